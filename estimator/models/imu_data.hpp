@@ -1,0 +1,25 @@
+// What the estimator reads: a view of one recording's increments. The owner keeps the memory.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "estimator/geometry/earth.hpp"
+
+namespace selfcal {
+
+struct ImuData {
+  earth::Position site;                                // known position of the site
+  double sample_rate_hz = 0.0;                         // nominal
+  std::span<const double> time_s;                      // [N] end of each interval, strictly increasing
+  std::span<const std::array<double, 3>> delta_theta;  // [N] rad, gyro output integrated over the interval, b
+  std::span<const std::array<double, 3>> delta_v;      // [N] m/s, accelerometer output integrated, b
+  std::span<const double> gimbal_outer;                // [N] rad, may be empty: used to name positions only
+  std::span<const double> gimbal_inner;                // [N] rad, may be empty
+  std::span<const double> temperature;                 // [N] degC of the first channel, may be empty
+
+  std::size_t size() const { return time_s.size(); }
+};
+
+}  // namespace selfcal
