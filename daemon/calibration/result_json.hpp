@@ -1,0 +1,24 @@
+// The answer as the JSON document of interfaces.md (`selfcal estimate --json`; the daemon keeps the same text).
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "estimator/passes/calibration.hpp"
+#include "protocol/recording/recording.hpp"
+
+namespace selfcal {
+
+// Names and units of the 24 are those of sensor_parameters. `warnings` are the reader's. With `curves` the passes
+// carry their convergence (epochs, values, sigmas) and the document its correlation matrix, for the report.
+nlohmann::ordered_json result_json(const CalibrationResult& result, const CalibrationOptions& options,
+                                   const Recording& recording, const std::vector<std::string>& warnings,
+                                   bool curves = false);
+
+// As one line of text, for those who keep it rather than look into it. Not finite numbers become null.
+std::string result_json_text(const CalibrationResult& result, const CalibrationOptions& options,
+                             const Recording& recording, const std::vector<std::string>& warnings,
+                             bool curves = false);
+
+}  // namespace selfcal

@@ -1,0 +1,27 @@
+// Recording interchange format version 1, as an HDF5 file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "protocol/error.hpp"
+#include "protocol/recording/check.hpp"
+#include "protocol/recording/recording.hpp"
+
+namespace selfcal {
+
+// Reads and checks a recording: any chunking and compression that the HDF5 library knows, f4 or f8, fixed or
+// variable strings; unknown attributes and datasets are ignored. Errors (bad_input) name file, dataset, row, value.
+Expected<LoadedRecording> read_hdf5(const std::filesystem::path& path, const CheckPolicy& policy = {});
+
+// The same from a file image in memory (used by the fuzzer; `name` is what messages call it).
+Expected<LoadedRecording> read_hdf5_image(const void* image, std::size_t size, const std::string& name,
+                                          const CheckPolicy& policy = {});
+
+// Writes f8, chunked, shuffled and deflated. The file appears under its name complete and on disk, or not at all:
+// it is written beside its place, synced, and renamed; an existing file is replaced only by a complete one. A full
+// disk or an unwritable folder is an error (internal: it is this machine that fails) and leaves no partial file.
+Expected<void> write_hdf5(const Recording& recording, const std::filesystem::path& path);
+
+}  // namespace selfcal
