@@ -1,0 +1,51 @@
+// Concealed physics: what the 24-parameter model leaves out, each effect from its equation on the true motion.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/error.hpp"
+
+namespace selfcal::sim {
+
+// One number of an effect: its name in the file, the unit it is written in, SI value per unit, and the value taken
+// where the file does not name it.
+struct EffectParameter {
+  std::string_view name;
+  std::string_view unit;
+  double si_per_unit = 1.0;
+  double default_value = 0.0;   // in the unit
+};
+
+struct EffectDescription {
+  std::string_view id;          // as in the mismatch catalogue, or, in_catalogue false, one of ours beyond it
+  bool in_catalogue = true;
+  std::span<const EffectParameter> parameters;
+};
+
+// Every effect the simulation knows.
+std::span<const EffectDescription> physics_effects();
+
+struct PhysicsEffect {
+  std::string id;
+  std::vector<double> values;   // SI, in the order of the description's parameters
+};
+
+// Effects add up. The same effect may stand twice (two spectral lines, two settlings).
+struct ConcealedPhysics {
+  std::vector<PhysicsEffect> effects;
+};
+
+// Reads a physics file:
+//   [[effect]]
+//   id = "accel_relaxation"
+//   x = 50.0            # names and units as in physics_effects()
+//   tau_s = 60.0
+// Unknown id or key, wrong type, non-finite value: bad_input naming file, line and key.
+[[nodiscard]] Expected<ConcealedPhysics> read_physics(const std::string& path);
+[[nodiscard]] Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name);
+
+}  // namespace selfcal::sim
