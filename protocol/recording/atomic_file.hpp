@@ -20,6 +20,6 @@ Expected<void> commit_file(const std::filesystem::path& temporary, const std::fi
 Expected<void> write_file_atomically(const std::filesystem::path& path, std::string_view contents);
 
 // Whole file as text; an error where it cannot be read or is longer than `limit` bytes.
-Expected<std::string> read_text_file(const std::filesystem::path& path, std::size_t limit = std::size_t{1} << 32);
+Expected<std::string> read_text_file(const std::filesystem::path& path, std::size_t limit);
 
 }  // namespace selfcal
