@@ -1,0 +1,43 @@
+// The commands of `selfcal`: each file of this folder that holds one registers it, and main.cpp offers them all.
+//
+//   namespace {
+//   CommandRun configure(CLI::App& app) {
+//     auto options = std::make_shared<Options>();
+//     app.add_option("FILE", options->file, "...")->required();
+//     return [options]() -> Expected<int> { ...; return 0; };
+//   }
+//   const CommandRegistration registration{{"estimate", "the 24 sensor errors of a recording", configure}};
+//   }  // namespace
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "protocol/error.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace selfcal::cli {
+
+// Runs the command once its options are parsed: 0 done, 1 done but the answer is no. An Error's message is printed
+// on one line of standard error, and its kind is the exit status.
+using CommandRun = std::function<Expected<int>()>;
+
+struct Command {
+  std::string name;
+  std::string description;
+  std::function<CommandRun(CLI::App&)> configure;   // adds options to the subcommand's parser
+};
+
+class CommandRegistration {
+ public:
+  explicit CommandRegistration(Command command);
+};
+
+// All registered, by name.
+const std::vector<Command>& commands();
+
+}  // namespace selfcal::cli

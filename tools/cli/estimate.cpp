@@ -1,0 +1,103 @@
+// selfcal estimate: the 24 sensor errors of a recording.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/calibration/result_json.hpp"
+#include "daemon/calibration/result_table.hpp"
+#include "protocol/recording/recording_file.hpp"
+#include "tools/cli/command.hpp"
+#include "tools/cli/estimator_arguments.hpp"
+#include "tools/cli/terminal.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+struct EstimateArguments {
+  std::string recording;
+  bool json = false;
+  bool curves = false;
+  std::string covariance = "once";
+  int max_passes = CalibrationOptions{}.max_passes;
+  double convergence_sigma = CalibrationOptions{}.convergence_sigma;
+  std::vector<std::string> tolerance;
+  NoiseArguments noise;
+};
+
+Expected<CalibrationOptions> options_from(const EstimateArguments& arguments) {
+  CalibrationOptions options;
+  options.noise = arguments.noise.in_si();
+  options.max_passes = arguments.max_passes;
+  options.convergence_sigma = arguments.convergence_sigma;
+  options.carried_covariance = arguments.covariance == "carried";
+  const Expected<ParameterVector> tolerance = tolerance_from(arguments.tolerance);
+  if (!tolerance) {
+    return tl::unexpected(tolerance.error());
+  }
+  options.tolerance = *tolerance;
+  return options;
+}
+
+std::string progress_text(const CalibrationProgress& progress) {
+  return fmt::format("pass {} {}: {:3.0f} %", progress.pass,
+                     progress.direction == PassDirection::forward ? "forward" : "reverse",
+                     100.0 * progress.fraction);
+}
+
+Expected<int> estimate(const EstimateArguments& arguments) {
+  const Expected<CalibrationOptions> options = options_from(arguments);
+  if (!options) {
+    return tl::unexpected(options.error());
+  }
+  const Expected<LoadedRecording> loaded = read_recording(arguments.recording);
+  if (!loaded) {
+    return tl::unexpected(loaded.error());
+  }
+  for (const std::string& warning : loaded->warnings) {
+    fmt::print(stderr, "selfcal estimate: warning: {}: {}\n", arguments.recording, warning);
+  }
+  Expected<CalibrationResult> result = [&] {
+    ProgressLine line;
+    return calibrate_recording(loaded->recording, *options,
+                               [&line](const CalibrationProgress& p) { line.show(progress_text(p)); });
+  }();
+  if (!result) {
+    return fail(result.error().kind, fmt::format("{}: {}", arguments.recording, result.error().message));
+  }
+  if (arguments.json) {
+    fmt::print("{}\n", result_json_text(*result, *options, loaded->recording, loaded->warnings, arguments.curves));
+  } else {
+    fmt::print("{}", result_table(*result, *options, loaded->recording, use_colour(stdout)));
+  }
+  return acceptable(*result) ? 0 : 1;
+}
+
+CommandRun configure(CLI::App& app) {
+  auto arguments = std::make_shared<EstimateArguments>();
+  app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
+  app.add_flag("--json", arguments->json, "one JSON document on standard output");
+  app.add_flag("--curves", arguments->curves, "with --json: convergence within the passes, and the correlations");
+  arguments->noise.add_to(app);
+  app.add_option("--covariance", arguments->covariance,
+                 "once: every datum counts once; carried: kept from pass to pass (overconfident, for comparison)")
+      ->check(CLI::IsMember({"once", "carried"}))
+      ->capture_default_str();
+  app.add_option("--max-passes", arguments->max_passes, "stop after so many passes")
+      ->check(CLI::Range(3, 99))
+      ->capture_default_str();
+  app.add_option("--convergence", arguments->convergence_sigma,
+                 "stop when no parameter moves by more than this fraction of its sigma")
+      ->check(CLI::Range(1e-6, 1.0))
+      ->capture_default_str();
+  app.add_option("--tolerance", arguments->tolerance,
+                 "NAME=VALUE: sigma beyond which a parameter (gyro_scale_y) or group (gyro_scale) is not determined");
+  return [arguments] { return estimate(*arguments); };
+}
+
+const CommandRegistration registration{{"estimate", "the 24 sensor errors of a recording", configure}};
+
+}  // namespace
+}  // namespace selfcal::cli
