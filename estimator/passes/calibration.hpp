@@ -14,11 +14,9 @@
 
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/models/imu_data.hpp"
+#include "estimator/models/sensor_model.hpp"
 
 namespace selfcal {
-
-using ParameterVector = Eigen::Matrix<double, sensor_parameter_count, 1>;   // SI, order of sensor_parameters
-using ParameterMatrix = Eigen::Matrix<double, sensor_parameter_count, sensor_parameter_count>;
 
 // Noise of the sensors and of the site; what is not given is estimated from the recording.
 struct NoiseOptions {

@@ -1,0 +1,28 @@
+// The one table of the state vector (mission.md). Positions are carried as lengths, so that all of the dynamic part
+// is in metres, metres per second and radians:
+//   dp = ((R_M+h) dL, dh, (R_N+h) cos L dlambda) | dv n u e | phi n u e | observation states | 24 parameters | extra
+// phi: C_computed = (I - [phi x]) C_true. Parameters: truth minus the values the navigation compensates with.
+// Observation states (coloured motion of a moored base) and extra parameters (diagnosis) may be absent.
+#pragma once
+
+#include "estimator/geometry/sensor_parameters.hpp"
+
+namespace selfcal {
+
+struct StateLayout {
+  static constexpr int position = 0;
+  static constexpr int velocity = 3;
+  static constexpr int attitude = 6;
+  static constexpr int navigation_count = 9;
+
+  int observation_count = 0;
+  int extra_count = 0;
+
+  int observation() const { return navigation_count; }
+  int dynamic_count() const { return navigation_count + observation_count; }
+  int parameters() const { return dynamic_count(); }
+  int constant_count() const { return sensor_parameter_count + extra_count; }
+  int count() const { return dynamic_count() + constant_count(); }
+};
+
+}  // namespace selfcal

@@ -1,0 +1,94 @@
+// One pass of navigation and filtering over a whole recording, forward or in reverse.
+//
+// The pass linearises about a trajectory: the given parameters and the attitude integrated from the given start. The
+// filter is exact for the linearised problem and starts from the prior every time, so that its covariance counts each
+// datum once; a sequence of passes is a Gauss-Newton iteration (estimator/README.md, "Passes").
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/filter/ud_filter.hpp"
+#include "estimator/navigation/interval_navigator.hpp"
+
+namespace selfcal {
+
+// Motion of the base along one axis of n, seen once per update interval: d_k = sum a_j d_{k-j} + w_k.
+struct MotionModel {
+  VectorX coefficients;              // a_1 ... a_p; empty: none
+  double innovation_sigma = 0.0;     // of w, m
+  double sigma = 0.0;                // of d, m
+};
+
+// The position of the site is observed at every update epoch as 0 = position error + motion + white noise.
+struct ObservationModel {
+  double sigma = 1e-5;                   // white, m, for a 1 s interval
+  std::array<MotionModel, 3> motion;     // north, up, east
+  int state_count() const;
+};
+
+struct NoiseModel {
+  double gyro_arw = 0.0;      // rad/s/sqrt(Hz)
+  double accel_vrw = 0.0;     // m/s^2/sqrt(Hz)
+  ObservationModel observation;
+};
+
+// 1 sigma before any data. The navigation part is wide enough to say nothing.
+struct PriorModel {
+  double position = 10.0;                 // m
+  double velocity = 2.0;                  // m/s
+  double attitude = 0.2;                  // rad
+  VectorX parameter_sigma;                // [24 + extra], about zero
+  std::optional<MatrixX> carried;         // [24 x 24] instead, about the linearisation: counts data again
+};
+
+struct PassInput {
+  const ImuData* data = nullptr;
+  ParameterVector parameters = ParameterVector::Zero();   // linearisation
+  VectorX extra_prior_mean;                               // [extra] prior mean less linearisation; may be empty
+  Matrix3 C_nb = Matrix3::Identity();                     // where the pass begins
+  double sign = 1.0;
+  double interval_s = 1.0;
+  NoiseModel noise;
+  PriorModel prior;
+  ExtraSignatures* extra = nullptr;
+};
+
+struct Epoch {
+  double time_s = 0.0;               // where the position is observed
+  double interval_middle_s = 0.0;    // of the data between this observation and the one before
+  Vector3 innovation;                // m, each given those before it
+  Vector3 variance;                  // predicted, m^2
+};
+
+struct PassOutput {
+  StateLayout layout;
+  VectorX mean;                      // of the state at the end of the pass
+  MatrixX covariance;
+  Matrix3 C_nb;                      // attitude at the end, corrected
+  std::vector<Epoch> epochs;
+  double nis_mean = 0.0;             // per degree of freedom
+  double log_likelihood = 0.0;
+  std::vector<double> history_s;
+  std::vector<ParameterVector> history_value, history_sigma;
+  bool stopped = false;
+};
+
+// Told a few hundred times per pass: fraction done, parameters and their sigma (SI).
+using PassProgress = std::function<void(double, const ParameterVector&, const ParameterVector&)>;
+// Shown every interval after it was propagated and before its observation, and every scalar update after it.
+class PassObserver {
+ public:
+  virtual ~PassObserver() = default;
+  virtual void propagated(const Interval& interval, const UdFilter& filter) = 0;
+  virtual void updated(int axis, const VectorX& h_dynamic, const ScalarInnovation& innovation,
+                       const UdFilter& filter) = 0;
+};
+
+PassOutput run_pass(const PassInput& input, const PassProgress& progress = {}, const std::stop_token& stop = {},
+                    PassObserver* observer = nullptr);
+
+}  // namespace selfcal
