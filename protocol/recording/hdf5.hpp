@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "protocol/error.hpp"
 #include "protocol/recording/check.hpp"
@@ -12,10 +11,11 @@
 namespace selfcal {
 
 // Reads and checks a recording: any chunking and compression that the HDF5 library knows, f4 or f8, fixed or
-// variable strings; unknown attributes and datasets are ignored. Errors (bad_input) name file, dataset, row, value.
+// variable strings; unknown attributes and datasets are ignored. Errors (bad_input) name file, dataset, row, value. The library parses in a
+// child process (isolated_parse.hpp): a damaged file that kills it is an error like any other.
 Expected<LoadedRecording> read_hdf5(const std::filesystem::path& path, const CheckPolicy& policy = {});
 
-// The same from a file image in memory (used by the fuzzer; `name` is what messages call it).
+// The same from a file image in memory (`name` is what messages call it).
 Expected<LoadedRecording> read_hdf5_image(const void* image, std::size_t size, const std::string& name,
                                           const CheckPolicy& policy = {});
 

@@ -1,0 +1,164 @@
+// Every fault that the format names, put into a sound recording: one clear error with dataset, row and value.
+#include "protocol/recording/check.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "tests/unit/recording/sample_recording.hpp"
+
+namespace selfcal {
+namespace {
+
+using test::sample_recording;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+std::string error_of(const Recording& recording, const CheckPolicy& policy = {}) {
+  const auto checked = check_recording(recording, policy);
+  if (checked) {
+    return "no error";
+  }
+  EXPECT_EQ(checked.error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(checked.error().message.find('\n'), std::string::npos);
+  return checked.error().message;
+}
+
+TEST(CheckRecording, SoundOneHasNoWarning) {
+  const auto checked = check_recording(sample_recording());
+  ASSERT_TRUE(checked) << checked.error().message;
+  EXPECT_TRUE(checked->empty());
+}
+
+TEST(CheckRecording, NonFiniteValueIsNamed) {
+  Recording r = sample_recording();
+  r.delta_theta_rad[17][2] = nan;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("delta_theta_rad"), HasSubstr("row 17"), HasSubstr("nan")));
+  r = sample_recording();
+  r.delta_v_mps[600][0] = -infinite;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("delta_v_mps"), HasSubstr("row 600, column 0"), HasSubstr("-inf")));
+  r = sample_recording();
+  r.gimbal_inner_rad[3] = infinite;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("gimbal_inner_rad"), HasSubstr("row 3"), HasSubstr("inf")));
+  r = sample_recording();
+  r.temperature_c[2 * 41 + 1] = nan;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("temperature_c"), HasSubstr("row 41, column 1")));
+  r = sample_recording();
+  r.schedule_deg[1][0] = nan;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("schedule_deg"), HasSubstr("row 1, column 0")));
+}
+
+TEST(CheckRecording, TimeMustIncrease) {
+  Recording r = sample_recording();
+  r.time_s[100] = r.time_s[99];
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("time_s: row 100"), HasSubstr("not after"), HasSubstr("2 s")));
+}
+
+TEST(CheckRecording, GapIsNamedAndMayBeLetPass) {
+  Recording r = sample_recording();
+  for (std::size_t row = 500; row < r.size(); ++row) {
+    r.time_s[row] += 0.5;
+  }
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("time_s: row 500"), HasSubstr("gap of 0.52 s")));
+  const auto lenient = check_recording(r, {.gaps_are_errors = false});
+  ASSERT_TRUE(lenient) << lenient.error().message;
+  EXPECT_THAT(*lenient, ::testing::ElementsAre(HasSubstr("row 500")));
+}
+
+TEST(CheckRecording, JitterOfATenthIsNoGap) {
+  Recording r = sample_recording();
+  for (std::size_t row = 0; row < r.size(); row += 2) {
+    r.time_s[row] += 0.1 / r.sample_rate_hz;
+  }
+  EXPECT_EQ(error_of(r), "no error");
+}
+
+TEST(CheckRecording, RateThatContradictsTime) {
+  for (const double rate : {25.0, 49.9, 50.1, 100.0, 200.0}) {
+    Recording r = sample_recording();
+    r.sample_rate_hz = rate;
+    EXPECT_THAT(error_of(r), AllOf(HasSubstr("sample_rate_hz"), HasSubstr("contradicts"), HasSubstr("50 Hz")))
+        << rate;
+  }
+  Recording r = sample_recording();
+  r.sample_rate_hz = 50.01;   // 2e-4: a crystal
+  EXPECT_EQ(error_of(r), "no error");
+}
+
+TEST(CheckRecording, SiteAndTimingInRange) {
+  for (const auto& [member, name] : {std::pair{&Recording::latitude_deg, "latitude_deg"},
+                                     {&Recording::longitude_deg, "longitude_deg"},
+                                     {&Recording::height_m, "height_m"},
+                                     {&Recording::sample_rate_hz, "sample_rate_hz"}}) {
+    for (const double value : {-1e6, 1e6, nan, infinite}) {
+      Recording r = sample_recording();
+      r.*member = value;
+      EXPECT_THAT(error_of(r), AllOf(HasSubstr(name), HasSubstr("outside"))) << value;
+    }
+  }
+  Recording r = sample_recording();
+  r.latitude_deg = 90.001;
+  EXPECT_THAT(error_of(r), HasSubstr("latitude_deg = 90.001"));
+}
+
+TEST(CheckRecording, LengthsMustAgree) {
+  Recording r = sample_recording();
+  r.delta_v_mps.pop_back();
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("delta_v_mps"), HasSubstr("1199 rows"), HasSubstr("1200")));
+  Recording empty;
+  empty.sample_rate_hz = 50.0;
+  EXPECT_THAT(error_of(empty), HasSubstr("time_s: 0 rows"));
+}
+
+TEST(CheckRecording, IncrementsInTheWrongUnitAreNotGravity) {
+  Recording r = sample_recording();
+  for (auto& d : r.delta_v_mps) {
+    for (double& component : d) component /= 9.80665;   // in g s
+  }
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("delta_v_mps"), HasSubstr("mean specific force")));
+}
+
+class GimbalCheck : public ::testing::Test {
+ protected:
+  Recording r = sample_recording();
+};
+
+TEST_F(GimbalCheck, ReversedAxis) {
+  for (double& angle : r.gimbal_outer_rad) angle = -angle;
+  EXPECT_THAT(error_of(r), AllOf(HasSubstr("gimbal_outer_rad"), HasSubstr("rows"), HasSubstr("deg")));
+}
+
+TEST_F(GimbalCheck, SwappedAxes) {
+  std::swap(r.gimbal_outer_rad, r.gimbal_inner_rad);
+  EXPECT_THAT(error_of(r), HasSubstr("delta_theta_rad"));
+}
+
+TEST_F(GimbalCheck, StandsStillWhileTheGyrosTurn) {
+  for (double& angle : r.gimbal_inner_rad) angle = 0.0;
+  EXPECT_THAT(error_of(r), HasSubstr("read-outs turned 0.0 and 0.0 deg"));
+}
+
+TEST_F(GimbalCheck, DegreesForRadians) {
+  for (double& angle : r.gimbal_outer_rad) angle *= 180.0 / std::numbers::pi;
+  EXPECT_THAT(error_of(r), HasSubstr("gimbal"));
+}
+
+TEST_F(GimbalCheck, AWarningWhereThePolicySaysSo) {
+  for (double& angle : r.gimbal_outer_rad) angle = -angle;
+  const auto checked = check_recording(r, {.gimbal_contradiction_is_error = false});
+  ASSERT_TRUE(checked);
+  EXPECT_THAT(*checked, ::testing::ElementsAre(HasSubstr("gimbal")));
+}
+
+TEST_F(GimbalCheck, OneDegreeOfReadOutErrorIsAllowed) {
+  for (double& angle : r.gimbal_outer_rad) angle *= 1.0 + 1.0 / 90.0;   // 1 deg over the turn
+  EXPECT_EQ(error_of(r), "no error");
+}
+
+}  // namespace
+}  // namespace selfcal
