@@ -9,8 +9,6 @@ UdFilter::UdFilter(const VectorX& mean, const VectorX& sigma, int constants)
       x_(mean),
       U_(MatrixX::Identity(mean.size(), mean.size())),
       D_(sigma.cwiseAbs2()),
-      work_(dynamic_, 2 * dynamic_),
-      weights_(2 * dynamic_),
       f_(mean.size()),
       v_(mean.size()),
       gain_(VectorX::Zero(mean.size())) {
@@ -40,16 +38,17 @@ void UdFilter::propagate(const MatrixX& Phi, const MatrixX& Gamma, const VectorX
   U_.topRightCorner(d, c).noalias() += Gamma * U_.bottomRightCorner(c, c).triangularView<Eigen::UnitUpper>();
 
   // (F1): U_xx' D_x' U_xx'^T = Phi U_xx D_x U_xx^T Phi^T + L q L^T by modified weighted Gram-Schmidt.
+  work_.resize(d, d + q.size());
   work_.leftCols(d).noalias() = Phi.lazyProduct(U_.topLeftCorner(d, d));
-  work_.rightCols(d) = L;
-  weights_.head(d) = D_.head(d);
-  weights_.tail(d) = q;
+  work_.rightCols(q.size()) = L;
+  weights_.resize(d + q.size());
+  weights_ << D_.head(d), q;
   for (int i = d - 1; i >= 0; --i) {
-    const VectorX weighted = work_.row(i).transpose().cwiseProduct(weights_);
-    const double norm = work_.row(i).dot(weighted);
+    weighted_ = work_.row(i).transpose().cwiseProduct(weights_);
+    const double norm = work_.row(i).dot(weighted_);
     D_(i) = norm;
     for (int j = 0; j < i; ++j) {
-      const double u = norm > 0.0 ? work_.row(j).dot(weighted) / norm : 0.0;
+      const double u = norm > 0.0 ? work_.row(j).dot(weighted_) / norm : 0.0;
       U_(j, i) = u;
       work_.row(j) -= u * work_.row(i);
     }

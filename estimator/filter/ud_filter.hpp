@@ -26,7 +26,8 @@ class UdFilter {
   // positive definite covers the first m constants.
   void set_constant_covariance(const MatrixX& covariance);
 
-  // x_d' = Phi x_d + Gamma x_c + drive + L w, w ~ (0, diag(q)). Phi, L [d x d], Gamma [d x c], drive, q [d].
+  // x_d' = Phi x_d + Gamma x_c + drive + L w, w ~ (0, diag(q)). Phi [d x d], Gamma [d x c], drive [d], L [d x k],
+  // q [k].
   void propagate(const MatrixX& Phi, const MatrixX& Gamma, const VectorX& drive, const MatrixX& L, const VectorX& q);
 
   // Observation of value = h^T x + noise; h has `rows` in the dynamic part alone.
@@ -46,8 +47,9 @@ class UdFilter {
   VectorX x_;
   MatrixX U_;
   VectorX D_;
-  MatrixX work_;       // [d x 2d] rows of the weighted Gram-Schmidt
-  VectorX weights_;    // [2d]
+  using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RowMajorMatrix work_;          // [d x (d+k)] rows of the weighted Gram-Schmidt
+  VectorX weights_, weighted_;   // [d+k]
   VectorX f_, v_, gain_;
 };
 

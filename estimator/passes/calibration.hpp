@@ -25,14 +25,17 @@ struct NoiseOptions {
   std::optional<double> position_sigma;        // m, white, at 1 Hz
 };
 
+// 1 sigma: 10 ug, 0.005 deg/h, 10 ppm, 5 arcsec. Derivation in estimator/README.md.
+ParameterVector default_tolerance();
+// The largest size a parameter of such sensors can have: 10 mg, 2 deg/h, 5000 ppm, 1 deg.
+ParameterVector plausible_limit();
+
 struct CalibrationOptions {
   NoiseOptions noise;
-  int max_passes = 9;                // at least 3: forward, reverse, forward
-  double convergence_sigma = 0.02;   // stop when no parameter moved by more than this fraction of its sigma
+  int max_passes = 12;               // after the noise is known; at least 3 in all: forward, reverse, forward
+  double convergence_sigma = 0.1;   // stop when no parameter moved by more than this fraction of its sigma
   bool carried_covariance = false;   // for comparison only: keep P from pass to pass, counting data again
   ParameterVector tolerance = default_tolerance();   // 1 sigma beyond which a parameter counts as not determined
-
-  static ParameterVector default_tolerance();   // see estimator/README.md
 };
 
 enum class PassDirection { forward, reverse };
@@ -67,6 +70,7 @@ struct Consistency {
   double nis_low = 0.0, nis_high = 0.0;          // its 99.9 % interval for a right model
   double whiteness_p_value = 0.0;     // portmanteau test on the innovations of the final pass
   double parity_max_sigma = 0.0;      // largest difference between last forward and last reverse answer, in sigma
+  double autocorrelation = 0.0;       // of the normalised innovations at lag 1, mean of the axes
   std::string words;                  // one or two sentences for people
 };
 

@@ -17,8 +17,8 @@ struct DynamicModel {
   DynamicModel(const ObservationModel& observation, const ProcessNoise& noise) {
     const int d = StateLayout::navigation_count + observation.state_count();
     Phi = MatrixX::Zero(d, d);
-    L = MatrixX::Identity(d, d);
-    q = VectorX::Zero(d);
+    L = MatrixX::Zero(d, StateLayout::navigation_count + 3);   // the last three drive the motion of each axis
+    q = VectorX::Zero(L.cols());
     drive = VectorX::Zero(d);
     L.topLeftCorner<9, 9>() = noise.L;
     q.head<9>() = noise.q;
@@ -33,7 +33,8 @@ struct DynamicModel {
         row(at) = 1.0;
         Phi.row(at).segment(at, p) = motion.coefficients.transpose();
         Phi.block(at + 1, at, p - 1, p - 1).setIdentity();
-        q(at) = motion.innovation_sigma * motion.innovation_sigma;
+        L(at, StateLayout::navigation_count + axis) = 1.0;
+        q(StateLayout::navigation_count + axis) = motion.innovation_sigma * motion.innovation_sigma;
         at += p;
       }
     }
@@ -111,6 +112,9 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       progress(std::min(1.0, index / intervals), out.history_value.back(), out.history_sigma.back());
     }
   };
+  for (const VectorX& h : model.h) {   // where the pass begins the position is known as well
+    filter.update(h, 0.0, noise_variance);
+  }
   while (navigator.next(interval)) {
     if (stop.stop_requested()) {
       out.stopped = true;
@@ -142,6 +146,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       out.log_likelihood -= 0.5 * (innovation.value * innovation.value / innovation.variance +
                                    std::log(2.0 * std::numbers::pi * innovation.variance));
     }
+    epoch.position = filter.mean().segment<3>(StateLayout::position);
     out.epochs.push_back(epoch);
     if (index % history_step == 0) {
       record_history();

@@ -62,6 +62,7 @@ struct Epoch {
   double interval_middle_s = 0.0;    // of the data between this observation and the one before
   Vector3 innovation;                // m, each given those before it
   Vector3 variance;                  // predicted, m^2
+  Vector3 position;                  // position state after the update, m: minus the motion of the base
 };
 
 struct PassOutput {

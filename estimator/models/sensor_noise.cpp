@@ -1,0 +1,225 @@
+#include "estimator/models/sensor_noise.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace selfcal {
+namespace {
+
+using Increments = std::span<const std::array<double, 3>>;
+
+constexpr int piece_length = 64;          // groups
+constexpr int lowest_bin = 6, highest_bin = 26;   // of piece_length
+// Increments are summed into groups. On a still base 0.5 s: pieces of 32 s, 0.19 to 0.8 Hz, where the noise of the
+// angle matters least (a slow rate leaves quantisation far from white above). On a moving one, or where dwells are too
+// short, 0.05 s: 3.2 s, 1.9 to 8 Hz, where sway has died out; it also makes quantisation white.
+constexpr double slow_group_s = 0.5, fast_group_s = 0.05;
+constexpr std::size_t enough_pieces = 10;
+constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
+constexpr double margin_s = 1.0;          // left out at both ends of a dwell
+constexpr int detrend_order = 4;
+
+// Takes a polynomial out of a piece and tapers it; sway is slow and large, and must not leak into the band.
+class PiecePreparation {
+ public:
+  PiecePreparation() : basis_(piece_length, detrend_order + 1), window_(piece_length) {
+    for (int i = 0; i < piece_length; ++i) {
+      const double t = (2.0 * i + 1.0) / piece_length - 1.0;
+      const double sine = std::sin(std::numbers::pi * (i + 0.5) / piece_length);
+      window_(i) = sine * sine * sine * sine;
+      for (int k = 0; k < basis_.cols(); ++k) {
+        basis_(i, k) = std::pow(t, k);
+      }
+    }
+    projector_ = basis_ * (basis_.transpose() * basis_).inverse() * basis_.transpose();
+    cosine_.resize(highest_bin - lowest_bin + 1, piece_length);
+    sine_.resize(highest_bin - lowest_bin + 1, piece_length);
+    for (int b = lowest_bin; b <= highest_bin; ++b) {
+      for (int i = 0; i < piece_length; ++i) {
+        const double phase = 2.0 * std::numbers::pi * b * i / piece_length;
+        cosine_(b - lowest_bin, i) = std::cos(phase);
+        sine_(b - lowest_bin, i) = std::sin(phase);
+      }
+    }
+  }
+
+  // Periodogram of rates (per s) at the bins, density per Hz, two-sided: white noise of asd N gives N^2.
+  Eigen::ArrayXd periodogram(const Eigen::VectorXd& rates, double group_s) const {
+    const Eigen::VectorXd x = (rates - projector_ * rates).cwiseProduct(window_);
+    return ((cosine_ * x).array().square() + (sine_ * x).array().square()) * (group_s / window_.squaredNorm());
+  }
+
+ private:
+  Eigen::MatrixXd basis_, projector_, cosine_, sine_;
+  Eigen::VectorXd window_;
+};
+
+struct Spectrum {
+  Eigen::ArrayXd density = Eigen::ArrayXd::Zero(highest_bin - lowest_bin + 1);
+  std::size_t pieces = 0;
+};
+
+Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<Segment>& segments,
+                       double group_s) {
+  static const PiecePreparation preparation;
+  const auto group = static_cast<std::size_t>(std::max(1.0, std::round(group_s * rate_hz)));
+  const std::size_t length = group * piece_length;
+  const auto margin = static_cast<std::size_t>(margin_s * rate_hz);
+  std::size_t available = 0;
+  for (const Segment& s : segments) {
+    available += s.rotation || s.last - s.first < 2 * margin ? 0 : (s.last - s.first - 2 * margin) / length;
+  }
+  const std::size_t stride = std::max<std::size_t>(1, available / most_pieces);
+  Spectrum spectrum;
+  std::size_t piece = 0;
+  Eigen::VectorXd rates(piece_length);
+  for (const Segment& s : segments) {
+    if (s.rotation || s.last - s.first < 2 * margin) {
+      continue;
+    }
+    for (std::size_t first = s.first + margin; first + length <= s.last - margin; first += length) {
+      if (piece++ % stride != 0) {
+        continue;
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        for (int i = 0; i < piece_length; ++i) {
+          double sum = 0.0;
+          for (std::size_t k = 0; k < group; ++k) {
+            sum += increments[first + static_cast<std::size_t>(i) * group + k][axis];
+          }
+          rates(i) = sum / (static_cast<double>(group) / rate_hz);
+        }
+        spectrum.density += preparation.periodogram(rates, group_s) / 3.0;
+      }
+      ++spectrum.pieces;
+    }
+  }
+  if (spectrum.pieces > 0) {
+    spectrum.density /= static_cast<double>(spectrum.pieces);
+  }
+  return spectrum;
+}
+
+// density = N^2 + Q^2 * 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
+void fit_density(const Spectrum& spectrum, double group_s, TriadNoise& noise) {
+  const Eigen::Index bins = spectrum.density.size();
+  Eigen::ArrayXd shape(bins);
+  for (Eigen::Index b = 0; b < bins; ++b) {
+    const double sine = std::sin(std::numbers::pi * static_cast<double>(b + lowest_bin) / piece_length);
+    shape(b) = 4.0 * sine * sine / group_s;
+  }
+  std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
+  std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
+  double white = sorted[static_cast<std::size_t>(bins / 2)];
+  double angle = 0.0;
+  for (int round = 0; round < 20; ++round) {
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    for (Eigen::Index b = 0; b < bins; ++b) {
+      const double model = white + angle * shape(b);
+      if (round > 0 && spectrum.density(b) > 2.0 * model) {
+        continue;   // a line
+      }
+      const Eigen::Vector2d row(1.0 / model, shape(b) / model);
+      normal += row * row.transpose();
+      right += row * spectrum.density(b) / model;
+    }
+    const Eigen::Vector2d fit = normal.inverse() * right;
+    angle = std::max(0.0, fit(1));
+    white = angle > 0.0 ? fit(0) : right(0) / normal(0, 0);
+    white = std::max(white, 1e-6 * sorted[static_cast<std::size_t>(bins / 2)]);
+  }
+  noise.white_asd = std::sqrt(white);
+  noise.increment_sigma = std::sqrt(angle);
+}
+
+// The quantum: increments that are whole multiples of a step larger than their own rounding.
+double find_quantum(Increments increments) {
+  const std::size_t count = std::min<std::size_t>(increments.size(), 4000);
+  double smallest = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double x : increments[i]) {
+      const double size = std::abs(x);
+      if (size > 0.0 && (smallest == 0.0 || size < smallest)) {
+        smallest = size;
+      }
+    }
+  }
+  if (smallest == 0.0) {
+    return 0.0;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double x : increments[i]) {
+      const double ratio = x / smallest;
+      if (std::abs(ratio - std::round(ratio)) > 1e-3 * std::max(1.0, std::abs(ratio) * 1e-3)) {
+        return 0.0;
+      }
+    }
+  }
+  return smallest;
+}
+
+// Half the mean square of differences of successive 1 s sums inside dwells.
+double second_variance(const ImuData& data, const std::vector<Segment>& segments) {
+  const auto second = static_cast<std::size_t>(std::max(1.0, std::round(data.sample_rate_hz)));
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (const Segment& s : segments) {
+    if (s.rotation) {
+      continue;
+    }
+    Vector3 previous = Vector3::Zero();
+    bool have = false;
+    for (std::size_t first = s.first + second; first + 2 * second <= s.last; first += second) {
+      Vector3 velocity = Vector3::Zero();
+      for (std::size_t i = first; i < first + second; ++i) {
+        velocity += Eigen::Map<const Vector3>(data.delta_v[i].data());
+      }
+      if (have) {
+        sum += (velocity - previous).squaredNorm() / 6.0;
+        ++count;
+      }
+      previous = velocity;
+      have = true;
+    }
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
+}  // namespace
+
+SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments) {
+  SensorNoise noise;
+  const auto fit = [&](double group_s) {
+    const Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
+    const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, group_s);
+    if (gyro.pieces > 0) {
+      fit_density(gyro, group_s, noise.gyro);
+      fit_density(accel, group_s, noise.accel);
+    }
+    return gyro.pieces;
+  };
+  noise.spectra = fit(fast_group_s);
+  if (noise.spectra > 0) {
+    // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
+    const double expected = noise.accel.white_asd * noise.accel.white_asd;
+    noise.base_moves = second_variance(data, segments) > 25.0 * expected;
+    if (!noise.base_moves) {
+      const SensorNoise fast = noise;
+      const std::size_t pieces = fit(slow_group_s);
+      if (pieces >= enough_pieces) {
+        noise.spectra = pieces;
+      } else {
+        noise = fast;
+      }
+    }
+  }
+  noise.gyro.quantum = find_quantum(data.delta_theta);
+  noise.accel.quantum = find_quantum(data.delta_v);
+  return noise;
+}
+
+}  // namespace selfcal

@@ -1,0 +1,323 @@
+#include "estimator/passes/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/geometry/units.hpp"
+#include "estimator/models/motion_fit.hpp"
+#include "estimator/models/segments.hpp"
+#include "estimator/models/sensor_noise.hpp"
+#include "estimator/navigation/coarse_alignment.hpp"
+#include "estimator/passes/consistency.hpp"
+#include "estimator/passes/pass.hpp"
+
+namespace selfcal {
+namespace {
+
+constexpr double interval_s = 1.0;
+constexpr double least_duration_s = 60.0;
+// Until the site's own noise is known. Moored: decimetres.
+constexpr double first_still_sigma = 3e-6;    // m
+constexpr double first_moored_sigma = 0.2;    // m
+constexpr double least_position_sigma = 1e-6; // m: a still base stands to micrometres
+constexpr int motion_order = 8;               // up to four spectral peaks per axis
+constexpr int most_motion_fits = 8;
+constexpr int motion_start_up = 100;          // epochs left out of the first fit, while the filter settles
+constexpr double fair_nis = 10.0;             // beyond it another heading is tried
+
+ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale, double accel_angle, double gyro_scale,
+                       double gyro_angle) {
+  ParameterVector v;
+  v.segment<3>(parameter::accel_bias).setConstant(accel_bias);
+  v.segment<3>(parameter::gyro_drift).setConstant(gyro_drift);
+  v.segment<6>(parameter::accel_scale_pos).setConstant(accel_scale);
+  v.segment<3>(parameter::accel_misalignment).setConstant(accel_angle);
+  v.segment<3>(parameter::gyro_scale).setConstant(gyro_scale);
+  v.segment<6>(parameter::gyro_misalignment).setConstant(gyro_angle);
+  return v;
+}
+
+Vector3 axis_nis(const PassOutput& pass) {
+  Vector3 sum = Vector3::Zero();
+  for (const Epoch& e : pass.epochs) {
+    sum += e.innovation.cwiseAbs2().cwiseQuotient(e.variance);
+  }
+  return sum / static_cast<double>(pass.epochs.size());
+}
+
+// What the passes hand on to each other, and the answer so far.
+class Calibration {
+ public:
+  Calibration(const ImuData& data, const CalibrationOptions& options,
+              const std::function<void(const CalibrationProgress&)>& progress, const std::stop_token& stop)
+      : data_(data), options_(options), progress_(progress), stop_(stop), segments_(find_segments(data)) {
+    noise_ = estimate_sensor_noise(data, segments_);
+    input_.data = &data;
+    input_.interval_s = interval_s;
+    input_.prior.parameter_sigma = 2.0 * plausible_limit();
+    input_.noise.gyro_arw = options.noise.gyro_arw.value_or(noise_.gyro.white_asd);
+    input_.noise.accel_vrw = options.noise.accel_vrw.value_or(noise_.accel.white_asd);
+    input_.noise.observation.sigma =
+        options.noise.position_sigma.value_or(noise_.base_moves ? first_moored_sigma : first_still_sigma);
+  }
+
+  CalibrationOutcome run();
+
+ private:
+  bool align();
+  bool pass(double sign);
+  bool settle(int least_passes);
+  bool fit_position_sigma();
+  bool fit_base_motion();
+  bool sharpen_base_motion(double best_likelihood);
+  CalibrationResult result();
+  ParameterVector sigma() const {
+    return last_.covariance.diagonal().segment<sensor_parameter_count>(last_.layout.parameters()).cwiseSqrt();
+  }
+
+  const ImuData& data_;
+  const CalibrationOptions& options_;
+  const std::function<void(const CalibrationProgress&)>& progress_;
+  const std::stop_token& stop_;
+  std::vector<Segment> segments_;
+  SensorNoise noise_;
+  PassInput input_;
+  PassOutput last_;
+  double next_sign_ = 1.0;
+  std::vector<PassSummary> passes_;
+  double last_move_ = 0.0;
+  bool converged_ = false;
+};
+
+// One pass from where the last one ended; the next will go the other way.
+bool Calibration::pass(double sign) {
+  input_.sign = sign;
+  const auto direction = sign > 0.0 ? PassDirection::forward : PassDirection::reverse;
+  const int number = static_cast<int>(passes_.size()) + 1;
+  PassProgress report;
+  if (progress_) {
+    report = [&](double fraction, const ParameterVector& value, const ParameterVector& s) {
+      progress_({number, direction, fraction, value, s});
+    };
+  }
+  last_ = run_pass(input_, report, stop_);
+  if (last_.stopped) {
+    return false;
+  }
+  const ParameterVector value =
+      input_.parameters + last_.mean.segment<sensor_parameter_count>(last_.layout.parameters());
+  last_move_ = (value - input_.parameters).cwiseAbs().cwiseQuotient(sigma()).maxCoeff();
+  passes_.push_back({direction, static_cast<double>(data_.size()) / data_.sample_rate_hz, last_.nis_mean, last_move_,
+                     last_.history_s, last_.history_value, last_.history_sigma});
+  input_.parameters = value;
+  input_.C_nb = last_.C_nb;
+  next_sign_ = -sign;
+  if (options_.carried_covariance) {
+    const int at = last_.layout.parameters();
+    input_.prior.carried =
+        last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).eval();
+  }
+  return true;
+}
+
+// Coarse alignment and the first pass. Where the first pass makes no sense the heading was wrong (a poor view of
+// Earth's rotation): the other quadrants are tried, and the best kept.
+bool Calibration::align() {
+  const bool dwells = !segments_.empty() && !segments_[0].rotation;
+  const double duration = data_.time_s.back() - data_.time_s.front();
+  const double first_dwell = dwells ? segments_[0].end_s - segments_[0].start_s : 0.0;
+  const Matrix3 C_coarse = coarse_alignment(data_, std::min(duration, std::max(first_dwell, least_duration_s))).C_nb;
+  double best_nis = 0.0;
+  Matrix3 C_best = C_coarse;
+  for (int quadrant = 0; quadrant < 4; ++quadrant) {
+    const Matrix3 C_try = rotation_y(0.5 * M_PI * quadrant) * C_coarse;
+    input_.C_nb = C_try;
+    input_.parameters.setZero();
+    passes_.clear();
+    if (!pass(+1.0)) {
+      return false;
+    }
+    if (quadrant == 0 || last_.nis_mean < best_nis) {
+      best_nis = last_.nis_mean;
+      C_best = C_try;
+    }
+    if (last_.nis_mean < fair_nis) {
+      return true;
+    }
+  }
+  input_.C_nb = C_best;
+  input_.parameters.setZero();
+  passes_.clear();
+  return pass(+1.0);
+}
+
+// Passes until the parameters stand still.
+bool Calibration::settle(int least_passes) {
+  converged_ = false;
+  for (int count = 0; count < options_.max_passes; ++count) {
+    if (!pass(next_sign_)) {
+      return false;
+    }
+    if (static_cast<int>(passes_.size()) >= least_passes && last_move_ < options_.convergence_sigma) {
+      converged_ = true;
+      break;
+    }
+  }
+  return true;
+}
+
+// A still base: the white position noise is the one with the greatest likelihood, from 1 um upwards by factors of 3.
+bool Calibration::fit_position_sigma() {
+  PassOutput best = last_;
+  double best_sigma = input_.noise.observation.sigma;
+  const auto attempt = [&](double candidate) {
+    PassInput trial = input_;
+    trial.sign = next_sign_;
+    trial.noise.observation.sigma = candidate;
+    const PassOutput out = run_pass(trial, {}, stop_);
+    const bool better = !out.stopped && out.log_likelihood > best.log_likelihood;
+    if (better) {
+      best = out;
+      best_sigma = candidate;
+    }
+    return better;
+  };
+  // Innovations stronger than predicted ask for more noise, weaker ones for less.
+  const double factor = last_.nis_mean > 1.0 ? 3.0 : 1.0 / 3.0;
+  for (double s = factor * best_sigma; s < 1.0 && s > 0.9 * least_position_sigma && attempt(s); s *= factor) {
+  }
+  input_.noise.observation.sigma = std::max(best_sigma, least_position_sigma);
+  return !stop_.stop_requested();
+}
+
+// A moored base: an autoregressive model of its motion, fitted to what the filter took for motion, again and again
+// while the likelihood grows.
+bool Calibration::fit_base_motion() {
+  ObservationModel best = input_.noise.observation;
+  double best_likelihood = last_.log_likelihood;
+  for (int fit = 0; fit < most_motion_fits; ++fit) {
+    ObservationModel& model = input_.noise.observation;
+    const auto count = static_cast<Eigen::Index>(last_.epochs.size());
+    const Eigen::Index skip = std::min<Eigen::Index>(motion_start_up, count / 4);
+    for (int axis = 0; axis < 3; ++axis) {
+      VectorX series(count - skip);
+      for (Eigen::Index k = skip; k < count; ++k) {
+        const Epoch& e = last_.epochs[static_cast<std::size_t>(k)];
+        series(k - skip) = fit == 0 ? e.innovation(axis) : -e.position(axis);
+      }
+      model.motion[static_cast<std::size_t>(axis)] = fit_motion(series, motion_order);
+    }
+    model.sigma = first_still_sigma;
+    if (!pass(next_sign_)) {
+      return false;
+    }
+    if (fit > 0 && last_.log_likelihood < best_likelihood + 3.0 * motion_order && fit > 3) {
+      break;
+    }
+    if (last_.log_likelihood > best_likelihood) {
+      best_likelihood = last_.log_likelihood;
+      best = model;
+    }
+  }
+  input_.noise.observation = best;
+  return sharpen_base_motion(best_likelihood);
+}
+
+// What drives the motion model was judged from a series with the filter's own noise in it, so it comes out too large:
+// drawn down, axis by axis, by what the innovations say, while the likelihood grows.
+bool Calibration::sharpen_base_motion(double best_likelihood) {
+  constexpr int most_rounds = 6;
+  for (int round = 0; round < most_rounds; ++round) {
+    const ObservationModel before = input_.noise.observation;
+    if (round > 0) {
+      const Vector3 nis = axis_nis(last_);
+      for (int axis = 0; axis < 3; ++axis) {
+        input_.noise.observation.motion[static_cast<std::size_t>(axis)].innovation_sigma *=
+            std::clamp(nis(axis), 0.2, 2.0);
+      }
+    }
+    if (!pass(next_sign_)) {
+      return false;
+    }
+    if (round > 0 && last_.log_likelihood < best_likelihood + 3.0) {
+      input_.noise.observation = last_.log_likelihood > best_likelihood ? input_.noise.observation : before;
+      break;
+    }
+    best_likelihood = last_.log_likelihood;
+  }
+  return true;
+}
+
+CalibrationOutcome Calibration::run() {
+  const CalibrationOutcome stopped{std::nullopt, {"stopped"}};
+  if (!align() || !pass(next_sign_)) {
+    return stopped;
+  }
+  if (!options_.noise.position_sigma) {
+    if (noise_.base_moves ? !fit_base_motion() : !fit_position_sigma()) {
+      return stopped;
+    }
+  }
+  if (!settle(3)) {
+    return stopped;
+  }
+  if (next_sign_ < 0.0 && !pass(next_sign_)) {   // end at the start: its attitude is part of the answer
+    return stopped;
+  }
+  return {result(), {}};
+}
+
+CalibrationResult Calibration::result() {
+  CalibrationResult r;
+  r.value = input_.parameters;
+  r.sigma = sigma();
+  const int at = last_.layout.parameters();
+  r.covariance = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
+  const ParameterVector limit = plausible_limit();
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    r.determined[k] = r.sigma(i) <= options_.tolerance(i);
+    r.plausible[k] = std::abs(r.value(i)) <= limit(i);
+  }
+  r.gyro_arw = input_.noise.gyro_arw;
+  r.accel_vrw = input_.noise.accel_vrw;
+  r.position_sigma = input_.noise.observation.sigma;
+  r.gyro_quantum = noise_.gyro.quantum;
+  r.accel_quantum = noise_.accel.quantum;
+  r.moored = input_.noise.observation.state_count() > 0;
+  r.consistency = judge_innovations(last_, converged_, last_move_);
+  r.segments = summarise_segments(segments_, last_);
+  r.undetermined = undetermined_directions(r.covariance, options_.tolerance);
+
+  r.C_nb_start = last_.C_nb;
+  r.attitude_sigma = last_.covariance.diagonal().segment<3>(StateLayout::attitude).cwiseSqrt();
+  const bool gimbal = !data_.gimbal_outer.empty() && !data_.gimbal_inner.empty();
+  const Matrix3 C_vb = gimbal ? gimbal_matrix(data_.gimbal_outer[0], data_.gimbal_inner[0]) : Matrix3::Identity();
+  r.initial_attitude = attitude_from_matrix(r.C_nb_start * C_vb.transpose());
+  r.passes = std::move(passes_);
+  return r;
+}
+
+}  // namespace
+
+ParameterVector default_tolerance() {
+  return groups(10.0 * units::micro_g, 0.005 * units::degree_per_hour, 10.0 * units::ppm, 5.0 * units::arcsecond,
+                10.0 * units::ppm, 5.0 * units::arcsecond);
+}
+
+ParameterVector plausible_limit() {
+  return groups(1e4 * units::micro_g, 2.0 * units::degree_per_hour, 5000.0 * units::ppm, units::degree,
+                5000.0 * units::ppm, units::degree);
+}
+
+CalibrationOutcome calibrate(const ImuData& data, const CalibrationOptions& options,
+                             const std::function<void(const CalibrationProgress&)>& progress,
+                             const std::stop_token& stop) {
+  if (data.size() < 2 || data.time_s.back() - data.time_s.front() < least_duration_s) {
+    return {std::nullopt, {"the recording is shorter than 60 s: too short to align"}};
+  }
+  Calibration calibration(data, options, progress, stop);
+  return calibration.run();
+}
+
+}  // namespace selfcal

@@ -1,0 +1,146 @@
+#include "estimator/passes/consistency.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+namespace selfcal {
+namespace {
+
+constexpr int whiteness_lags = 20;
+constexpr double normal_999 = 3.29;   // two-sided 99.9 % of the normal distribution
+
+// P(chi-squared with `degrees` > value), by Wilson and Hilferty's cube root; good to 1e-3 for degrees >= 20.
+double chi_squared_tail(double value, double degrees) {
+  const double t = 2.0 / (9.0 * degrees);
+  const double z = (std::cbrt(value / degrees) - (1.0 - t)) / std::sqrt(t);
+  return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
+
+std::string format(const char* pattern, auto... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+// Which turns fix what the direction is made of.
+std::string remedy(const ParameterVector& direction) {
+  const double inner_scale = std::abs(direction(parameter::gyro_scale + 1));
+  const double cross = std::max(std::abs(direction(parameter::accel_misalignment + 1)),
+                                std::abs(direction(parameter::gyro_misalignment + 1)));
+  const double drift = direction.segment<3>(parameter::gyro_drift).cwiseAbs().maxCoeff();
+  if (std::max(inner_scale, cross) > 0.5 && drift < 0.5) {
+    return "turn the inner axis while it lies level (outer at 90: 90/90 to 90/180, 90/270 and back), as the schedule "
+           "'horizontal' does";
+  }
+  if (drift > 0.5) {
+    return "dwell longer: gyro drift falls as one over the root of the time";
+  }
+  return "turn both axes through full circles with the axis concerned up, down and level";
+}
+
+}  // namespace
+
+Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma) {
+  Consistency c;
+  const auto n = static_cast<double>(pass.epochs.size());
+  c.nis_mean = pass.nis_mean;
+  c.parity_max_sigma = parity_max_sigma;
+  // The mean of 3n squares of standard normals.
+  const double spread = normal_999 * std::sqrt(2.0 / (3.0 * n));
+  c.nis_low = 1.0 - spread;
+  c.nis_high = 1.0 + spread;
+
+  // Ljung and Box 1978, the three axes together.
+  double statistic = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> w;
+    for (const Epoch& e : pass.epochs) {
+      w.push_back(e.innovation(axis) / std::sqrt(e.variance(axis)));
+    }
+    const double power = std::inner_product(w.begin(), w.end(), w.begin(), 0.0);
+    for (std::ptrdiff_t lag = 1; lag <= whiteness_lags && lag < std::ssize(w); ++lag) {
+      const double r = std::inner_product(w.begin() + lag, w.end(), w.begin(), 0.0) / power;
+      statistic += n * (n + 2.0) * r * r / (n - static_cast<double>(lag));
+      c.autocorrelation += lag == 1 ? r / 3.0 : 0.0;
+    }
+  }
+  c.whiteness_p_value = chi_squared_tail(statistic, 3.0 * whiteness_lags);
+
+  // The noise densities are estimates, good to some per cent, so a few per cent of NIS say nothing about the model.
+  constexpr double density_margin = 0.15;
+  const bool nis_high = c.nis_mean > c.nis_high + density_margin;
+  const bool coloured = c.whiteness_p_value < 1e-3 && std::abs(c.autocorrelation) > 0.05;
+  if (!converged) {
+    c.verdict = Verdict::not_converged;
+    c.words = "The passes did not settle: the answer still moves from pass to pass and must not be used.";
+  } else if (nis_high || (coloured && c.nis_mean > 0.5)) {
+    c.verdict = Verdict::inconsistent;
+    c.words = format("The data do not fit the 24-parameter model: innovations are %.2f times as strong as predicted (NIS), "
+                     "correlation %.2f from second to second (whiteness p = %.2g). Something is left out; the sigmas are "
+                     "too small.",
+                     c.nis_mean, c.autocorrelation, c.whiteness_p_value);
+  } else if (c.nis_mean < c.nis_low - density_margin) {
+    c.words = format("Nothing contradicts the model, but innovations are weaker than predicted (NIS %.3f): the noise given "
+                     "is larger than that of the data, and the sigmas are larger than they need be.",
+                     c.nis_mean);
+  } else {
+    c.words = format("Innovations are as predicted (NIS %.3f) and white (p = %.2g); forward and reverse passes agree within "
+                     "%.3f sigma.",
+                     c.nis_mean, c.whiteness_p_value, c.parity_max_sigma);
+  }
+  return c;
+}
+
+std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segments, const PassOutput& pass) {
+  std::vector<Epoch> epochs = pass.epochs;
+  std::sort(epochs.begin(), epochs.end(),
+            [](const Epoch& a, const Epoch& b) { return a.interval_middle_s < b.interval_middle_s; });
+  std::vector<SegmentSummary> summaries;
+  std::size_t next = 0;
+  for (const Segment& segment : segments) {
+    SegmentSummary s{segment.rotation, segment.start_s, segment.end_s, segment.outer * 180.0 / M_PI,
+                     segment.inner * 180.0 / M_PI, 0.0, 0};
+    while (next < epochs.size() && epochs[next].interval_middle_s < segment.end_s) {
+      s.nis_mean += (epochs[next].innovation.cwiseAbs2().cwiseQuotient(epochs[next].variance)).sum() / 3.0;
+      ++s.epochs;
+      ++next;
+    }
+    if (s.epochs > 0) {
+      s.nis_mean /= s.epochs;
+    }
+    summaries.push_back(s);
+  }
+  return summaries;
+}
+
+std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix& covariance,
+                                                           const ParameterVector& tolerance) {
+  const ParameterMatrix scaled =
+      tolerance.cwiseInverse().asDiagonal() * covariance * tolerance.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> eigen(scaled);
+  std::vector<UndeterminedDirection> found;
+  for (int k = sensor_parameter_count - 1; k >= 0; --k) {   // largest first
+    const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()(k)));
+    if (sigma <= 1.0) {
+      break;
+    }
+    UndeterminedDirection direction;
+    direction.direction = eigen.eigenvectors().col(k);
+    direction.sigma = sigma;
+    direction.words = format("sigma %.1f tolerances:", sigma);
+    for (int i = 0; i < sensor_parameter_count; ++i) {
+      if (std::abs(direction.direction(i)) > 0.3) {
+        direction.words += format(" %+.2f ", direction.direction(i)) +
+                           std::string(sensor_parameters[static_cast<std::size_t>(i)].name);
+      }
+    }
+    direction.words += "; to fix it, " + remedy(direction.direction);
+    found.push_back(direction);
+  }
+  return found;
+}
+
+}  // namespace selfcal
