@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""Holds the source tree to its module boundaries: python3 check.py ROOT
+
+Reads every #include of our own code and prints one line, "file:line: what", for each that points against the
+arrows below; then checks that no file is too long and that each folder of the top level explains itself.
+Exit status 1 if anything was found.
+"""
+import re
+import sys
+from pathlib import Path
+
+# A module is the longest of these prefixes that a path begins with. What it may include, besides itself:
+MAY_INCLUDE = {
+    "estimator/geometry": [],
+    "estimator/models": ["estimator/geometry"],
+    "estimator/filter": ["estimator/geometry", "estimator/models"],
+    "estimator/navigation": ["estimator/geometry", "estimator/models", "estimator/filter"],
+    "estimator/passes": ["estimator/geometry", "estimator/models", "estimator/filter", "estimator/navigation"],
+    "estimator": ["estimator"],  # planning, diagnosis: on top of all the others
+    "protocol": ["estimator/geometry"],
+    "protocol/isotp": ["protocol/error.hpp"],
+    "protocol/uds": ["protocol/error.hpp", "protocol/isotp"],
+    "protocol/flash": ["protocol/error.hpp"],
+    # A fault of the estimator must not be repeated in the truth that it is measured against.
+    "sim_ins": ["protocol", "estimator/geometry"],
+    "daemon": ["protocol", "estimator"],
+    "tools": ["daemon", "protocol", "estimator", "sim_ins"],
+    "tests": ["tools", "daemon", "protocol", "estimator", "sim_ins"],
+}
+
+# The estimator is a function of its arguments: no input or output, clock, thread or log.
+IMPURE = re.compile(
+    r"^(iostream|fstream|ostream|istream|cstdio|stdio\.h|print|filesystem|chrono|ctime|time\.h|thread|mutex|"
+    r"shared_mutex|condition_variable|future|semaphore|latch|barrier|syncstream|unistd\.h|syslog\.h|sys/.*|systemd/.*|"
+    r"hdf5.*|sqlite3\.h|sdbus-c\+\+/.*|lcm/.*|toml\+\+/.*|CLI/.*|linux/.*|net/.*)$")
+# Codecs are bytes in, bytes out: the standard library, tl::expected for errors and fmt for their words.
+CODEC_THIRD_PARTY = re.compile(r"^(tl/expected\.hpp|fmt/.*)$")
+STANDARD = re.compile(r"^[a-z_0-9]+$")
+
+# Paths generated at build time; written <like/this>, so never mistaken for files of ours.
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+TOP_LEVEL = ["estimator", "protocol", "sim_ins", "daemon", "tools", "tests", "config", "systemd"]
+CODE = {".hpp", ".cpp", ".h", ".cc"}
+TEXT = CODE | {".py", ".sh", ".cmake", ""}
+LINE_LIMIT = 500
+
+
+def module_of(path):
+    prefixes = [m for m in MAY_INCLUDE if path == m or path.startswith(m + "/")]
+    return max(prefixes, key=len, default=None)
+
+
+def allowed(source, target):
+    """Whether `source` may include `target`, both paths from the repository root."""
+    own = module_of(source)
+    if own is None or module_of(target) == own:
+        return True
+    return any(target == p or target.startswith(p + "/") for p in MAY_INCLUDE[own])
+
+
+def is_codec(path):
+    return module_of(path) in ("protocol/isotp", "protocol/uds", "protocol/flash")
+
+
+def include_complaints(root, path):
+    source = path.relative_to(root).as_posix()
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        quoted, name = match[1] == '"', match[2]
+        where = f"{source}:{number}"
+        if quoted:
+            if not (root / name).is_file():
+                yield f'{where}: "{name}" is no path from the repository root'
+            elif not allowed(source, name):
+                yield f'{where}: {module_of(source)} must not include "{name}"'
+        elif source.startswith("estimator/") and IMPURE.match(name):
+            yield f"{where}: the estimator does no input, output, timing or threading, so no <{name}>"
+        elif is_codec(source) and not STANDARD.match(name) and not CODEC_THIRD_PARTY.match(name):
+            yield f"{where}: a codec depends on the standard library only, not on <{name}>"
+
+
+def complaints(root):
+    for folder in TOP_LEVEL:
+        if not (root / folder / "README.md").is_file():
+            yield f"{folder}/: has no README.md"
+        for path in sorted((root / folder).rglob("*")):
+            if not path.is_file() or path.suffix not in TEXT or "__pycache__" in path.parts:
+                continue
+            length = path.read_bytes().count(b"\n")
+            if length > LINE_LIMIT:
+                yield f"{path.relative_to(root)}: {length} lines, more than {LINE_LIMIT}"
+            if path.suffix in CODE:
+                yield from include_complaints(root, path)
+
+
+def main():
+    found = list(complaints(Path(sys.argv[1]).resolve()))
+    print("\n".join(found) if found else "module boundaries: kept")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

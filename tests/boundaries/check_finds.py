@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""Negative control of check.py: in a small tree that keeps the rules it must find nothing, and each breach that is
+then put into that tree, alone, must be found, and be the only thing found."""
+import tempfile
+import unittest
+from pathlib import Path
+
+import check
+
+KEPT = {
+    "estimator/geometry/rotation.hpp": "#include <array>\n#include <Eigen/Core>\n",
+    "estimator/models/imu_data.hpp": '#include "estimator/geometry/rotation.hpp"\n',
+    "estimator/navigation/navigator.hpp": '#include "estimator/models/imu_data.hpp"\n',
+    "estimator/passes/pass.hpp": '#include "estimator/navigation/navigator.hpp"\n',
+    "estimator/diagnosis/search.cpp": '#include "estimator/passes/pass.hpp"\n',
+    "protocol/error.hpp": "#include <tl/expected.hpp>\n",
+    "protocol/isotp/codec.hpp": '#include <span>\n#include "protocol/error.hpp"\n',
+    "protocol/can/socket.cpp": "#include <linux/can.h>\n",
+    "sim_ins/gimbal.cpp": '#include "estimator/geometry/rotation.hpp"\n#include "protocol/isotp/codec.hpp"\n',
+    "daemon/main.cpp": '#include "estimator/passes/pass.hpp"\n#include <systemd/sd-event.h>\n',
+    "tools/cli/main.cpp": '#include "daemon/config.hpp"\n#include "sim_ins/config.hpp"\n',
+    "daemon/config.hpp": "",
+    "sim_ins/config.hpp": "",
+    "tests/helper.hpp": "",
+} | {f"{folder}/README.md": "" for folder in check.TOP_LEVEL}
+
+BREACHES = {
+    "geometry knows nobody": ("estimator/geometry/rotation.hpp", '#include "estimator/models/imu_data.hpp"\n'),
+    "models below passes": ("estimator/models/imu_data.hpp", '#include "estimator/passes/pass.hpp"\n'),
+    "navigation below diagnosis": ("estimator/navigation/navigator.hpp", '#include "estimator/diagnosis/search.cpp"\n'),
+    "estimator without protocol": ("estimator/passes/pass.hpp", '#include "protocol/error.hpp"\n'),
+    "estimator without files": ("estimator/passes/pass.hpp", "#include <fstream>\n"),
+    "estimator without clock": ("estimator/diagnosis/search.cpp", "#  include <chrono>\n"),
+    "estimator without threads": ("estimator/geometry/rotation.hpp", "#include <thread>\n"),
+    "codec without system": ("protocol/isotp/codec.hpp", "#include <linux/can.h>\n"),
+    "codec without library": ("protocol/isotp/codec.hpp", "#include <nlohmann/json.hpp>\n"),
+    "codec without socket": ("protocol/isotp/codec.hpp", '#include "protocol/can/socket.cpp"\n'),
+    "protocol without estimator": ("protocol/can/socket.cpp", '#include "estimator/models/imu_data.hpp"\n'),
+    "protocol without daemon": ("protocol/can/socket.cpp", '#include "daemon/config.hpp"\n'),
+    "virtual INS without estimator": ("sim_ins/gimbal.cpp", '#include "estimator/models/imu_data.hpp"\n'),
+    "virtual INS without daemon": ("sim_ins/gimbal.cpp", '#include "daemon/config.hpp"\n'),
+    "daemon without virtual INS": ("daemon/main.cpp", '#include "sim_ins/config.hpp"\n'),
+    "daemon without tools": ("daemon/main.cpp", '#include "tools/cli/main.cpp"\n'),
+    "nobody includes tests": ("tools/cli/main.cpp", '#include "tests/helper.hpp"\n'),
+    "paths from the root": ("daemon/main.cpp", '#include "config.hpp"\n'),
+    "long file": ("daemon/main.cpp", "\n" * (check.LINE_LIMIT + 1)),
+    "folder without README": ("config/README.md", None),
+}
+
+
+def write(root, files):
+    for name, content in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content, encoding="utf-8")
+
+
+class CheckFinds(unittest.TestCase):
+    def test_nothing_where_the_rules_are_kept(self):
+        with tempfile.TemporaryDirectory() as folder:
+            write(Path(folder), KEPT)
+            self.assertEqual(list(check.complaints(Path(folder))), [])
+
+    def test_each_breach(self):
+        for name, (path, content) in BREACHES.items():
+            with self.subTest(name), tempfile.TemporaryDirectory() as folder:
+                write(Path(folder), KEPT)
+                if content is None:
+                    (Path(folder) / path).unlink()
+                else:
+                    with open(Path(folder) / path, "a", encoding="utf-8") as file:
+                        file.write(content)
+                found = list(check.complaints(Path(folder)))
+                self.assertEqual(len(found), 1, found)
+                self.assertTrue(found[0].startswith(path.removesuffix("README.md")), found)
+
+
+if __name__ == "__main__":
+    unittest.main()
