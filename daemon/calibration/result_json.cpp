@@ -131,7 +131,8 @@ Json consistency_json(const Consistency& consistency) {
           {"nis_low", consistency.nis_low},
           {"nis_high", consistency.nis_high},
           {"whiteness_p_value", consistency.whiteness_p_value},
-          {"parity_max_sigma", consistency.parity_max_sigma}};
+          {"parity_max_sigma", consistency.parity_max_sigma},
+          {"autocorrelation", consistency.autocorrelation}};
 }
 
 }  // namespace

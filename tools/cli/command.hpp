@@ -34,7 +34,8 @@ struct Command {
 
 class CommandRegistration {
  public:
-  explicit CommandRegistration(Command command);
+  // Not explicit: a file with several commands lists them in one array.
+  CommandRegistration(Command command);
 };
 
 // All registered, by name.

@@ -46,7 +46,7 @@ NoiseOptions NoiseArguments::in_si() const {
 }
 
 Expected<ParameterVector> tolerance_from(const std::vector<std::string>& arguments) {
-  ParameterVector tolerance = CalibrationOptions::default_tolerance();
+  ParameterVector tolerance = default_tolerance();
   for (const std::string& argument : arguments) {
     const std::size_t equals = argument.find('=');
     const std::string_view name = std::string_view(argument).substr(0, equals);
