@@ -1,0 +1,80 @@
+#include "daemon/run_documents.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/parameter_trend.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+
+namespace selfcal {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json figure(double value) { return value < 0 ? ordered_json() : ordered_json(value); }
+
+ordered_json summary(const RunRecord& run) {
+  return {
+      {"run", run.id},
+      {"ins", run.ins},
+      {"serial", run.serial},
+      {"state", name(run.state)},
+      {"exit_status", run.exit_status < 0 ? ordered_json() : ordered_json(run.exit_status)},
+      {"reason", run.reason},
+      {"user", run.user},
+      {"kind", run.rollback ? "rollback" : "calibration"},
+      {"schedule", run.schedule},
+      {"dry_run", run.dry_run},
+      {"force_reason", run.force_reason},
+      {"started_utc", run.started_utc},
+      {"ended_utc", run.ended_utc},
+      {"software", run.software},
+      {"ins_software", run.ins_software},
+      {"recording", run.recording},
+      {"drift_before_m", figure(run.drift_old_m)},
+      {"drift_after_m", figure(run.drift_new_m)},
+  };
+}
+
+}  // namespace
+
+Expected<std::string> run_document(const RunStore& store, const RunRecord& run) {
+  ordered_json document = summary(run);
+  const auto events = store.events(run.id);
+  if (!events) return tl::unexpected(events.error());
+  document["events"] = ordered_json::array();
+  for (const EventRecord& event : *events) {
+    document["events"].push_back({{"utc", event.utc}, {"kind", event.kind}, {"text", event.text}});
+  }
+  document["result"] = run.result_json.empty() ? ordered_json() : ordered_json::parse(run.result_json, nullptr, false);
+  return document.dump();
+}
+
+Expected<std::string> history_document(const RunStore& store, const std::string& serial) {
+  const auto runs = store.runs_of_serial(serial);
+  if (!runs) return tl::unexpected(runs.error());
+  ordered_json document{{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}};
+  for (const RunRecord& run : *runs) document["runs"].push_back(summary(run));
+  if (serial.empty()) return document.dump();
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto history = store.parameter_history(serial, i);
+    if (!history) return tl::unexpected(history.error());
+    const SensorParameter& parameter = sensor_parameters[static_cast<std::size_t>(i)];
+    ordered_json values = ordered_json::array();
+    for (const ParameterRecord& record : *history) {
+      values.push_back({{"run", record.run},
+                        {"utc", record.utc},
+                        {"value", record.value},
+                        {"sigma", record.sigma},
+                        {"determined", record.determined}});
+    }
+    ordered_json entry{{"name", parameter.name}, {"unit", parameter.unit}, {"values", std::move(values)}};
+    if (const auto trend = parameter_trend(*history)) {
+      entry["change_per_year"] = trend->slope_per_year;
+      entry["change_per_year_sigma"] = trend->slope_sigma;
+    }
+    document["parameters"].push_back(std::move(entry));
+  }
+  return document.dump();
+}
+
+}  // namespace selfcal

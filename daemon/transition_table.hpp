@@ -1,0 +1,133 @@
+// The calibration as one table: in this state, upon this event, if this guard holds: go there and do that.
+//
+// The engine (calibration_run.hpp) stores the next state in the database before it performs the action, so that
+// after a crash the table says how to go on: the event `recovered` (bus back, INS restarted, daemon restarted) has a
+// row in every state. daemon/README.md shows this table; a test compares the two.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace selfcal {
+
+enum class State {
+  connecting,      // find the INS and read who it is
+  unlocking,       // session and SecurityAccess
+  scheduling,      // write the rotation schedule
+  starting,        // command the rotation
+  rotating,        // follow it, pull pages meanwhile
+  draining,        // gimbal at rest, last pages
+  estimating,      // estimator at work, off the loop
+  judging,         // may this be written?
+  checking_old,    // free-inertial drift with the old set
+  erasing,         // inactive slot
+  writing,         // new set into the inactive slot
+  verifying,       // read it back
+  committing,      // make it the newest valid slot
+  resetting,       // power cycle
+  confirming,      // read what is in force
+  checking_new,    // free-inertial drift with the new set
+  stopping,        // gimbal to be stopped before the run ends
+  completed,       // end: done (also a dry run)
+  refused,         // end: the answer is no, nothing was written
+  failed,          // end: trouble
+  aborted,         // end: by an operator
+};
+
+enum class Event {
+  begin,
+  identified,
+  unlocked,
+  schedule_accepted,
+  rotation_started,
+  rotation_ended,
+  pages_complete,
+  estimate_ready,
+  judged,
+  drift_measured,
+  slot_erased,
+  set_written,
+  set_verified,
+  set_committed,
+  ins_restarted,
+  set_confirmed,
+  gimbal_stopped,
+  link_lost,         // no answer, or the interface went down
+  recovered,         // identified and unlocked again
+  link_gone,         // not recovered within the stated time
+  step_failed,       // anything else that cannot be mended
+  abort_requested,
+};
+
+enum class Guard {
+  always,
+  gimbal_turning,        // the INS says so, and it is this run's rotation
+  rotation_complete,     // the INS says so, and it is this run's rotation
+  gate_refused,          // not determined, inconsistent or implausible, and no operator's reason to write it anyway
+  dry_run,
+  drift_check_wanted,
+  new_set_in_force,      // slot in force holds this run's set
+  abort_pending,         // the gimbal is being stopped because an operator asked
+};
+
+enum class Action {
+  none,
+  identify,
+  unlock,
+  write_schedule,
+  start_rotation,
+  follow_rotation,
+  pull_last_pages,
+  estimate,
+  judge,
+  measure_drift_old,
+  erase_inactive_slot,
+  write_set,
+  read_back,
+  commit,
+  reset_ins,
+  read_in_force,
+  measure_drift_new,
+  stop_gimbal,
+  recover_link,
+  decline_abort,
+  conclude,
+};
+
+struct Transition {
+  State state;
+  Event event;
+  Guard guard;
+  Action action;
+  State next;
+};
+
+std::span<const Transition> transition_table();
+
+// Which row applies; `holds` evaluates guards. Rows of a state and event are tried in their order.
+template <typename Holds>
+const Transition* find_transition(State state, Event event, Holds&& holds) {
+  for (const Transition& row : transition_table()) {
+    if (row.state == state && row.event == event && holds(row.guard)) return &row;
+  }
+  return nullptr;
+}
+
+bool is_final(State state);
+bool gimbal_may_turn(State state);
+
+std::string_view name(State state);
+std::string_view name(Event event);
+std::string_view name(Guard guard);
+std::string_view name(Action action);
+std::optional<State> state_from_name(std::string_view text);
+
+// What the INS is being asked to do, for people: "rotating, pulling data".
+std::string_view words(State state);
+
+// The table in Markdown, as daemon/README.md holds it.
+std::string transition_table_markdown();
+
+}  // namespace selfcal

@@ -1,0 +1,87 @@
+#include "daemon/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace selfcal {
+namespace {
+
+using testing::HasSubstr;
+
+std::string complaint(std::string_view text) {
+  const auto config = parse_config(text, "f.toml");
+  return config ? std::string() : config.error().message;
+}
+
+TEST(Config, TheShippedFileIsWellFormedAndHoldsTheDefaults) {
+  const auto config = load_config(SELFCAL_SOURCE_DIR "/config/selfcald.toml");
+  ASSERT_TRUE(config) << config.error().message;
+  const InsConfig defaults;
+  const InsConfig& shipped = config->instruments.at(0);
+  EXPECT_EQ(shipped.request_id, defaults.request_id);
+  EXPECT_EQ(shipped.response_id, defaults.response_id);
+  EXPECT_EQ(shipped.status_id, defaults.status_id);
+  EXPECT_EQ(shipped.schedule, defaults.schedule);
+  EXPECT_EQ(shipped.dwell_s, defaults.dwell_s);
+  EXPECT_EQ(shipped.rotation_s, defaults.rotation_s);
+  EXPECT_EQ(shipped.request_timeout_s, defaults.request_timeout_s);
+  EXPECT_EQ(shipped.lost_after_s, defaults.lost_after_s);
+  EXPECT_EQ(shipped.drift_check_s, defaults.drift_check_s);
+  EXPECT_EQ(shipped.time_scale, defaults.time_scale);
+  EXPECT_EQ(config->state_directory, Config().state_directory);
+  EXPECT_EQ(config->bus, Config().bus);
+  EXPECT_EQ(config->lcm_url, Config().lcm_url);
+  EXPECT_EQ(config->recordings_quota_mib, Config().recordings_quota_mib);
+  EXPECT_EQ(config->free_space_mib, Config().free_space_mib);
+}
+
+TEST(Config, TheShippedFileShowsEveryKey) {
+  std::ifstream in(SELFCAL_SOURCE_DIR "/config/selfcald.toml");
+  std::stringstream text;
+  text << in.rdbuf();
+  for (const std::string& key : config_keys()) {
+    const std::string last = key.substr(key.rfind('.') + 1);
+    EXPECT_THAT(text.str(), HasSubstr(last + " = ")) << key;
+  }
+}
+
+TEST(Config, UnknownKeyIsNamedWithItsLine) {
+  EXPECT_EQ(complaint("[ins.a]\ninterface = \"vcan0\"\ntypo = 1\n"), "f.toml:3: ins.a.typo: unknown key");
+  EXPECT_EQ(complaint("[ins.a]\ninterface = \"vcan0\"\n[deamon]\n"), "f.toml:3: deamon: unknown section");
+}
+
+TEST(Config, EveryComplaintIsShown) {
+  const std::string text = complaint("[ins.a]\ninterface = 3\ndwell_s = -1\n");
+  EXPECT_THAT(text, HasSubstr("f.toml:2: ins.a.interface: must be a string"));
+  EXPECT_THAT(text, HasSubstr("f.toml:3: ins.a.dwell_s: is -1, must lie between 1 and 3600"));
+}
+
+TEST(Config, WhatContradictsItselfIsRefused) {
+  EXPECT_THAT(complaint(""), HasSubstr("at least one section"));
+  EXPECT_THAT(complaint("[ins.a]\nfd = true\n"), HasSubstr("ins.a.interface: missing"));
+  EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\nrequest_id = 0x800\n"), HasSubstr("needs extended_ids"));
+  EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\n[ins.b]\ninterface = \"c\"\n"),
+              HasSubstr("same interface and request_id as ins.a"));
+  EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\nlatitude_deg = 40\n"), HasSubstr("belong together"));
+  EXPECT_THAT(complaint("[ins.A]\ninterface = \"c\"\n"), HasSubstr("a name holds"));
+  EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\ndwell_s = nan\n"), HasSubstr("must lie between"));
+  EXPECT_THAT(complaint("[ins.a\n"), HasSubstr("f.toml:1:"));
+}
+
+TEST(Config, TolerancesTakeParametersAndGroups) {
+  const auto config = parse_config(
+      "[ins.a]\ninterface = \"c\"\ntolerance = { gyro_scale = 3, accel_bias_y = 2.5 }\n", "f.toml");
+  ASSERT_TRUE(config) << config.error().message;
+  const auto& tolerance = config->instruments.at(0).tolerance;
+  for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(tolerance[static_cast<std::size_t>(parameter::gyro_scale + axis)], 3.0);
+  EXPECT_EQ(tolerance[parameter::accel_bias + 1], 2.5);
+  EXPECT_FALSE(tolerance[parameter::accel_bias]);
+  EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\nlimit = { gyro_scal = 3 }\n"),
+              HasSubstr("gyro_scal is no parameter"));
+}
+
+}  // namespace
+}  // namespace selfcal

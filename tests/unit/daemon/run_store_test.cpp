@@ -1,0 +1,135 @@
+#include "daemon/run_store.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace selfcal {
+namespace {
+
+using testing::HasSubstr;
+
+class RunStoreTest : public testing::Test {
+ protected:
+  RunStoreTest() {
+    std::string pattern = testing::TempDir() + "run_store_XXXXXX";
+    folder_ = mkdtemp(pattern.data());
+    file_ = folder_ / "selfcal.db";
+  }
+  ~RunStoreTest() override { std::filesystem::remove_all(folder_); }
+
+  std::unique_ptr<RunStore> open() {
+    auto store = RunStore::open(file_);
+    EXPECT_TRUE(store) << store.error().message;
+    return std::move(*store);
+  }
+
+  static RunRecord begun() {
+    RunRecord run;
+    run.ins = std::string("bench");
+    run.user = std::string("ann");
+    run.schedule = "horizontal";
+    run.started_utc = "2026-01-01T00:00:00Z";
+    run.software = std::string("0.1");
+    return run;
+  }
+
+  std::filesystem::path folder_, file_;
+};
+
+TEST_F(RunStoreTest, ARunIsFoundAgainAfterReopening) {
+  RunRecord run = begun();
+  {
+    auto store = open();
+    run.id = *store->create_run(run);
+    run.state = State::rotating;
+    run.serial = std::string("SN'1");   // a quote, so that binding is seen to work
+    run.rotation = 4000000000u;
+    ASSERT_TRUE(store->update_run(run));
+    ASSERT_TRUE(store->add_event(run.id, {"2026-01-01T00:00:01Z", "state", "rotating"}));
+  }
+  auto store = open();
+  const auto unfinished = *store->unfinished_runs();
+  ASSERT_EQ(unfinished.size(), 1u);
+  EXPECT_EQ(unfinished[0].serial, "SN'1");
+  EXPECT_EQ(unfinished[0].state, State::rotating);
+  EXPECT_EQ(unfinished[0].rotation, 4000000000u);
+  EXPECT_EQ(store->events(run.id)->at(0).text, "rotating");
+
+  run.state = State::completed;
+  ASSERT_TRUE(store->update_run(run));
+  EXPECT_TRUE(store->unfinished_runs()->empty());
+  EXPECT_EQ(store->runs_of_serial("SN'1")->size(), 1u);
+  EXPECT_EQ(store->runs_of_serial("other")->size(), 0u);
+  EXPECT_EQ(store->runs_of_serial("")->size(), 1u);
+}
+
+TEST_F(RunStoreTest, NumbersAreNeverUsedTwice) {
+  auto store = open();
+  EXPECT_EQ(*store->create_run(begun()), 1);
+  EXPECT_EQ(*store->create_run(begun()), 2);
+}
+
+TEST_F(RunStoreTest, HistoryHoldsCompletedRunsThatWrote) {
+  auto store = open();
+  const std::string serial("S");
+  RunStore::Parameters parameters;
+  parameters.value.fill(3.5);
+  parameters.sigma.fill(0.5);
+  parameters.determined.fill(true);
+  for (const auto& [state, dry] : {std::pair{State::completed, false}, {State::refused, false}, {State::completed, true}}) {
+    RunRecord run = begun();
+    run.dry_run = dry;
+    run.id = *store->create_run(run);
+    run.serial = serial;
+    run.state = state;
+    ASSERT_TRUE(store->update_run(run));
+    ASSERT_TRUE(store->store_parameters(run.id, parameters));
+  }
+  const auto history = *store->parameter_history("S", 7);
+  ASSERT_EQ(history.size(), 1u);
+  EXPECT_EQ(history[0].value, 3.5);
+  EXPECT_EQ(history[0].sigma, 0.5);
+}
+
+TEST_F(RunStoreTest, SetsAreKeptByRole) {
+  auto store = open();
+  const RunId run = *store->create_run(begun());
+  ASSERT_TRUE(store->store_set(run, SetRole::previous, {1, 0, 2}));
+  EXPECT_EQ(**store->set(run, SetRole::previous), (std::vector<std::uint8_t>{1, 0, 2}));
+  EXPECT_FALSE(*store->set(run, SetRole::written));
+}
+
+TEST_F(RunStoreTest, ADamagedDatabaseIsRefusedAndABackupTakesItsPlace) {
+  {
+    auto store = open();
+    for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->create_run(begun()));
+    ASSERT_TRUE(RunStore::copy(file_, folder_ / "backup.db"));
+  }
+  {
+    std::fstream file(file_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(3 * 4096);   // a page of the runs table (SQLite's default page size)
+    const std::string rubbish(4096, '\x5a');
+    file.write(rubbish.data(), 4096);
+  }
+  const auto damaged = RunStore::open(file_);
+  ASSERT_FALSE(damaged);
+  EXPECT_EQ(damaged.error().kind, ErrorKind::device);
+  EXPECT_THAT(damaged.error().message, HasSubstr(file_.string()));
+  EXPECT_FALSE(RunStore::check(file_));
+  EXPECT_TRUE(RunStore::check(folder_ / "backup.db"));
+  std::filesystem::rename(folder_ / "backup.db", file_);
+  EXPECT_EQ(open()->runs_of_serial("")->size(), 200u);
+}
+
+TEST_F(RunStoreTest, AFileThatIsNoDatabaseIsRefused) {
+  std::ofstream(file_) << std::string(8192, 'x');
+  const auto store = RunStore::open(file_);
+  ASSERT_FALSE(store);
+  EXPECT_THAT(store.error().message, HasSubstr("not a database"));
+}
+
+}  // namespace
+}  // namespace selfcal
