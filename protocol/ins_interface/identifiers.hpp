@@ -1,0 +1,60 @@
+// The numbers by which the INS is spoken to: CAN identifiers, data identifiers, routines. THE table; the DBC, the
+// decoder's names and the documentation come from it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace selfcal::ins {
+
+namespace can_id {
+inline constexpr std::uint32_t request = 0x640;       // tester to INS, default; settable
+inline constexpr std::uint32_t response = 0x648;      // INS to tester
+inline constexpr std::uint32_t functional = 0x7DF;    // tester to all
+inline constexpr std::uint32_t status = 0x650;        // INS, periodic: InsState
+inline constexpr std::uint32_t gimbal = 0x651;        // INS, periodic: InsGimbal
+}  // namespace can_id
+
+namespace did {
+inline constexpr std::uint16_t serial_number = 0xF18C;          // ASCII
+inline constexpr std::uint16_t software_version = 0xF195;       // ASCII
+inline constexpr std::uint16_t state = 0x0200;                  // StateRecord
+inline constexpr std::uint16_t schedule = 0x0201;               // ScheduleRecord; writable
+inline constexpr std::uint16_t site = 0x0202;                   // SiteRecord; writable
+inline constexpr std::uint16_t coefficients_in_force = 0x0210;  // Coefficients, as taken at power-on
+inline constexpr std::uint16_t coefficients_inactive = 0x0211;  // Coefficients in the slot not in force; writable
+inline constexpr std::uint16_t coefficients_factory = 0x0212;   // Coefficients
+inline constexpr std::uint16_t raw_data_directory = 0x0220;     // DirectoryRecord
+inline constexpr std::uint16_t sample_format = 0x0221;          // SampleFormatRecord
+}  // namespace did
+
+namespace routine {
+inline constexpr std::uint16_t self_calibration = 0x0301;       // start: run id u32; stop; result: RunRecord
+inline constexpr std::uint16_t erase_inactive = 0x0302;         // start: erase the inactive coefficient slot
+inline constexpr std::uint16_t commit_coefficients = 0x0303;    // start: CRC u32 of the record to be made valid
+inline constexpr std::uint16_t navigation_check = 0x0304;       // start: NavigationCheckRequest; result: ...Record
+}  // namespace routine
+
+enum class Access : std::uint8_t { open, unlocked };   // unlocked: SecurityAccess and the extended session
+
+struct DataIdentifier {
+  std::uint16_t id;
+  std::string_view name;
+  Access write;          // meaningful if writable
+  bool writable;
+  std::string_view content;
+};
+extern const std::array<DataIdentifier, 10> data_identifiers;
+
+struct Routine {
+  std::uint16_t id;
+  std::string_view name;
+  std::string_view content;
+};
+extern const std::array<Routine, 4> routines;
+
+std::string_view did_name(std::uint16_t did);           // "unknown"
+std::string_view routine_name(std::uint16_t routine);   // "unknown"
+
+}  // namespace selfcal::ins
