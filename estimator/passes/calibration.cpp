@@ -285,7 +285,7 @@ CalibrationResult Calibration::result() {
   r.gyro_quantum = noise_.gyro.quantum;
   r.accel_quantum = noise_.accel.quantum;
   r.moored = input_.noise.observation.state_count() > 0;
-  r.consistency = judge_innovations(last_, converged_, last_move_);
+  r.consistency = judge_innovations(last_, converged_, last_move_, r.moored);
   r.segments = summarise_segments(segments_, last_);
   r.undetermined = undetermined_directions(r.covariance, options_.tolerance);
 
