@@ -1,0 +1,233 @@
+// selfcal plan: predicted sigma of the 24 before anything turns, and the search for a schedule.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "estimator/geometry/units.hpp"
+#include "estimator/planning/plan.hpp"
+#include "protocol/recording/atomic_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
+#include "tools/cli/command.hpp"
+#include "tools/cli/estimator_arguments.hpp"
+#include "tools/cli/terminal.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+struct PlanArguments {
+  std::string schedule = "table2";
+  std::optional<double> dwell_s;
+  std::optional<double> rotation_s;
+  std::vector<double> attitude_deg = {0.0, 0.0, 0.0};   // roll, pitch, heading
+  double latitude_deg = 40.0;
+  double height_m = 0.0;
+  double arw_deg_per_sqrt_h = 0.001;
+  double vrw_ug_per_sqrt_hz = 5.0;
+  double position_sigma_m = Installation{}.position_sigma;
+  std::vector<std::string> tolerance;
+  std::vector<std::string> ignored;
+  bool optimize = false;
+  double longest_s = SearchOptions{}.longest_s;
+  std::string output;
+  bool json = false;
+};
+
+Expected<Installation> installation_from(const PlanArguments& a) {
+  Installation installation;
+  installation.attitude = {a.attitude_deg[0] * units::degree, a.attitude_deg[1] * units::degree,
+                           a.attitude_deg[2] * units::degree};
+  installation.site = {a.latitude_deg * units::degree, 0.0, a.height_m};
+  installation.gyro_arw = a.arw_deg_per_sqrt_h * units::degree_per_sqrt_hour;
+  installation.accel_vrw = a.vrw_ug_per_sqrt_hz * units::micro_g_per_sqrt_hz;
+  installation.position_sigma = a.position_sigma_m;
+  const Expected<ParameterVector> tolerance = tolerance_from(a.tolerance);
+  if (!tolerance) {
+    return tl::unexpected(tolerance.error());
+  }
+  installation.tolerance = *tolerance;
+  for (const std::string& name : a.ignored) {
+    bool found = false;
+    for (int i = 0; i < sensor_parameter_count; ++i) {
+      if (sensor_parameters[static_cast<std::size_t>(i)].name.starts_with(name)) {
+        installation.tolerance(i) = HUGE_VAL;
+        found = true;
+      }
+    }
+    if (!found) {
+      return fail(ErrorKind::usage, fmt::format("--ignore {}: no parameter or group of this name", name));
+    }
+  }
+  return installation;
+}
+
+nlohmann::json schedule_json(const Schedule& schedule) {
+  nlohmann::json positions = nlohmann::json::array();
+  for (const GimbalPosition& p : schedule.positions) {
+    positions.push_back({p.outer_deg, p.inner_deg});
+  }
+  return {{"positions", positions}, {"dwell_s", schedule.dwell_s}, {"rotation_s", schedule.rotation_s}};
+}
+
+nlohmann::json plan_json(const Plan& plan, const Schedule& schedule, const Installation& installation,
+                         const std::vector<std::string>& warnings) {
+  nlohmann::json parameters = nlohmann::json::array();
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const SensorParameter& p = sensor_parameters[k];
+    nlohmann::json entry = {{"name", p.name},
+                            {"unit", p.unit},
+                            {"sigma", plan.sigma(i) / p.si_per_unit},
+                            {"determined", plan.determined[k]}};
+    if (std::isfinite(installation.tolerance(i))) {
+      entry["tolerance"] = installation.tolerance(i) / p.si_per_unit;
+    }
+    parameters.push_back(entry);
+  }
+  nlohmann::json history = nlohmann::json::array();
+  for (const PositionForecast& forecast : plan.history) {
+    nlohmann::json sigma = nlohmann::json::array();
+    for (int i = 0; i < sensor_parameter_count; ++i) {
+      sigma.push_back(forecast.sigma(i) / sensor_parameters[static_cast<std::size_t>(i)].si_per_unit);
+    }
+    history.push_back({{"end_s", forecast.end_s}, {"sigma", sigma}});
+  }
+  return {{"duration_s", plan.duration_s}, {"parameters", parameters}, {"schedule", schedule_json(schedule)},
+          {"meets_tolerances", plan.meets_tolerances()}, {"warnings", warnings}, {"history", history}};
+}
+
+void print_table(const Plan& plan, const Schedule& schedule, const Installation& installation) {
+  fmt::print("{} positions, {:.1f} min\n\n{:<24} {:>12} {:>12}\n", schedule.positions.size(), plan.duration_s / 60.0,
+             "parameter", "sigma", "tolerance");
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const SensorParameter& p = sensor_parameters[k];
+    const std::string tolerance = std::isfinite(installation.tolerance(i))
+                                      ? fmt::format("{:.4g}", installation.tolerance(i) / p.si_per_unit)
+                                      : "-";
+    fmt::print("{:<24} {:>12.4g} {:>12} {:<7}{}\n", p.name, plan.sigma(i) / p.si_per_unit, tolerance, p.unit,
+               plan.determined[k] ? "" : " NOT MET");
+  }
+}
+
+// What the operator should know before turning: what will not be determined, and whether another schedule would do.
+std::vector<std::string> warnings_for(const Plan& plan, const Schedule& schedule, const Installation& installation) {
+  std::vector<std::string> warnings;
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!plan.determined[k]) {
+      const SensorParameter& p = sensor_parameters[k];
+      warnings.push_back(fmt::format("{}: sigma {:.3g} {} does not meet the tolerance of {:.3g}", p.name,
+                                     plan.sigma(i) / p.si_per_unit, p.unit,
+                                     installation.tolerance(i) / p.si_per_unit));
+    }
+  }
+  if (warnings.empty()) {
+    return warnings;
+  }
+  for (const UndeterminedDirection& direction : plan.undetermined) {
+    warnings.push_back("weak direction, " + direction.words);
+  }
+  const double moves = static_cast<double>(schedule.positions.size()) - 1.0;
+  const double mean_dwell = (schedule.duration_s() - moves * schedule.rotation_s) / (moves + 1.0);
+  for (const char* name : {"horizontal", "table2"}) {
+    const Plan other = predict(*named_schedule(name, mean_dwell, schedule.rotation_s), installation);
+    const auto count = [](const Plan& p) { return std::count(p.determined.begin(), p.determined.end(), true); };
+    if (count(other) > count(plan)) {
+      warnings.push_back(fmt::format("better here: schedule '{}' with the same dwell determines {} of {} in {:.1f} min",
+                                     name, count(other), sensor_parameter_count, other.duration_s / 60.0));
+      break;
+    }
+  }
+  return warnings;
+}
+
+Expected<int> plan(const PlanArguments& a) {
+  const Expected<Installation> installation = installation_from(a);
+  if (!installation) {
+    return tl::unexpected(installation.error());
+  }
+  Schedule schedule;
+  Plan result;
+  if (a.optimize) {
+    SearchOptions options;
+    options.rotation_s = a.rotation_s.value_or(options.rotation_s);
+    options.longest_s = a.longest_s;
+    if (a.dwell_s) {
+      options.dwells_s = {*a.dwell_s};
+    }
+    ProgressLine line;
+    SearchResult found = search_schedule(*installation, options, [&line](double fraction) {
+      line.show(fmt::format("searching: {:3.0f} %", 100.0 * fraction));
+    });
+    if (found.schedule.positions.empty()) {
+      return fail(ErrorKind::usage, fmt::format("--longest {} s: too short for any schedule", a.longest_s));
+    }
+    schedule = std::move(found.schedule);
+    result = std::move(found.plan);
+  } else {
+    Expected<Schedule> given = find_schedule(a.schedule, a.dwell_s, a.rotation_s);
+    if (!given) {
+      return tl::unexpected(given.error());
+    }
+    schedule = std::move(*given);
+    result = predict(schedule, *installation);
+  }
+  const std::vector<std::string> warnings = warnings_for(result, schedule, *installation);
+  if (!a.output.empty()) {
+    if (const auto written = write_file_atomically(a.output, format_schedule(schedule)); !written) {
+      return tl::unexpected(written.error());
+    }
+  }
+  if (a.json) {
+    fmt::print("{}\n", plan_json(result, schedule, *installation, warnings).dump(1));
+  } else {
+    print_table(result, schedule, *installation);
+    if (a.optimize) {
+      fmt::print("\n{}", format_schedule(schedule));
+    }
+    for (const std::string& warning : warnings) {
+      fmt::print("warning: {}\n", warning);
+    }
+  }
+  return result.meets_tolerances() ? 0 : 1;
+}
+
+CommandRun configure(CLI::App& app) {
+  auto a = std::make_shared<PlanArguments>();
+  app.add_option("--schedule", a->schedule, "table2, horizontal, or a TOML file")->capture_default_str();
+  app.add_option("--dwell", a->dwell_s, "seconds at each position")->check(CLI::PositiveNumber);
+  app.add_option("--rotation", a->rotation_s, "seconds for each move")->check(CLI::PositiveNumber);
+  app.add_option("--attitude", a->attitude_deg, "of the vehicle: roll,pitch,heading in degrees")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--latitude", a->latitude_deg, "degrees")->check(CLI::Range(-89.0, 89.0))->capture_default_str();
+  app.add_option("--height", a->height_m, "metres above the ellipsoid")->check(CLI::Range(-500.0, 9000.0));
+  app.add_option("--arw", a->arw_deg_per_sqrt_h, "angle random walk, deg/sqrt(h)")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--vrw", a->vrw_ug_per_sqrt_hz, "velocity random walk, ug/sqrt(Hz)")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--position-noise", a->position_sigma_m, "of the known position, m at 1 Hz")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--tolerance", a->tolerance, "NAME=VALUE: sigma that a parameter or group must reach");
+  app.add_option("--ignore", a->ignored, "parameter or group whose tolerance does not count");
+  app.add_flag("--optimize", a->optimize, "search the shortest schedule that meets the tolerances");
+  app.add_option("--longest", a->longest_s, "with --optimize: no schedule beyond so many seconds")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("-o,--output", a->output, "write the schedule to a TOML file, ready to run");
+  app.add_flag("--json", a->json, "one JSON document on standard output");
+  return [a] { return plan(*a); };
+}
+
+const CommandRegistration registration{
+    {"plan", "predicted accuracy of a schedule, or the shortest schedule that reaches one", configure}};
+
+}  // namespace
+}  // namespace selfcal::cli
