@@ -13,9 +13,8 @@ using Increments = std::span<const std::array<double, 3>>;
 
 constexpr int piece_length = 64;          // groups
 constexpr int lowest_bin = 6, highest_bin = 26;   // of piece_length
-// Increments are summed into groups. On a still base 0.5 s: pieces of 32 s, 0.19 to 0.8 Hz, where the noise of the
-// angle matters least (a slow rate leaves quantisation far from white above). On a moving one, or where dwells are too
-// short, 0.05 s: 3.2 s, 1.9 to 8 Hz, where sway has died out; it also makes quantisation white.
+// Increments are summed into groups. 0.05 s: pieces of 3.2 s, 1.9 to 8 Hz, where sway has died out. Gyros on a still
+// base 0.5 s: 32 s, 0.19 to 0.8 Hz, because a slow steady rate leaves their quantisation far from white above that.
 constexpr double slow_group_s = 0.5, fast_group_s = 0.05;
 constexpr std::size_t enough_pieces = 10;
 constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
@@ -151,15 +150,21 @@ double find_quantum(Increments increments) {
   if (smallest == 0.0) {
     return 0.0;
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    for (const double x : increments[i]) {
-      const double ratio = x / smallest;
-      if (std::abs(ratio - std::round(ratio)) > 1e-3 * std::max(1.0, std::abs(ratio) * 1e-3)) {
-        return 0.0;
-      }
+  // The smallest step seen may be several quanta.
+  constexpr int most_quanta = 30;
+  for (int quanta = 1; quanta <= most_quanta; ++quanta) {
+    const double step = smallest / quanta;
+    const auto whole = [step](const std::array<double, 3>& increment) {
+      return std::all_of(increment.begin(), increment.end(), [step](double x) {
+        const double ratio = x / step;
+        return std::abs(ratio - std::round(ratio)) < 1e-3;
+      });
+    };
+    if (std::all_of(increments.begin(), increments.begin() + static_cast<std::ptrdiff_t>(count), whole)) {
+      return step;
     }
   }
-  return smallest;
+  return 0.0;
 }
 
 // Half the mean square of differences of successive 1 s sums inside dwells.
@@ -193,27 +198,19 @@ double second_variance(const ImuData& data, const std::vector<Segment>& segments
 
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments) {
   SensorNoise noise;
-  const auto fit = [&](double group_s) {
-    const Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
-    const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, group_s);
-    if (gyro.pieces > 0) {
-      fit_density(gyro, group_s, noise.gyro);
-      fit_density(accel, group_s, noise.accel);
-    }
-    return gyro.pieces;
-  };
-  noise.spectra = fit(fast_group_s);
+  const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, fast_group_s);
+  const Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s);
+  noise.spectra = accel.pieces;
   if (noise.spectra > 0) {
+    fit_density(accel, fast_group_s, noise.accel);
+    fit_density(gyro, fast_group_s, noise.gyro);
     // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
     const double expected = noise.accel.white_asd * noise.accel.white_asd;
     noise.base_moves = second_variance(data, segments) > 25.0 * expected;
     if (!noise.base_moves) {
-      const SensorNoise fast = noise;
-      const std::size_t pieces = fit(slow_group_s);
-      if (pieces >= enough_pieces) {
-        noise.spectra = pieces;
-      } else {
-        noise = fast;
+      const Spectrum slow = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, slow_group_s);
+      if (slow.pieces >= enough_pieces) {
+        fit_density(slow, slow_group_s, noise.gyro);
       }
     }
   }
