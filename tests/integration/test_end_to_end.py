@@ -1,0 +1,89 @@
+"""A whole calibration on vcan: nothing is lost on the way, and the data come while the gimbal still turns."""
+import json
+import math
+import struct
+import subprocess
+import unittest
+
+import h5py
+import numpy
+
+import case
+import witness
+
+
+class EndToEnd(case.OnBench):
+    def test_result_is_that_of_the_recording_it_kept(self):
+        # 20 s dwells: 7.8 minutes are enough to separate all 24 parameters (mission: the physical limit).
+        unit = self.bench(speed=60.0, ins={"dwell_s": 20.0, "drift_check_s": 60.0}).start()
+        run = unit.wait_for_end(unit.start_run("--schedule", "horizontal", "--force", "short dwell"))
+        self.assertEqual((run["state"], run["exit_status"]), ("completed", case.DONE), run["reason"])
+
+        again = json.loads(unit.selfcal("estimate", run["recording"], "--json", check=False).stdout)
+        # To rounding: the same code on the same samples, so only what JSON prints can differ.
+        for kept, recomputed in zip(run["result"]["parameters"], again["parameters"], strict=True):
+            self.assertEqual(kept["name"], recomputed["name"])
+            for figure in ("value", "sigma"):
+                self.assertTrue(math.isclose(kept[figure], recomputed[figure], rel_tol=1e-9, abs_tol=1e-12),
+                                f"{kept} {recomputed}")
+
+        # And the samples are those of the model itself, bit for bit: same configuration, schedule and seed.
+        direct = unit.folder / "direct.h5"
+        unit.selfcal("simulate", "--config", unit.folder / "sim.toml", "--schedule", "horizontal", "--dwell", 20,
+                     "--seed", unit.seed, "-o", direct)
+        with h5py.File(run["recording"]) as pulled, h5py.File(direct) as made:
+            self.assertEqual(len(pulled["time_s"]), len(made["time_s"]))
+            for name in ("delta_theta_rad", "delta_v_mps"):
+                numpy.testing.assert_allclose(pulled[name][:], made[name][:], rtol=0, atol=1e-15, err_msg=name)
+
+        truth = unit.truth()
+        for parameter in run["result"]["parameters"]:
+            off = abs(parameter["value"] - truth[parameter["name"]]) / parameter["sigma"]
+            # 24 draws beyond 5 sigma: one seed in 70,000, and the seed is fixed.
+            self.assertLess(off, 5.0, parameter)
+
+        version, held = witness.coefficients_in_force(unit.interface)
+        self.assertGreater(version, 0)
+        for parameter in run["result"]["parameters"]:
+            self.assertTrue(math.isclose(held[parameter["name"]], parameter["value"], rel_tol=1e-9, abs_tol=1e-9))
+        self.assertLess(run["drift_after_m"], run["drift_before_m"])
+
+    def test_last_page_soon_after_the_gimbal_stops(self):
+        """Classic CAN at 1 Mbit/s, 200 Hz: the last page within 10 s of the bus's own time."""
+        speed = 10.0
+        unit = self.bench(speed=speed, sim={"sample_rate_hz": 200.0}).start()
+        log = unit.folder / "can.log"
+        with open(log, "w", encoding="ascii") as output:
+            dump = subprocess.Popen(["candump", "-L", "-r", "4000000", unit.interface], stdout=output)
+            try:
+                run = unit.wait_for_end(unit.start_run("--schedule", unit.short, "--dry-run"))
+            finally:
+                dump.terminate()
+                dump.wait(10)
+        self.assertGreater(len(run["recording"]), 0, run["reason"])
+        stopped, last_data, data_before = None, None, 0
+        for line in log.read_text(encoding="ascii").splitlines():
+            stamp, _, frame = line.split()
+            identifier, data = frame.split("#")
+            payload = bytes.fromhex(data)
+            state = payload[0] & 0xF if int(identifier, 16) == 0x650 else None
+            if state == 3 and stopped is None:
+                stopped = float(stamp[1:-1])
+            if int(identifier, 16) == witness.RESPONSE and payload[0] >> 4 in (1, 2):
+                last_data = float(stamp[1:-1])
+                data_before += stopped is None
+        self.assertIsNotNone(stopped, "no status frame told that the rotation is complete")
+        self.assertLess((last_data - stopped) * speed, 10.0)
+        # Most of it came before: 40 s of 28 bytes at 200 Hz in frames of 7.
+        self.assertGreater(data_before, 0.8 * case.SHORT_S * 200 * 28 / 7)
+
+    def test_can_fd(self):
+        unit = self.bench(ins={"fd": True}, sim_options=["--fd"]).start()
+        run = unit.wait_for_end(unit.start_run("--schedule", unit.short, "--dry-run"))
+        self.assertGreater(len(run["recording"]), 0, run["reason"])
+        with h5py.File(run["recording"]) as pulled:
+            self.assertEqual(len(pulled["time_s"]), round(case.SHORT_S * 50))
+
+
+if __name__ == "__main__":
+    unittest.main()

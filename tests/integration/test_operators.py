@@ -1,0 +1,65 @@
+"""Who may do what, and what happens when two want the same."""
+import os
+import signal
+import subprocess
+import time
+import unittest
+
+import bench
+import case
+
+
+class Operators(case.OnBench):
+    def test_second_operator_is_told_who_is_first(self):
+        unit = self.bench(speed=5.0).start()
+        run = unit.start_run("--schedule", unit.short, "--dry-run")
+        second = unit.selfcal("run", unit.name, check=False)
+        self.assertEqual(second.returncode, case.DEVICE_TROUBLE)
+        self.assert_one_line(second.stderr, "busy", f"run {run}", "since")
+        unit.selfcal("abort", unit.name, "--reason", "test")
+        self.assertEqual(unit.wait_for_end(run)["state"], "aborted")
+
+    def test_interrupt_stops_safely(self):
+        unit = self.bench(speed=5.0).start()
+        operator = subprocess.Popen([bench.BIN / "selfcal", "run", unit.name, "--schedule", unit.short],
+                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        unit.wait_until(lambda s: s["state"] == "rotating" and s["pages_pulled"] >= 1, "rotation")
+        operator.send_signal(signal.SIGINT)
+        _, words = operator.communicate(timeout=30)
+        self.assertEqual(operator.returncode, case.ANSWER_IS_NO, words)
+        self.assertEqual(unit.document(1)["state"], "aborted")
+        self.assert_old_coefficients(unit)
+
+    @unittest.skipIf(os.getuid() != 0 or os.environ.get("VCAN_RUN") != "uml", "needs other users: user-mode Linux")
+    def test_an_outsider_may_look_but_not_act(self):
+        unit = self.bench().start()
+        # The build may lie where nobody else may look.
+        outsider = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+        call = ["dbus-send", f"--bus={os.environ['DBUS_SYSTEM_BUS_ADDRESS']}", "--print-reply",
+                "--dest=org.selfcal.Manager1", "/org/selfcal/Manager"]
+        look = subprocess.run([*outsider, *call, "org.selfcal.Manager1.History", "string:"], capture_output=True,
+                              text=True, check=False)
+        self.assertEqual(look.returncode, 0, look.stderr)
+        act = subprocess.run([*outsider, *call, "org.selfcal.Manager1.Abort", "string:unit", "string:no"],
+                             capture_output=True, text=True, check=False)
+        self.assertNotEqual(act.returncode, 0)
+        self.assertIn("AccessDenied", act.stderr)
+
+
+class Restarts(case.OnBench):
+    def test_killed_service_takes_up_its_run(self):
+        """kill -9 at several instants of one run: it ends as if nothing had been."""
+        unit = self.bench(speed=4.0).start()
+        run = unit.start_run("--schedule", unit.short, "--dry-run")
+        for _ in range(3):
+            time.sleep(1.5)
+            unit.kill_daemon()
+            unit.start_daemon()
+        document = unit.wait_for_end(run)
+        self.assertIn(document["state"], ("completed", "refused"), document)
+        rotations = [e for e in document["events"] if e["text"].startswith("rotating")]
+        self.assertEqual(len(rotations), 1, "never a second rotation on top of the first")
+
+
+if __name__ == "__main__":
+    unittest.main()
