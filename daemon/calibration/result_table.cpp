@@ -73,7 +73,7 @@ std::string result_table(const CalibrationResult& result, const CalibrationOptio
                       result.accel_vrw / units::micro_g_per_sqrt_hz, result.position_sigma);
   text += passes_text(result);
   for (const UndeterminedDirection& direction : result.undetermined) {
-    text += fmt::format("undetermined ({:.1f} tolerances): {}\n", direction.sigma, direction.words);
+    text += fmt::format("undetermined: {}\n", direction.words);
   }
   const bool good = acceptable(result);
   text += coloured(fmt::format("verdict: {}", result.consistency.words), good ? green : red, colour) + "\n";

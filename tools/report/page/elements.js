@@ -1,0 +1,76 @@
+// Building the page: elements and numbers.
+'use strict';
+
+// element('td', {class: 'bad'}, 'text', child, ...)
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+const svgNamespace = 'http://www.w3.org/2000/svg';
+
+function svgElement(tag, attributes = {}, ...children) {
+  const made = document.createElementNS(svgNamespace, tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+// Units as people read them; the JSON keeps its plain ones.
+const unitSymbols = {'ug': 'µg', 'deg/h': '°/h', 'arcsec': '″', 'deg': '°'};
+
+function unitSymbol(unit) {
+  return unitSymbols[unit] || unit;
+}
+
+// The shortest text with `digits` significant digits.
+function significant(value, digits = 4) {
+  if (value === null || !Number.isFinite(value)) {
+    return '–';
+  }
+  if (value === 0) {
+    return '0';
+  }
+  const size = Math.abs(value);
+  if (size < 1e-4 || size >= 1e7) {
+    return value.toExponential(digits - 1);
+  }
+  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+  return value.toFixed(Math.min(decimals, 12));
+}
+
+// Decimals that show two significant digits of sigma: value and sigma are then cut at the same place.
+function decimalsFor(sigma) {
+  if (!(sigma > 0)) {
+    return 6;
+  }
+  return Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
+}
+
+function cssColour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+}
+
+// columns: [{title, cells}], cells being texts or elements.
+function table(columns, attributes = {}) {
+  const head = element('tr');
+  for (const column of columns) {
+    head.append(element('th', {scope: 'col', class: column.class || ''}, column.title));
+  }
+  const body = element('tbody');
+  const rows = Math.max(0, ...columns.map((column) => column.cells.length));
+  for (let row = 0; row < rows; ++row) {
+    const line = element('tr');
+    for (const column of columns) {
+      line.append(element('td', {class: column.class || ''}, column.cells[row] ?? ''));
+    }
+    body.append(line);
+  }
+  return element('div', {class: 'scroll'}, element('table', attributes, element('thead', {}, head), body));
+}

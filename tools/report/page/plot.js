@@ -1,0 +1,186 @@
+// One plot: a figure with title, legend, uPlot canvas, read-out, saving, and its numbers as a table.
+//
+// spec: {id, title, height, x: {label, unit, values, log}, y: {label, unit, log, range: [low, high]},
+//        series: [{label, colour, values, dash, points, thin}], band: [upper, lower] (series numbers),
+//        marks: [x, ...] (dotted vertical lines), level: y (dotted horizontal line)}
+'use strict';
+
+const livePlots = [];
+
+function axisTitle(axis) {
+  return axis.unit ? `${axis.label} (${unitSymbol(axis.unit)})` : axis.label;
+}
+
+function axisOptions(spec, which, ticks) {
+  const axis = spec[which];
+  return {
+    scale: which,
+    label: axisTitle(axis),
+    labelSize: 18,
+    labelFont: '12px system-ui, sans-serif',
+    font: '11px system-ui, sans-serif',
+    size: which === 'y' ? 62 : 34,
+    stroke: cssColour('text'),
+    grid: {stroke: cssColour('rule'), width: 1},
+    ticks: {stroke: cssColour('rule'), width: 1},
+    values: (plot, splits) => {
+      const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
+      const decimals = Math.min(9, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+      const labels = splits.map((at) => {
+        if (at === null) return '';
+        return axis.log ? logLabel(at) : at.toFixed(decimals);
+      });
+      ticks[which] = splits.map((at, k) => ({at, label: labels[k]})).filter((tick) => tick.at !== null);
+      return labels;
+    },
+  };
+}
+
+// Powers of ten only: uPlot offers all nine of a decade.
+function logLabel(at) {
+  const power = Math.log10(at);
+  return Math.abs(power - Math.round(power)) < 1e-9 ? String(+at.toPrecision(1)) : '';
+}
+
+function drawMarks(spec, plot) {
+  const {ctx, bbox} = plot;
+  ctx.save();
+  ctx.strokeStyle = cssColour('faint');
+  ctx.lineWidth = devicePixelRatio;
+  ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
+  ctx.beginPath();
+  for (const x of spec.marks || []) {
+    const across = plot.valToPos(x, 'x', true);
+    ctx.moveTo(across, bbox.top);
+    ctx.lineTo(across, bbox.top + bbox.height);
+  }
+  if (spec.level !== undefined) {
+    const down = plot.valToPos(spec.level, 'y', true);
+    ctx.moveTo(bbox.left, down);
+    ctx.lineTo(bbox.left + bbox.width, down);
+  }
+  ctx.stroke();
+  ctx.restore();
+}
+
+function seriesOptions(series) {
+  const colour = cssColour(series.colour);
+  return {
+    label: series.label,
+    stroke: colour,
+    width: series.points ? 0 : series.thin ? 0.8 : 1.6,
+    dash: series.dash,
+    spanGaps: false,
+    paths: series.points ? () => null : undefined,
+    points: {show: Boolean(series.points), size: 6, fill: colour, stroke: colour},
+  };
+}
+
+function plotOptions(spec, width, ticks, readout) {
+  const scale = (axis) => ({
+    time: false,
+    distr: axis.log ? 3 : 1,
+    ...(axis.range ? {range: () => axis.range} : {}),
+  });
+  return {
+    width,
+    height: spec.height || 230,
+    legend: {show: false},
+    cursor: {drag: {x: true, y: false}},
+    scales: {x: scale(spec.x), y: scale(spec.y)},
+    axes: [axisOptions(spec, 'x', ticks), axisOptions(spec, 'y', ticks)],
+    series: [{label: spec.x.label}, ...spec.series.map(seriesOptions)],
+    bands: spec.band ? [{series: spec.band, fill: cssColour('band')}] : [],
+    hooks: {
+      draw: [(plot) => drawMarks(spec, plot)],
+      setCursor: [(plot) => showReadout(spec, plot, readout)],
+    },
+  };
+}
+
+function showReadout(spec, plot, readout) {
+  const row = plot.cursor.idx;
+  if (row === null || row === undefined) {
+    readout.textContent = '';
+    return;
+  }
+  const parts = [`${spec.x.label} ${significant(spec.x.values[row])} ${unitSymbol(spec.x.unit || '')}`];
+  for (const series of spec.series) {
+    if (series.values[row] !== null) {
+      parts.push(`${series.label} ${significant(series.values[row], 5)} ${unitSymbol(spec.y.unit || '')}`);
+    }
+  }
+  readout.textContent = parts.join(' · ');
+}
+
+function legend(spec) {
+  const entries = spec.series.map((series) => {
+    const colour = `var(--${series.colour})`;
+    const mark = series.points ? svgElement('circle', {cx: 10, cy: 5, r: 3, fill: colour})
+        : svgElement('line', {x1: 0, y1: 5, x2: 20, y2: 5, stroke: colour, 'stroke-width': 2,
+                              'stroke-dasharray': (series.dash || []).join(' ')});
+    return element('span', {}, svgElement('svg', {width: 20, height: 10, 'aria-hidden': 'true'}, mark), series.label);
+  });
+  return element('div', {class: 'legend'}, ...entries);
+}
+
+function numbersTable(spec) {
+  const details = element('details', {}, element('summary', {}, 'Numbers'));
+  details.addEventListener('toggle', () => {
+    if (details.open && details.children.length === 1) {
+      details.append(table(plotColumns(spec).map(
+          (column) => ({title: column.title, cells: column.values.map((value) => significant(value, 6))}))));
+    }
+  });
+  return details;
+}
+
+// Left and right move the cursor from point to point, Escape undoes a zoom.
+function addKeys(host, state) {
+  host.addEventListener('keydown', (event) => {
+    const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
+    if (step !== undefined) {
+      const count = state.plot.data[0].length;
+      const row = Math.min(count - 1, Math.max(0, (state.plot.cursor.idx ?? -1) + step));
+      state.plot.setCursor({left: state.plot.valToPos(state.plot.data[0][row], 'x'), top: 20});
+      event.preventDefault();
+    } else if (event.key === 'Escape') {
+      state.plot.setData(state.plot.data, true);
+    }
+  });
+}
+
+function addPlot(parent, spec) {
+  const host = element('div', {class: 'plot', tabindex: '0', role: 'img', id: spec.id,
+                               'aria-label': `${spec.title}: ${axisTitle(spec.y)} against ${axisTitle(spec.x)}`});
+  const readout = element('div', {class: 'readout'});
+  const state = {spec, host, ticks: {x: [], y: []}, plot: null};
+  const button = (label, action) => {
+    const made = element('button', {type: 'button', title: `Save "${spec.title}" as ${label}`}, label);
+    made.addEventListener('click', action);
+    return made;
+  };
+  const tools = element('div', {class: 'tools'},
+      button('CSV', () => saveBlob(spec.id + '.csv', 'text/csv', csvText(spec))),
+      button('JSON', () => saveBlob(spec.id + '.json', 'application/json', JSON.stringify(plotColumns(spec)))),
+      button('SVG', () => saveBlob(spec.id + '.svg', 'image/svg+xml', svgText(spec, state.plot, state.ticks))),
+      button('PNG', async () => saveBlob(spec.id + '.png', 'image/png', await pngBlob(spec, state.plot))));
+  parent.append(element('figure', {}, element('header', {}, element('h3', {}, spec.title), tools), legend(spec), host,
+                        readout, numbersTable(spec)));
+  state.draw = () => {
+    if (state.plot) {
+      state.plot.destroy();
+    }
+    const data = [spec.x.values, ...spec.series.map((series) => series.values)];
+    state.plot = new uPlot(plotOptions(spec, Math.max(240, host.clientWidth), state.ticks, readout), data, host);
+  };
+  state.draw();
+  addKeys(host, state);
+  livePlots.push(state);
+}
+
+function redrawPlots() {
+  for (const state of livePlots) {
+    state.draw();
+  }
+}
