@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace selfcal {
 namespace {
@@ -16,6 +17,7 @@ constexpr int lowest_bin = 6, highest_bin = 26;   // of piece_length
 // Increments are summed into groups. 0.05 s: pieces of 3.2 s, 1.9 to 8 Hz, where sway has died out. Gyros on a still
 // base 0.5 s: 32 s, 0.19 to 0.8 Hz, because a slow steady rate leaves their quantisation far from white above that.
 constexpr double slow_group_s = 0.5, fast_group_s = 0.05;
+constexpr int lowest_bins = 5;
 constexpr std::size_t enough_pieces = 10;
 constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
 constexpr double margin_s = 1.0;          // left out at both ends of a dwell
@@ -103,7 +105,8 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
 }
 
 // density = N^2 + Q^2 * 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
-void fit_density(const Spectrum& spectrum, double group_s, TriadNoise& noise) {
+// A quantum that is carried on (known_angle) leaves quantum^2/12 of white angle; it is then not fitted.
+void fit_density(const Spectrum& spectrum, double group_s, std::optional<double> known_angle, TriadNoise& noise) {
   const Eigen::Index bins = spectrum.density.size();
   Eigen::ArrayXd shape(bins);
   for (Eigen::Index b = 0; b < bins; ++b) {
@@ -113,7 +116,9 @@ void fit_density(const Spectrum& spectrum, double group_s, TriadNoise& noise) {
   std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
   std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
   double white = sorted[static_cast<std::size_t>(bins / 2)];
-  double angle = 0.0;
+  double angle = known_angle.value_or(0.0);
+  // Periodic quantisation can look like white angle all the way down: the lowest bins bound what may be taken off.
+  const double least = std::max(1e-6 * white, 0.3 * spectrum.density.head(lowest_bins).mean());
   for (int round = 0; round < 20; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -126,10 +131,11 @@ void fit_density(const Spectrum& spectrum, double group_s, TriadNoise& noise) {
       normal += row * row.transpose();
       right += row * spectrum.density(b) / model;
     }
-    const Eigen::Vector2d fit = normal.inverse() * right;
-    angle = std::max(0.0, fit(1));
-    white = angle > 0.0 ? fit(0) : right(0) / normal(0, 0);
-    white = std::max(white, 1e-6 * sorted[static_cast<std::size_t>(bins / 2)]);
+    if (!known_angle) {
+      const Eigen::Vector2d fit = normal.inverse() * right;
+      angle = fit(0) > least ? std::max(0.0, fit(1)) : std::max(0.0, (right(1) - normal(0, 1) * least) / normal(1, 1));
+    }
+    white = std::max(least, (right(0) - normal(0, 1) * angle) / normal(0, 0));
   }
   noise.white_asd = std::sqrt(white);
   noise.increment_sigma = std::sqrt(angle);
@@ -194,28 +200,48 @@ double second_variance(const ImuData& data, const std::vector<Segment>& segments
   return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
+// So long that a piece fits into the median dwell, and no longer than the slow group.
+double slow_group(const std::vector<Segment>& segments) {
+  std::vector<double> dwells;
+  for (const Segment& segment : segments) {
+    if (!segment.rotation) {
+      dwells.push_back(segment.end_s - segment.start_s - 2.0 * margin_s);
+    }
+  }
+  if (dwells.empty()) {
+    return fast_group_s;
+  }
+  const auto middle = dwells.begin() + static_cast<std::ptrdiff_t>(dwells.size() / 2);
+  std::nth_element(dwells.begin(), middle, dwells.end());
+  return std::clamp(0.98 * *middle / piece_length, fast_group_s, slow_group_s);
+}
+
 }  // namespace
 
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments) {
   SensorNoise noise;
+  noise.gyro.quantum = find_quantum(data.delta_theta);
+  noise.accel.quantum = find_quantum(data.delta_v);
   const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, fast_group_s);
   const Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s);
   noise.spectra = accel.pieces;
-  if (noise.spectra > 0) {
-    fit_density(accel, fast_group_s, noise.accel);
-    fit_density(gyro, fast_group_s, noise.gyro);
-    // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
-    const double expected = noise.accel.white_asd * noise.accel.white_asd;
-    noise.base_moves = second_variance(data, segments) > 25.0 * expected;
-    if (!noise.base_moves) {
-      const Spectrum slow = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, slow_group_s);
-      if (slow.pieces >= enough_pieces) {
-        fit_density(slow, slow_group_s, noise.gyro);
-      }
+  if (noise.spectra == 0) {
+    return noise;
+  }
+  const double accel_quantum = noise.accel.quantum;
+  fit_density(accel, fast_group_s,
+              accel_quantum > 0.0 ? std::optional(accel_quantum * accel_quantum / 12.0) : std::nullopt, noise.accel);
+  fit_density(gyro, fast_group_s, std::nullopt, noise.gyro);
+  // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
+  const double expected = noise.accel.white_asd * noise.accel.white_asd;
+  noise.base_moves = second_variance(data, segments) > 25.0 * expected;
+  if (!noise.base_moves) {
+    const double group_s = slow_group(segments);
+    const Spectrum slow = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
+    if (slow.pieces >= enough_pieces) {
+      fit_density(slow, group_s, std::nullopt, noise.gyro);
     }
   }
-  noise.gyro.quantum = find_quantum(data.delta_theta);
-  noise.accel.quantum = find_quantum(data.delta_v);
   return noise;
 }
 

@@ -1,6 +1,7 @@
 #include "estimator/passes/calibration.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
@@ -85,7 +86,9 @@ class Calibration {
   PassOutput last_;
   double next_sign_ = 1.0;
   std::vector<PassSummary> passes_;
-  double last_move_ = 0.0;
+  std::array<std::optional<ParameterVector>, 2> answers_;   // of the last forward and the last reverse pass
+  double last_move_ = 0.0;       // in sigma, since the pass before
+  double same_way_move_ = 0.0;   // in sigma, since the last pass of the same direction
   bool converged_ = false;
 };
 
@@ -107,6 +110,9 @@ bool Calibration::pass(double sign) {
   const ParameterVector value =
       input_.parameters + last_.mean.segment<sensor_parameter_count>(last_.layout.parameters());
   last_move_ = (value - input_.parameters).cwiseAbs().cwiseQuotient(sigma()).maxCoeff();
+  std::optional<ParameterVector>& same_way = answers_[sign > 0.0 ? 0 : 1];
+  same_way_move_ = same_way ? (value - *same_way).cwiseAbs().cwiseQuotient(sigma()).maxCoeff() : HUGE_VAL;
+  same_way = value;
   passes_.push_back({direction, static_cast<double>(data_.size()) / data_.sample_rate_hz, last_.nis_mean, last_move_,
                      last_.history_s, last_.history_value, last_.history_sigma});
   input_.parameters = value;
@@ -158,7 +164,10 @@ bool Calibration::settle(int least_passes) {
     if (!pass(next_sign_)) {
       return false;
     }
-    if (static_cast<int>(passes_.size()) >= least_passes && last_move_ < options_.convergence_sigma) {
+    // Still against the pass before, which ran the other way, or against the one before that, which ran the same way:
+    // with a fitted motion of the base the two ways do not weigh the ends alike.
+    const double move = std::min(last_move_, same_way_move_);
+    if (static_cast<int>(passes_.size()) >= least_passes && move < options_.convergence_sigma) {
       converged_ = true;
       break;
     }
@@ -250,9 +259,15 @@ bool Calibration::sharpen_base_motion(double best_likelihood) {
 
 CalibrationOutcome Calibration::run() {
   const CalibrationOutcome stopped{std::nullopt, {"stopped"}};
-  if (!align() || !pass(next_sign_)) {
+  if (!align()) {
     return stopped;
   }
+  // Innovations tell of the site's noise only where the linearisation no longer shows in them.
+  do {
+    if (!pass(next_sign_)) {
+      return stopped;
+    }
+  } while (last_move_ > 1.0 && static_cast<int>(passes_.size()) < 6);
   if (!options_.noise.position_sigma) {
     if (noise_.base_moves ? !fit_base_motion() : !fit_position_sigma()) {
       return stopped;

@@ -1,0 +1,26 @@
+// Gyro scale that follows the measured temperature.
+#include "estimator/diagnosis/effects/declare.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+void columns(const EffectContext& c, double /*constant*/, Columns /*velocity*/, Columns angle) {
+  add_axes(angle, c.temperature * c.angle);
+}
+
+}  // namespace
+
+Effect gyro_scale_temperature_measured() {
+  Effect e;
+  e.id = "gyro_scale_temperature";
+  e.equation = "dw_i = k_i (T - mean T) w_i";
+  e.excited = "rotations";
+  e.experiment = "heating the block";
+  e.parameters = axis_parameters("ppm/degC", units::ppm, 2.0);
+  e.needs_temperature = true;
+  e.sensor = columns;
+  return e;
+}
+
+}  // namespace selfcal::diagnosis
