@@ -16,6 +16,7 @@ struct SingleFrame {
 };
 struct FirstFrame {
   std::uint32_t length = 0;                 // of the whole message
+  std::size_t frame_bytes = 0;              // length of this frame: that of all but the last consecutive frame
   std::span<const std::uint8_t> payload;    // its beginning
 };
 struct ConsecutiveFrame {
@@ -41,12 +42,13 @@ enum class CodecError : std::uint8_t {
 // `data` is the payload of one CAN frame (up to 64 bytes). Spans point into it.
 tl::expected<Pdu, CodecError> decode(std::span<const std::uint8_t> data);
 
-// Encoders write into `out` (frame_bytes long: 8, or an FD length), return how many bytes are in use; padding is the
-// transport's. Single: 0 if the payload does not fit. First: returns always frame_bytes; *taken says how much of the
-// payload went in.
+// Encoders write into `out`, as long as the frame may become (8, or an FD length); padding is the transport's.
+// Single, consecutive, flow control: return the bytes in use; single 0 if the payload does not fit. First: fills all of
+// `out` from the beginning of the payload and returns how much of it went in.
 std::size_t encode_single(std::span<const std::uint8_t> payload, std::span<std::uint8_t> out);
 std::size_t encode_first(std::uint32_t length, std::span<const std::uint8_t> payload, std::span<std::uint8_t> out);
-std::size_t encode_consecutive(std::uint8_t sequence, std::span<const std::uint8_t> payload, std::span<std::uint8_t> out);
+std::size_t encode_consecutive(std::uint8_t sequence, std::span<const std::uint8_t> payload,
+                               std::span<std::uint8_t> out);
 std::size_t encode_flow_control(const FlowControl& flow, std::span<std::uint8_t> out);
 
 std::size_t max_single_payload(std::size_t frame_bytes);                            // 7 for 8; n-2 for more

@@ -47,13 +47,15 @@ enum class Result : std::uint8_t {
   received,             // Transport::message() is a complete message
   received_functional,  // the same, on the functional identifier
   reception_started,    // a first frame was accepted
-  timeout_a,            // the bus took our frame too late: message given up
+  timeout_a,            // the bus did not take our frame in time: message given up
+  timeout_ar,           // nor our flow control: reception given up
   timeout_bs,           // no flow control
   timeout_cr,           // no consecutive frame
   wrong_sequence,       // a frame was lost or doubled: reception given up
   invalid_flow_status,
   unexpected_frame,     // a new message began before the old one ended: the old one is given up
-  too_many_waits,
+  too_many_waits,       // the peer said WAIT too often: message given up
+  held_too_long,        // we did: reception given up
   overflow,             // the peer cannot take our message
   message_too_long,     // the peer's message does not fit; it was told so
 };
@@ -62,7 +64,7 @@ std::string_view name(Result result);
 bool is_failure(Result result);
 bool concerns_sending(Result result);   // failure of our message (else of the peer's)
 
-// At most three results come of one call.
+// What one call brought about; never more than four results.
 class Events {
  public:
   void add(Result result) { results_[count_++] = result; }
@@ -92,7 +94,7 @@ class Transport {
 
   // The frames that may go out now, at most out.size(); asking does not change anything. Takes flow control first.
   std::size_t pending(std::span<can::CanFrame> out, Time now) const;
-  // The bus has taken the first `count` of what pending() gave.
+  // The bus has taken the first `count` of what pending() gave; no other call may stand between the two.
   Events sent(std::size_t count, Time now);
 
   // When on_time() or pending() is next needed. A frame that may go out at once has its time in the past.
@@ -129,6 +131,7 @@ class Transport {
     std::vector<std::uint8_t> buffer;
     std::size_t length = 0;
     std::size_t done = 0;
+    std::size_t frame_payload = 0;      // of every consecutive frame but the last: as long as the first frame
     std::uint8_t sequence = 0;          // expected next
     unsigned block_left = 0;            // frames until we owe flow control; 0: no limit
     Time deadline{0};                   // N_Cr
@@ -146,7 +149,11 @@ class Transport {
   void finish_frame(can::CanFrame& frame, std::size_t used) const;
   can::CanFrame single_frame(std::span<const std::uint8_t> message, std::uint32_t id) const;
   void owe_flow_control(FlowStatus status, Time now);
-  void grant_or_wait(Time now);
+  void grant_or_wait(Time now, Events& events);
+  void end_reception();
+  void end_reception_for_new_message(Events& events);
+  can::CanFrame opening_frame() const;
+  can::CanFrame consecutive_frame(std::size_t at, std::size_t part, std::uint8_t sequence) const;
   std::size_t consecutive_payload() const;
   bool is_ours(std::uint32_t id, const can::CanFrame& frame) const;
   void on_single(const SingleFrame& single, Events& events);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/can/frame.hpp"
@@ -13,7 +14,7 @@
 
 namespace selfcal::uds {
 
-// One line: service, DID or routine, NRC by name, the first bytes of data. `from_ins` tells requests from responses.
+// One line: service, DID or routine, NRC by name, the first bytes of data; of seeds and keys only their length.
 std::string describe_message(std::span<const std::uint8_t> message);
 
 struct DecoderOptions {
@@ -21,7 +22,6 @@ struct DecoderOptions {
   std::uint32_t response_id = 0x648;
   std::uint32_t functional_id = 0x7DF;
   bool extended = false;
-  bool hide_keys = true;   // seeds and keys of SecurityAccess are never printed in full
 };
 
 // Puts ISO-TP messages together by listening only (it sends no flow control).

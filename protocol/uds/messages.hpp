@@ -53,7 +53,7 @@ struct SessionTimings {
 // What a TransferData response of `max_block` bytes carries: two of them are service and block counter.
 inline constexpr std::size_t transfer_overhead = 2;
 
-// Requests, as the server reads them. nullopt-like: NRC in the error.
+// Requests, as the server reads them; the error is the NRC to answer with.
 struct UploadRange {
   std::uint32_t first_page = 0;
   std::uint32_t bytes = 0;

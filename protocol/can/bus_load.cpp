@@ -1,0 +1,16 @@
+#include "protocol/can/bus_load.hpp"
+
+#include <algorithm>
+
+namespace selfcal::can {
+
+Time BusClock::transmit(const CanFrame& frame, Time now) {
+  const Time duration = frame_time(frame, rates_);
+  free_at_ = std::max(free_at_, now) + duration;
+  busy_ += duration;
+  ++frames_;
+  data_bytes_ += frame.remote ? 0U : frame.size;
+  return free_at_;
+}
+
+}  // namespace selfcal::can

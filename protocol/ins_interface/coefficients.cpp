@@ -1,0 +1,75 @@
+#include "protocol/ins_interface/coefficients.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/byte_order.hpp"
+#include "protocol/flash/crc32c.hpp"
+
+namespace selfcal::ins {
+namespace {
+
+constexpr std::uint32_t magic = 0x5343434F;
+constexpr std::uint16_t format_number = 1;
+constexpr std::size_t crc_at = 256;
+
+}  // namespace
+
+CoefficientsBytes encode(const Coefficients& coefficients) {
+  CoefficientsBytes bytes{};
+  ByteWriter out(bytes);
+  out.put(magic);
+  out.put(format_number);
+  out.put(std::uint16_t{0});
+  out.put(coefficients.version);
+  out.put(coefficients.date_s);
+  out.put_text(coefficients.author, author_bytes);
+  for (const double value : coefficients.value) {
+    out.put(value);
+  }
+  const std::span<std::uint8_t> all(bytes);
+  ByteWriter(all.subspan(crc_at)).put(flash::crc32c(all.first(crc_at)));
+  return bytes;
+}
+
+Expected<Coefficients> decode_coefficients(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() != coefficients_bytes) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("coefficient record: {} bytes instead of {}", bytes.size(), coefficients_bytes));
+  }
+  ByteReader in(bytes);
+  if (const auto found = in.get<std::uint32_t>(); found != magic) {
+    return fail(ErrorKind::bad_input, fmt::format("coefficient record: magic 0x{:08X}: not such a record", found));
+  }
+  const std::uint32_t stored = stored_crc(bytes.first<coefficients_bytes>());
+  if (const std::uint32_t computed = flash::crc32c(bytes.first(crc_at)); computed != stored) {
+    return fail(ErrorKind::bad_input, fmt::format("coefficient record: CRC 0x{:08X} is stored, the content has 0x{:08X}",
+                                                  stored, computed));
+  }
+  if (const auto found = in.get<std::uint16_t>(); found != format_number) {
+    return fail(ErrorKind::bad_input, fmt::format("coefficient record: format {} is unknown", found));
+  }
+  in.get<std::uint16_t>();
+  Coefficients result;
+  result.version = in.get<std::uint32_t>();
+  result.date_s = in.get<std::int64_t>();
+  result.author = in.get_text(author_bytes);
+  if (!std::ranges::all_of(result.author, [](char c) { return c >= ' ' && c <= '~'; })) {
+    return fail(ErrorKind::bad_input, "coefficient record: the author is not printable ASCII");
+  }
+  for (std::size_t i = 0; i < coefficient_count; ++i) {
+    result.value[i] = in.get_double();
+    if (!std::isfinite(result.value[i])) {
+      return fail(ErrorKind::bad_input, fmt::format("coefficient record: value {} is not finite", i));
+    }
+  }
+  return result;
+}
+
+std::uint32_t stored_crc(std::span<const std::uint8_t, coefficients_bytes> bytes) {
+  return ByteReader(bytes.subspan(crc_at)).get<std::uint32_t>();
+}
+
+}  // namespace selfcal::ins

@@ -1,0 +1,103 @@
+#include "protocol/uds/decode.hpp"
+
+#include <fmt/format.h>
+
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/ins_interface/status.hpp"
+#include "protocol/isotp/codec.hpp"
+
+namespace selfcal::uds {
+namespace {
+
+constexpr std::uint32_t longest_message = 65535;   // what is announced as longer is broken or not ours
+
+std::string stamp(Time time) {
+  const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(time).count();
+  return fmt::format("({}.{:06})", micros / 1'000'000, micros % 1'000'000);
+}
+
+std::string status_line(const can::CanFrame& frame, Time time) {
+  std::string line = fmt::format("{} status  ", stamp(time));
+  for (const ins::Signal& signal : ins::status_signals) {
+    if (signal.frame_id == frame.id) {
+      line += fmt::format(" {}={:g}{}", signal.name, ins::raw_signal(signal, frame.payload()) * signal.factor,
+                          signal.unit);
+    }
+  }
+  return line;
+}
+
+}  // namespace
+
+LogDecoder::LogDecoder(const DecoderOptions& options)
+    : options_(options),
+      streams_{Stream{options.request_id, "tester ", {}, 0, 0}, Stream{options.response_id, "INS    ", {}, 0, 0},
+               Stream{options.functional_id, "tester*", {}, 0, 0}} {}
+
+std::optional<std::string> LogDecoder::on_frame(const can::CanFrame& frame, Time time) {
+  if (frame.remote) {
+    return std::nullopt;
+  }
+  for (Stream& stream : streams_) {
+    if (frame.id == stream.id && frame.extended == options_.extended) {
+      return on_stream(stream, frame, time);
+    }
+  }
+  const bool is_status = frame.id == ins::can_id::status || frame.id == ins::can_id::gimbal;
+  if (is_status && !frame.extended && frame.size == 8) {
+    return status_line(frame, time);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> LogDecoder::on_stream(Stream& stream, const can::CanFrame& frame, Time time) {
+  const auto pdu = isotp::decode(frame.payload());
+  if (!pdu) {
+    return broken_line(stream, "malformed frame", time);
+  }
+  if (std::holds_alternative<isotp::FlowControl>(*pdu)) {
+    return std::nullopt;
+  }
+  if (const auto* next = std::get_if<isotp::ConsecutiveFrame>(&*pdu)) {
+    if (stream.length == 0) {
+      return broken_line(stream, "consecutive frame without a first one", time);
+    }
+    if (next->sequence != stream.sequence) {
+      stream.length = 0;
+      return broken_line(stream, "frame lost or doubled", time);
+    }
+    stream.sequence = static_cast<std::uint8_t>((stream.sequence + 1) & 0x0F);
+    const std::size_t part = std::min(next->payload.size(), stream.length - stream.bytes.size());
+    stream.bytes.insert(stream.bytes.end(), next->payload.begin(), next->payload.begin() + static_cast<long>(part));
+    if (stream.bytes.size() < stream.length) {
+      return std::nullopt;
+    }
+    stream.length = 0;
+    return message_line(stream, stream.bytes, time);
+  }
+  const bool interrupted = stream.length != 0;
+  stream.length = 0;
+  malformed_ += interrupted ? 1 : 0;
+  if (const auto* first = std::get_if<isotp::FirstFrame>(&*pdu)) {
+    if (first->length > longest_message) {
+      return broken_line(stream, "announced length beyond 65535", time);
+    }
+    stream.bytes.assign(first->payload.begin(), first->payload.end());
+    stream.length = first->length;
+    stream.sequence = 1;
+    return std::nullopt;
+  }
+  return message_line(stream, std::get<isotp::SingleFrame>(*pdu).payload, time);
+}
+
+std::string LogDecoder::message_line(const Stream& stream, std::span<const std::uint8_t> message, Time time) {
+  ++messages_;
+  return fmt::format("{} {} {}", stamp(time), stream.label, describe_message(message));
+}
+
+std::string LogDecoder::broken_line(const Stream& stream, std::string_view why, Time time) {
+  ++malformed_;
+  return fmt::format("{} {} broken: {}", stamp(time), stream.label, why);
+}
+
+}  // namespace selfcal::uds

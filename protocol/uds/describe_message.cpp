@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "protocol/byte_order.hpp"
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/uds/decode.hpp"
+#include "protocol/uds/services.hpp"
+
+namespace selfcal::uds {
+namespace {
+
+using ByteView = std::span<const std::uint8_t>;
+constexpr std::size_t shown_bytes = 16;
+
+std::string data_text(ByteView data) {
+  if (data.empty()) {
+    return "";
+  }
+  const ByteView head = data.first(std::min(data.size(), shown_bytes));
+  const std::string more = data.size() > shown_bytes ? fmt::format(" … {} bytes", data.size()) : "";
+  return fmt::format(": {:02X}{}", fmt::join(head, " "), more);
+}
+
+std::string_view action_name(std::uint8_t action) {
+  switch (static_cast<RoutineAction>(action)) {
+    case RoutineAction::start: return "start";
+    case RoutineAction::stop: return "stop";
+    case RoutineAction::result: return "result";
+  }
+  return "unknown action";
+}
+
+std::string session_name(std::uint8_t session) {
+  switch (static_cast<Session>(session)) {
+    case Session::standard: return "default session";
+    case Session::programming: return "programming session";
+    case Session::extended: return "extended session";
+  }
+  return fmt::format("session 0x{:02X}", session);
+}
+
+std::string security_text(std::uint8_t level, ByteView rest) {
+  // What unlocks the INS is told by its length alone.
+  return fmt::format(" {} ({} bytes)", (level & 1U) != 0 ? "seed" : "key", rest.size());
+}
+
+// What follows the service, which is the same in requests and responses for most services.
+std::string body_text(std::uint8_t service, ByteView body, bool response) {
+  ByteReader in(body);
+  switch (service) {
+    case service::session_control:
+      return body.empty() ? "" : fmt::format(" {}", session_name(body[0] & 0x7FU)) + data_text(body.subspan(1));
+    case service::security_access:
+      return body.empty() ? "" : security_text(body[0] & 0x7FU, body.subspan(1));
+    case service::read_data:
+    case service::write_data:
+      if (const auto did = in.get<std::uint16_t>(); in.ok()) {
+        return fmt::format(" {} (0x{:04X})", ins::did_name(did), did) + data_text(body.subspan(2));
+      }
+      break;
+    case service::routine_control: {
+      const auto action = in.get<std::uint8_t>();
+      const auto routine = in.get<std::uint16_t>();
+      if (in.ok()) {
+        return fmt::format(" {} {} (0x{:04X})", action_name(action & 0x7FU), ins::routine_name(routine), routine) +
+               data_text(body.subspan(3));
+      }
+      break;
+    }
+    case service::request_upload:
+      if (!response && body.size() == 10) {
+        in.get<std::uint16_t>();
+        const auto page = in.get<std::uint32_t>();
+        return fmt::format(" from page {}, {} bytes", page, in.get<std::uint32_t>());
+      }
+      break;
+    case service::transfer_data:
+      return body.empty() ? "" : fmt::format(" block {}, {} bytes", body[0], body.size() - 1);
+    default:
+      break;
+  }
+  return data_text(body);
+}
+
+}  // namespace
+
+std::string describe_message(ByteView message) {
+  if (message.empty()) {
+    return "empty message";
+  }
+  if (message[0] == service::negative_response) {
+    if (message.size() != 3) {
+      return "malformed negative response" + data_text(message.subspan(1));
+    }
+    return fmt::format("negative {}: {}", service_name(message[1]), describe_nrc(message[2]));
+  }
+  const bool response = (message[0] & positive_offset) != 0;
+  const auto service = static_cast<std::uint8_t>(message[0] & ~positive_offset);
+  return fmt::format("{}{} (0x{:02X}){}", response ? "positive " : "", service_name(service), message[0],
+                     body_text(service, message.subspan(1), response));
+}
+
+}  // namespace selfcal::uds

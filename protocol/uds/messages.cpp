@@ -1,0 +1,206 @@
+#include "protocol/uds/messages.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/byte_order.hpp"
+
+namespace selfcal::uds {
+namespace {
+
+// address and length of 4 bytes each (ISO 14229-1, addressAndLengthFormatIdentifier)
+constexpr std::uint8_t four_and_four = 0x44;
+constexpr std::uint8_t no_compression = 0x00;
+
+template <typename... Fields>
+Bytes message(std::uint8_t service, const Fields&... fields) {
+  Bytes bytes(1 + (sizeof(Fields) + ... + 0));
+  ByteWriter out(bytes);
+  out.put(service);
+  (out.put(fields), ...);
+  return bytes;
+}
+
+Bytes with_tail(Bytes head, ByteView tail) {
+  head.insert(head.end(), tail.begin(), tail.end());
+  return head;
+}
+
+constexpr std::uint8_t positive(std::uint8_t service) { return static_cast<std::uint8_t>(service + positive_offset); }
+
+// Checks that the response starts as it must and has at least `minimum` bytes.
+Expected<void> check(ByteView response, std::uint8_t service, ByteView echo, std::size_t minimum) {
+  if (response.size() < std::max(minimum, 1 + echo.size())) {
+    return fail(ErrorKind::device, fmt::format("{}: the response has only {} bytes", service_name(service),
+                                               response.size()));
+  }
+  if (response[0] != positive(service)) {
+    return fail(ErrorKind::device, fmt::format("{}: the response begins with 0x{:02X} instead of 0x{:02X}",
+                                               service_name(service), response[0], positive(service)));
+  }
+  for (std::size_t i = 0; i < echo.size(); ++i) {
+    if (response[1 + i] != echo[i]) {
+      return fail(ErrorKind::device, fmt::format("{}: byte {} of the response is 0x{:02X}, the request had 0x{:02X}",
+                                                 service_name(service), 1 + i, response[1 + i], echo[i]));
+    }
+  }
+  return {};
+}
+
+Expected<void> check_code(ByteView response, std::uint8_t service, std::uint8_t code, std::size_t minimum) {
+  return check(response, service, std::span(&code, 1), minimum);
+}
+
+Expected<void> check_did(ByteView response, std::uint8_t service, std::uint16_t did) {
+  const std::array<std::uint8_t, 2> echo = {static_cast<std::uint8_t>(did >> 8), static_cast<std::uint8_t>(did)};
+  return check(response, service, echo, 3);
+}
+
+std::uint8_t code(auto value) { return static_cast<std::uint8_t>(value); }
+
+}  // namespace
+
+Bytes session_request(Session session) { return message(service::session_control, code(session)); }
+Bytes reset_request(ResetType type) { return message(service::ecu_reset, code(type)); }
+Bytes tester_present_request(bool suppress_response) {
+  return message(service::tester_present, suppress_response ? suppress_response_bit : std::uint8_t{0});
+}
+Bytes seed_request() { return message(service::security_access, security_seed_level); }
+Bytes key_request(ByteView key) { return with_tail(message(service::security_access, security_key_level), key); }
+Bytes read_request(std::uint16_t did) { return message(service::read_data, did); }
+Bytes write_request(std::uint16_t did, ByteView record) {
+  return with_tail(message(service::write_data, did), record);
+}
+Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView option) {
+  return with_tail(message(service::routine_control, code(action), routine), option);
+}
+Bytes upload_request(std::uint32_t first_page, std::uint32_t bytes) {
+  return message(service::request_upload, no_compression, four_and_four, first_page, bytes);
+}
+Bytes transfer_request(std::uint8_t block) { return message(service::transfer_data, block); }
+Bytes transfer_exit_request() { return message(service::transfer_exit); }
+
+Expected<SessionTimings> read_session_response(ByteView response, Session session) {
+  return check_code(response, service::session_control, code(session), 6).map([&] {
+    ByteReader in(response.subspan(2));
+    const Time p2 = std::chrono::milliseconds(in.get<std::uint16_t>());
+    return SessionTimings{p2, std::chrono::milliseconds(10 * in.get<std::uint16_t>())};
+  });
+}
+
+Expected<void> read_reset_response(ByteView response, ResetType type) {
+  return check_code(response, service::ecu_reset, code(type), 2);
+}
+
+Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response) {
+  return check_code(response, service::security_access, security_seed_level, 2 + seed_bytes).map([&] {
+    std::array<std::uint8_t, seed_bytes> seed{};
+    std::ranges::copy(response.subspan(2, seed_bytes), seed.begin());
+    return seed;
+  });
+}
+
+Expected<void> read_key_response(ByteView response) {
+  return check_code(response, service::security_access, security_key_level, 2);
+}
+
+Expected<ByteView> read_read_response(ByteView response, std::uint16_t did) {
+  return check_did(response, service::read_data, did).map([&] { return response.subspan(3); });
+}
+
+Expected<void> read_write_response(ByteView response, std::uint16_t did) {
+  return check_did(response, service::write_data, did);
+}
+
+Expected<ByteView> read_routine_response(ByteView response, RoutineAction action, std::uint16_t routine) {
+  const std::array<std::uint8_t, 3> echo = {code(action), code(routine >> 8), code(routine)};
+  return check(response, service::routine_control, echo, 4).map([&] { return response.subspan(4); });
+}
+
+Expected<std::uint32_t> read_upload_response(ByteView response) {
+  if (const auto checked = check(response, service::request_upload, {}, 3); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const std::size_t width = response[1] >> 4U;
+  if (width < 1 || width > 4 || response.size() < 2 + width) {
+    return fail(ErrorKind::device, fmt::format("RequestUpload: length format 0x{:02X} in a response of {} bytes",
+                                               response[1], response.size()));
+  }
+  std::uint32_t longest = 0;
+  for (const std::uint8_t byte : response.subspan(2, width)) {
+    longest = longest << 8U | byte;
+  }
+  if (longest <= transfer_overhead) {
+    return fail(ErrorKind::device, fmt::format("RequestUpload: blocks of {} bytes carry no data", longest));
+  }
+  return longest;
+}
+
+Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block) {
+  return check_code(response, service::transfer_data, block, 2).map([&] { return response.subspan(2); });
+}
+
+Expected<ByteView> read_transfer_exit_response(ByteView response) {
+  return check(response, service::transfer_exit, {}, 1).map([&] { return response.subspan(1); });
+}
+
+tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request) {
+  if (request.size() != 11) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  ByteReader in(request.subspan(1));
+  if (in.get<std::uint8_t>() != no_compression || in.get<std::uint8_t>() != four_and_four) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  UploadRange range;
+  range.first_page = in.get<std::uint32_t>();
+  range.bytes = in.get<std::uint32_t>();
+  return range;
+}
+
+tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request) {
+  if (request.size() < 4) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  ByteReader in(request.subspan(1));
+  const auto action = in.get<std::uint8_t>();
+  if (action < code(RoutineAction::start) || action > code(RoutineAction::result)) {
+    return tl::unexpected(Nrc::sub_function_not_supported);
+  }
+  return RoutineCall{static_cast<RoutineAction>(action), in.get<std::uint16_t>(), request.subspan(4)};
+}
+
+std::array<std::uint8_t, 3> negative_response(std::uint8_t service, Nrc nrc) {
+  return {service::negative_response, service, code(nrc)};
+}
+
+Bytes session_response(Session session, const SessionTimings& timings) {
+  using std::chrono::duration_cast;
+  using std::chrono::milliseconds;
+  return message(positive(service::session_control), code(session),
+                 static_cast<std::uint16_t>(duration_cast<milliseconds>(timings.p2).count()),
+                 static_cast<std::uint16_t>(duration_cast<milliseconds>(timings.p2_star).count() / 10));
+}
+Bytes seed_response(ByteView seed) {
+  return with_tail(message(positive(service::security_access), security_seed_level), seed);
+}
+Bytes read_response(std::uint16_t did, ByteView record) {
+  return with_tail(message(positive(service::read_data), did), record);
+}
+Bytes write_response(std::uint16_t did) { return message(positive(service::write_data), did); }
+Bytes routine_response(const RoutineCall& call, ByteView status) {
+  return with_tail(message(positive(service::routine_control), code(call.action), call.routine), status);
+}
+Bytes upload_response(std::uint32_t max_block) {
+  return message(positive(service::request_upload), std::uint8_t{0x40}, max_block);
+}
+void transfer_response(std::uint8_t block, ByteView data, Bytes& out) {
+  out.assign({positive(service::transfer_data), block});
+  out.insert(out.end(), data.begin(), data.end());
+}
+Bytes transfer_exit_response(ByteView parameters) {
+  return with_tail(message(positive(service::transfer_exit)), parameters);
+}
+
+}  // namespace selfcal::uds
