@@ -57,8 +57,9 @@ class Bench:
         self.key_file = self.folder / "ins.key"
         self.key_file.touch(mode=0o600)
         self.key_file.write_text(secrets.token_hex(16) + "\n", encoding="ascii")
+        self.ins_keys = {"interface": interface, "key_file": str(self.key_file), "time_scale": speed} | (ins or {})
         self.write_sim_config(sim or {})
-        self.write_daemon_config(ins or {}, daemon or {})
+        self.write_daemon_config([self], daemon or {})
 
     # --- configuration ---------------------------------------------------------------------------------------
     def write_sim_config(self, sections):
@@ -69,10 +70,12 @@ class Bench:
                 text += toml_section(name, entries)
         (self.folder / "sim.toml").write_text(text, encoding="utf-8")
 
-    def write_daemon_config(self, ins, daemon):
+    def write_daemon_config(self, benches, daemon):
+        """The service of this bench serves the INS of all `benches`."""
         service = {"state_directory": str(self.folder / "state"), "bus": "system"} | daemon
-        unit = {"interface": self.interface, "key_file": str(self.key_file), "time_scale": self.speed} | ins
-        text = toml_section("daemon", service) + toml_section(f"ins.{self.name}", unit)
+        text = toml_section("daemon", service)
+        for one in benches:
+            text += toml_section(f"ins.{one.name}", one.ins_keys)
         (self.folder / "selfcald.toml").write_text(text, encoding="utf-8")
 
     # --- programs --------------------------------------------------------------------------------------------
