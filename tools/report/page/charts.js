@@ -32,12 +32,12 @@ function passAxis(report) {
   return axis;
 }
 
-// From the final value, wide enough for most of what was passed on the way; the wild start of a filter that knows
-// nothing would flatten all the rest.
-function convergenceRange(values, final, sigma) {
-  const away = values.filter((value) => value !== null).map((value) => Math.abs(value - final)).sort((a, b) => a - b);
-  const most = away.length > 0 ? away[Math.floor(0.9 * (away.length - 1))] : 0;
-  const half = Math.max(8 * sigma, 1.3 * most, 1e-12);
+// Wide enough for the 3 sigma band over the later part of each pass. Every pass starts from ignorance, where the band
+// is thousands of times wider: shown whole, the end would be a flat line.
+function convergenceRange(sigmas, final, sigma) {
+  const sorted = sigmas.filter((value) => value !== null).sort((a, b) => a - b);
+  const later = sorted.length > 0 ? sorted[Math.floor(0.3 * (sorted.length - 1))] : 0;
+  const half = Math.max(8 * sigma, 4 * later, 1e-12);
   return [final - half, final + half];
 }
 
@@ -49,14 +49,18 @@ function showConvergence(report) {
         (pass, row) => (pass === null ? null : report.passes[pass][key][axis.epochOf[row]][index]));
     const values = pick('epoch_values');
     const sigmas = pick('epoch_sigmas');
+    const range = convergenceRange(sigmas, parameter.value, parameter.sigma);
+    // Drawn once the band has come near the picture: before that the estimate is noise a thousand times its height.
+    const near = (list) => list.map((value, row) => (sigmas[row] !== null && 3 * sigmas[row] < range[1] - range[0] ? value : null));
     const at = (sign) => values.map((value, row) => (value === null ? null : value + sign * 3 * sigmas[row]));
     addPlot(place, {
       id: 'convergence-' + parameter.name,
       title: parameter.name,
       x: {label: 'time worked through', unit: 'min', values: axis.minutes},
-      y: {label: 'estimate', unit: parameter.unit, range: convergenceRange(values, parameter.value, parameter.sigma)},
-      series: [{label: 'estimate', colour: 'x', values}, {label: '+3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(1)},
-               {label: '−3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(-1)}],
+      y: {label: 'estimate', unit: parameter.unit, range},
+      series: [{label: 'estimate', colour: 'x', values, shown: near(values)},
+               {label: '+3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(1), shown: near(at(1))},
+               {label: '−3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(-1), shown: near(at(-1))}],
       band: [2, 3],
       marks: axis.marks,
     });

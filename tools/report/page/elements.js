@@ -45,6 +45,11 @@ function significant(value, digits = 4) {
   return value.toFixed(Math.min(decimals, 12));
 }
 
+// As toFixed, without a minus before zero.
+function fixed(value, decimals) {
+  return value.toFixed(decimals).replace(/^-(0(?:\.0*)?)$/, '$1');
+}
+
 // Decimals that show two significant digits of sigma: value and sigma are then cut at the same place.
 function decimalsFor(sigma) {
   if (!(sigma > 0)) {

@@ -1,7 +1,7 @@
 // One plot: a figure with title, legend, uPlot canvas, read-out, saving, and its numbers as a table.
 //
 // spec: {id, title, height, x: {label, unit, values, log}, y: {label, unit, log, range: [low, high]},
-//        series: [{label, colour, values, dash, points, thin}], band: [upper, lower] (series numbers),
+//        series: [{label, colour, values, shown, dash, points, thin}] (shown: what is drawn, where not all values), band: [upper, lower] (series numbers),
 //        marks: [x, ...] (dotted vertical lines), level: y (dotted horizontal line)}
 'use strict';
 
@@ -24,8 +24,7 @@ function axisOptions(spec, which, ticks) {
     grid: {stroke: cssColour('rule'), width: 1},
     ticks: {stroke: cssColour('rule'), width: 1},
     values: (plot, splits) => {
-      const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-      const decimals = Math.min(9, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+      const decimals = decimalsOfStep(splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1);
       const labels = splits.map((at) => {
         if (at === null) return '';
         return axis.log ? logLabel(at) : at.toFixed(decimals);
@@ -34,6 +33,17 @@ function axisOptions(spec, which, ticks) {
       return labels;
     },
   };
+}
+
+// The fewest decimals that write every multiple of the step exactly (2.5 takes one).
+function decimalsOfStep(step) {
+  for (let decimals = 0; decimals < 9; ++decimals) {
+    const scaled = step * 10 ** decimals;
+    if (Math.abs(scaled - Math.round(scaled)) < 1e-6 * scaled) {
+      return decimals;
+    }
+  }
+  return 9;
 }
 
 // Powers of ten only: uPlot offers all nine of a decade.
@@ -171,10 +181,13 @@ function addPlot(parent, spec) {
     if (state.plot) {
       state.plot.destroy();
     }
-    const data = [spec.x.values, ...spec.series.map((series) => series.values)];
+    const data = [spec.x.values, ...spec.series.map((series) => series.shown || series.values)];
     state.plot = new uPlot(plotOptions(spec, Math.max(240, host.clientWidth), state.ticks, readout), data, host);
   };
   state.draw();
+  if (livePlots.length === 0) {
+    performance.mark('first-plot');
+  }
   addKeys(host, state);
   livePlots.push(state);
 }

@@ -71,7 +71,7 @@ function svgSeries(spec, series, place) {
   const group = svgElement('g');
   let path = '';
   spec.x.values.forEach((x, row) => {
-    const y = series.values[row];
+    const y = (series.shown || series.values)[row];
     if (y === null || y === undefined) {
       path += path.endsWith(' ') || path === '' ? '' : ' ';
       return;

@@ -4,7 +4,7 @@
 function showVerdict(report) {
   const verdict = document.getElementById('verdict');
   const lead = report.acceptable ? 'Accepted: all 24 parameters are determined and consistent with the recording. '
-                                 : 'Not accepted: see the reasons below the table. ';
+                                 : `Not accepted: ${report.objections.join('; ')}. `;
   verdict.textContent = (report.acceptable ? '✔ ' : '✘ ') + lead + report.consistency.words;
   verdict.className = report.acceptable ? 'yes' : 'no';
 }
@@ -16,7 +16,7 @@ function showFacts(report) {
     ['Recorded', report.start_time_utc || '–'],
     ['Duration', `${significant(report.duration_s / 60, 4)} min, ${report.samples} samples at ${report.sample_rate_hz} Hz`],
     ['Site', `${significant(report.site.latitude_deg, 6)}°, ${significant(report.site.longitude_deg, 6)}°, ${significant(report.site.height_m, 3)} m`],
-    ['Attitude at the start', `roll ${attitude.roll.toFixed(3)}°, pitch ${attitude.pitch.toFixed(3)}°, heading ${attitude.heading.toFixed(3)}°`],
+    ['Attitude at the start', `roll ${fixed(attitude.roll, 3)}°, pitch ${fixed(attitude.pitch, 3)}°, heading ${fixed(attitude.heading, 3)}°`],
     ['Base', report.noise.base],
     ['Computed in', `${significant(report.elapsed_s, 3)} s, ${report.passes.length} passes`],
   ];
