@@ -1,0 +1,87 @@
+#include "sim_ins/base_motion.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::sim {
+namespace {
+
+struct Derivatives {  // value, first, second derivative in time
+  double value = 0.0;
+  double first = 0.0;
+  double second = 0.0;
+};
+
+void add(Derivatives& sum, const std::vector<Sine>& sines, double t) {
+  for (const Sine& sine : sines) {
+    const double w = 2.0 * std::numbers::pi / sine.period_s;
+    const double argument = w * t + sine.phase;
+    const double s = sine.amplitude * std::sin(argument);
+    sum.value += s;
+    sum.first += sine.amplitude * w * std::cos(argument);
+    sum.second -= w * w * s;
+  }
+}
+
+void add(Derivatives& sum, const std::vector<Settling>& settlings, double t) {
+  for (const Settling& settling : settlings) {
+    const double value = settling.amplitude * std::exp(-t / settling.tau_s);
+    sum.value += value;
+    sum.first -= value / settling.tau_s;
+    sum.second += value / (settling.tau_s * settling.tau_s);
+  }
+}
+
+}  // namespace
+
+bool BaseMotion::still() const {
+  return roll.empty() && pitch.empty() && yaw.empty() && surge.empty() && heave.empty() && sway.empty() &&
+         settling_roll.empty() && settling_pitch.empty() && settling_heave.empty();
+}
+
+BaseMotion moored_base_motion() {
+  BaseMotion motion;
+  motion.roll = {{0.5 * units::degree, 8.0, 0.0}};
+  motion.pitch = {{0.3 * units::degree, 6.0, 1.0}};
+  motion.yaw = {{0.2 * units::degree, 11.0, 2.0}, {0.05 * units::degree, 130.0, 0.5}};
+  motion.heave = {{0.05, 9.0, 0.3}};
+  motion.surge = {{0.08, 13.0, 1.3}};
+  motion.sway = {{0.06, 10.0, 2.3}};
+  return motion;
+}
+
+BaseState base_state(const BaseMotion& motion, const Attitude& mean, double t) {
+  BaseState state;
+  state.attitude = mean;
+  state.p_n = state.v_n = state.a_n = Vector3::Zero();
+  if (motion.still()) {
+    return state;
+  }
+  Derivatives roll, pitch, yaw, surge, heave, sway;
+  add(roll, motion.roll, t);
+  add(roll, motion.settling_roll, t);
+  add(pitch, motion.pitch, t);
+  add(pitch, motion.settling_pitch, t);
+  add(yaw, motion.yaw, t);
+  add(surge, motion.surge, t);
+  add(heave, motion.heave, t);
+  add(heave, motion.settling_heave, t);
+  add(sway, motion.sway, t);
+  state.attitude.roll += roll.value;
+  state.attitude.pitch += pitch.value;
+  state.attitude.heading += yaw.value;
+  state.attitude_rate = {roll.first, pitch.first, yaw.first};
+  const double c = std::cos(mean.heading);
+  const double s = std::sin(mean.heading);
+  const auto along_n = [&](double forward, double up, double right) {
+    return Vector3(c * forward - s * right, up, s * forward + c * right);
+  };
+  state.p_n = along_n(surge.value, heave.value, sway.value);
+  state.v_n = along_n(surge.first, heave.first, sway.first);
+  state.a_n = along_n(surge.second, heave.second, sway.second);
+  return state;
+}
+
+}  // namespace selfcal::sim

@@ -1,0 +1,187 @@
+#include "sim_ins/device/stores.hpp"
+
+#include <algorithm>
+
+#include "protocol/byte_order.hpp"
+#include "protocol/flash/crc32c.hpp"
+
+namespace selfcal::sim {
+namespace {
+
+constexpr std::size_t mark_offset = flash_block_bytes - 4;
+constexpr std::uint32_t mark_key = 0x600DC0DE;      // mark = CRC of the record xor this
+constexpr std::size_t counter_block = 3;
+constexpr std::size_t counter_bytes = 16;
+constexpr std::size_t run_block = 5;
+constexpr std::size_t run_bytes = 12;
+
+std::size_t block_of(ins::Slot slot) { return static_cast<std::size_t>(slot); }
+
+std::uint32_t word_at(const FlashMemory& flash, std::size_t offset) {
+  return ByteReader(flash.read(offset, 4)).get<std::uint32_t>();
+}
+
+std::span<const std::uint8_t, ins::coefficients_bytes> record_of(const FlashMemory& flash, ins::Slot slot) {
+  return flash.read(block_of(slot) * flash_block_bytes, ins::coefficients_bytes).first<ins::coefficients_bytes>();
+}
+
+void program_word(FlashMemory& flash, std::size_t offset, std::uint32_t word) {
+  std::array<std::uint8_t, 4> bytes{};
+  ByteWriter(bytes).put(word);
+  flash.program(offset, bytes);
+}
+
+}  // namespace
+
+std::optional<ins::Coefficients> CoefficientStore::read(ins::Slot slot) const {
+  auto set = ins::decode_coefficients(record_of(flash_, slot));
+  return set ? std::optional(std::move(*set)) : std::nullopt;
+}
+
+bool CoefficientStore::committed(ins::Slot slot) const {
+  return read(slot).has_value() && word_at(flash_, block_of(slot) * flash_block_bytes + mark_offset) ==
+                                       (ins::stored_crc(record_of(flash_, slot)) ^ mark_key);
+}
+
+void CoefficientStore::write_factory_if_blank(const ins::Coefficients& set) {
+  if (!read(ins::Slot::factory)) {
+    flash_.erase(block_of(ins::Slot::factory));
+    flash_.program(block_of(ins::Slot::factory) * flash_block_bytes, ins::encode(set));
+  }
+}
+
+void CoefficientStore::power_on() {
+  slot_ = ins::Slot::factory;
+  in_force_ = factory().value_or(ins::Coefficients{});
+  bool written = false;
+  bool valid = false;
+  for (const ins::Slot slot : {ins::Slot::a, ins::Slot::b}) {
+    written = written || word_at(flash_, block_of(slot) * flash_block_bytes + mark_offset) != 0xFFFFFFFFU;
+    if (!committed(slot)) {
+      continue;
+    }
+    const ins::Coefficients set = *read(slot);
+    if (!valid || set.version > in_force_.version) {
+      slot_ = slot;
+      in_force_ = set;
+    }
+    valid = true;
+  }
+  fell_back_ = written && !valid;
+}
+
+std::uint32_t CoefficientStore::in_force_crc() const { return ins::stored_crc(ins::encode(in_force_)); }
+
+void CoefficientStore::erase_inactive() { flash_.erase(block_of(inactive_slot())); }
+
+bool CoefficientStore::inactive_blank() const {
+  const auto bytes = flash_.read(block_of(inactive_slot()) * flash_block_bytes, flash_block_bytes);
+  return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t b) { return b == 0xFF; });
+}
+
+bool CoefficientStore::write_inactive(const ins::Coefficients& set) {
+  if (!inactive_blank()) {
+    return false;
+  }
+  flash_.program(block_of(inactive_slot()) * flash_block_bytes, ins::encode(set));
+  return true;
+}
+
+bool CoefficientStore::commit_inactive(std::uint32_t crc) {
+  if (!inactive() || ins::stored_crc(record_of(flash_, inactive_slot())) != crc) {
+    return false;
+  }
+  program_word(flash_, block_of(inactive_slot()) * flash_block_bytes + mark_offset, crc ^ mark_key);
+  return true;
+}
+
+void CounterStore::power_on() {
+  counters_ = {};
+  for (std::size_t copy = 0; copy < 2; ++copy) {
+    const auto bytes = flash_.read((counter_block + copy) * flash_block_bytes, counter_bytes);
+    ByteReader reader(bytes);
+    Counters c;
+    c.generation = reader.get<std::uint32_t>();
+    c.power_cycles = reader.get<std::uint32_t>();
+    c.wrong_keys = reader.get<std::uint32_t>();
+    if (reader.get<std::uint32_t>() == flash::crc32c(bytes.first(12)) && c.generation > counters_.generation) {
+      counters_ = c;
+    }
+  }
+}
+
+void CounterStore::set(std::uint32_t power_cycles, std::uint32_t wrong_keys) {
+  counters_ = {counters_.generation + 1, power_cycles, wrong_keys};
+  std::array<std::uint8_t, counter_bytes> bytes{};
+  ByteWriter writer(bytes);
+  writer.put(counters_.generation);
+  writer.put(counters_.power_cycles);
+  writer.put(counters_.wrong_keys);
+  writer.put(flash::crc32c(std::span(bytes).first(12)));
+  const std::size_t block = counter_block + counters_.generation % 2;
+  flash_.erase(block);
+  flash_.program(block * flash_block_bytes, bytes);
+}
+
+void RawStore::power_on() {
+  run_id_ = expected_ = written_ = 0;
+  samples_ = 0;
+  complete_ = true;
+  const auto bytes = flash_.read(run_block * flash_block_bytes, run_bytes);
+  ByteReader reader(bytes);
+  const auto run = reader.get<std::uint32_t>();
+  const auto expected = reader.get<std::uint32_t>();
+  if (reader.get<std::uint32_t>() != flash::crc32c(bytes.first(8))) {
+    return;
+  }
+  run_id_ = run;
+  expected_ = expected;
+  flash::Page page;
+  // Up to the first page that is not of this run, or not whole: the power went while it was written.
+  while (written_ < expected_ && flash::decode_page(this->page(written_), page) && page.run_id == run_id_ &&
+         page.sequence == written_) {
+    samples_ += page.samples.size();
+    ++written_;
+  }
+}
+
+void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
+  std::array<std::uint8_t, run_bytes> bytes{};
+  ByteWriter writer(bytes);
+  writer.put(run_id);
+  writer.put(pages_expected);
+  writer.put(flash::crc32c(std::span(bytes).first(8)));
+  flash_.erase(run_block);
+  flash_.program(run_block * flash_block_bytes, bytes);
+  run_id_ = run_id;
+  expected_ = pages_expected;
+  written_ = 0;
+  samples_ = 0;
+  complete_ = false;
+}
+
+void RawStore::append(const flash::Page& page) {
+  const std::size_t block = raw_ring_first_block + written_ % raw_ring_pages;
+  flash::PageBytes bytes;
+  flash::encode_page(page, bytes);
+  flash_.erase(block);
+  flash_.program(block * flash_block_bytes, bytes);
+  samples_ += page.samples.size();
+  ++written_;
+}
+
+std::uint32_t RawStore::first_page() const {
+  return written_ > raw_ring_pages ? written_ - static_cast<std::uint32_t>(raw_ring_pages) : 0;
+}
+
+ins::DirectoryRecord RawStore::directory() const {
+  return {run_id_, first_page(), written_, expected_, samples_, complete_};
+}
+
+std::span<const std::uint8_t> RawStore::page(std::uint32_t index) const {
+  return flash_.read((raw_ring_first_block + index % raw_ring_pages) * flash_block_bytes, flash_block_bytes);
+}
+
+void RawStore::spoil(std::uint32_t index) { spoilt_ = index; }
+
+}  // namespace selfcal::sim
