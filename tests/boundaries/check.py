@@ -9,6 +9,9 @@ import re
 import sys
 from pathlib import Path
 
+# What every codec may know: how errors are told, how bytes are ordered, what a frame and a deadline are.
+BYTES = ["protocol/error.hpp", "protocol/byte_order.hpp", "protocol/time.hpp", "protocol/can/frame.hpp"]
+
 # A module is the longest of these prefixes that a path begins with. What it may include, besides itself:
 MAY_INCLUDE = {
     "estimator/geometry": [],
@@ -17,10 +20,11 @@ MAY_INCLUDE = {
     "estimator/navigation": ["estimator/geometry", "estimator/models", "estimator/filter"],
     "estimator/passes": ["estimator/geometry", "estimator/models", "estimator/filter", "estimator/navigation"],
     "estimator": ["estimator"],  # planning, diagnosis: on top of all the others
-    "protocol": ["estimator/geometry"],
-    "protocol/isotp": ["protocol/error.hpp"],
-    "protocol/uds": ["protocol/error.hpp", "protocol/isotp"],
-    "protocol/flash": ["protocol/error.hpp"],
+    "protocol": ["protocol", "estimator/geometry"],
+    "protocol/flash": [*BYTES],
+    "protocol/ins_interface": [*BYTES, "protocol/flash"],
+    "protocol/isotp": [*BYTES],
+    "protocol/uds": [*BYTES, "protocol/isotp", "protocol/ins_interface"],
     # A fault of the estimator must not be repeated in the truth that it is measured against.
     "sim_ins": ["protocol", "estimator/geometry"],
     "daemon": ["protocol", "estimator"],
@@ -30,11 +34,14 @@ MAY_INCLUDE = {
 
 # The estimator is a function of its arguments: no input or output, clock, thread or log.
 IMPURE = re.compile(
-    r"^(iostream|fstream|ostream|istream|cstdio|stdio\.h|print|filesystem|chrono|ctime|time\.h|thread|mutex|"
+    r"^(iostream|fstream|ostream|istream|stdio\.h|print|filesystem|chrono|ctime|time\.h|thread|mutex|"
     r"shared_mutex|condition_variable|future|semaphore|latch|barrier|syncstream|unistd\.h|syslog\.h|sys/.*|systemd/.*|"
     r"hdf5.*|sqlite3\.h|sdbus-c\+\+/.*|lcm/.*|toml\+\+/.*|CLI/.*|linux/.*|net/.*)$")
-# Codecs are bytes in, bytes out: the standard library, tl::expected for errors and fmt for their words.
-CODEC_THIRD_PARTY = re.compile(r"^(tl/expected\.hpp|fmt/.*)$")
+# <cstdio> has snprintf, which is a function of its arguments, and these, which are not.
+OUTPUT = re.compile(r"\b(printf|fprintf|puts|putchar|fopen|fwrite|fread|fmt::print|std::cout|std::cerr)\b")
+# Codecs are bytes in, bytes out: the standard library, tl::expected for errors, fmt for their words, and AES-CMAC.
+CODECS = ("protocol/isotp", "protocol/uds", "protocol/flash", "protocol/ins_interface")
+CODEC_THIRD_PARTY = re.compile(r"^(tl/expected\.hpp|fmt/.*|openssl/.*)$")
 STANDARD = re.compile(r"^[a-z_0-9]+$")
 
 # Paths generated at build time; written <like/this>, so never mistaken for files of ours.
@@ -59,17 +66,19 @@ def allowed(source, target):
 
 
 def is_codec(path):
-    return module_of(path) in ("protocol/isotp", "protocol/uds", "protocol/flash")
+    return module_of(path) in CODECS
 
 
 def include_complaints(root, path):
     source = path.relative_to(root).as_posix()
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        where = f"{source}:{number}"
         match = INCLUDE.match(line)
         if not match:
+            if source.startswith("estimator/") and OUTPUT.search(line.partition("//")[0]):
+                yield f"{where}: the estimator prints nothing and opens no file"
             continue
         quoted, name = match[1] == '"', match[2]
-        where = f"{source}:{number}"
         if quoted:
             if not (root / name).is_file():
                 yield f'{where}: "{name}" is no path from the repository root'
