@@ -104,6 +104,7 @@ const std::vector<Key<InsConfig>>& ins_keys() {
       text("interface", &InsConfig::interface),
       can_id("request_id", &InsConfig::request_id),
       can_id("response_id", &InsConfig::response_id),
+      can_id("functional_id", &InsConfig::functional_id),
       can_id("status_id", &InsConfig::status_id),
       flag("extended_ids", &InsConfig::extended_ids),
       flag("fd", &InsConfig::fd),
@@ -169,6 +170,7 @@ void check_instruments(const toml::table& sections, Config& config, Reader& read
     }
     const std::uint32_t highest = ins.extended_ids ? 0x1FFFFFFFu : 0x7FFu;
     for (const auto& [key, id] : {std::pair{"request_id", ins.request_id}, std::pair{"response_id", ins.response_id},
+                                  std::pair{"functional_id", ins.functional_id},
                                   std::pair{"status_id", ins.status_id}}) {
       if (id > highest) reader.complain(line, section + "." + key, fmt::format("{:#x} needs extended_ids = true", id));
     }

@@ -18,7 +18,8 @@ struct InsConfig {
   std::string interface;            // CAN network interface
   std::uint32_t request_id = 0x640;
   std::uint32_t response_id = 0x648;
-  std::uint32_t status_id = 0x650;
+  std::uint32_t functional_id = 0x7DF;
+  std::uint32_t status_id = 0x650;  // of the state frame; the gimbal frame has the next one
   bool extended_ids = false;        // 29-bit identifiers
   bool fd = false;                  // CAN FD frames with bit rate switch
   std::string key_file;             // SecurityAccess key, 16 bytes as 32 hex digits; empty: credential "NAME.key", then "ins.key"

@@ -16,6 +16,7 @@ using S = State;
 constexpr auto table = std::to_array<Transition>({
     {S::connecting, E::begin, G::always, A::identify, S::connecting},
     {S::connecting, E::identified, G::always, A::unlock, S::unlocking},
+    {S::unlocking, E::unlocked, G::rollback, A::erase_inactive_slot, S::erasing},
     {S::unlocking, E::unlocked, G::always, A::write_schedule, S::scheduling},
     {S::scheduling, E::schedule_accepted, G::always, A::start_rotation, S::starting},
     {S::starting, E::rotation_started, G::always, A::follow_rotation, S::rotating},
@@ -163,8 +164,9 @@ constexpr std::array event_names{"begin",         "identified",     "unlocked", 
                                  "set_verified",  "set_committed",  "ins_restarted",  "set_confirmed",
                                  "gimbal_stopped", "link_lost",     "recovered",      "link_gone",
                                  "step_failed",   "abort_requested"};
-constexpr std::array guard_names{"always",  "gimbal_turning",     "rotation_complete", "gate_refused",
-                                 "dry_run", "drift_check_wanted", "new_set_in_force",  "abort_pending"};
+constexpr std::array guard_names{"always",       "rollback", "gimbal_turning",     "rotation_complete",
+                                 "gate_refused", "dry_run",  "drift_check_wanted", "new_set_in_force",
+                                 "abort_pending"};
 constexpr std::array action_names{
     "none",       "identify",          "unlock",        "write_schedule",      "start_rotation", "follow_rotation",
     "pull_last_pages", "estimate",     "judge",         "measure_drift_old",   "erase_inactive_slot", "write_set",

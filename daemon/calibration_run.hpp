@@ -1,0 +1,156 @@
+// One run of one INS: the engine that walks transition_table.hpp. It stores each state before the state's action,
+// and it is the only writer of its row.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/config.hpp"
+#include "daemon/estimate_worker.hpp"
+#include "daemon/ins_client.hpp"
+#include "daemon/page_file.hpp"
+#include "daemon/run_store.hpp"
+#include "daemon/task.hpp"
+#include "daemon/timers.hpp"
+#include "daemon/transition_table.hpp"
+#include "estimator/geometry/schedule.hpp"
+
+namespace selfcal {
+
+// What an onlooker may know about a run, at any time.
+struct RunProgress {
+  RunId run = 0;
+  State state = State::connecting;
+  ins::Status ins;                     // as last reported
+  int positions = 0;
+  std::uint32_t pages_pulled = 0;
+  std::uint32_t pages_expected = 0;
+  std::uint32_t pages_refetched = 0;   // for a wrong CRC
+  int pass = 0;
+  double pass_fraction = 0.0;
+  bool estimate_known = false;
+  std::array<double, sensor_parameter_count> value{}, sigma{};   // in the unit of sensor_parameters
+  bool link_up = true;
+  std::uint64_t lost_frames = 0;
+};
+
+class RunObserver {
+ public:
+  virtual ~RunObserver() = default;
+  virtual void on_state(const RunRecord& run) = 0;
+  virtual void on_progress(const RunRecord& run) = 0;
+  virtual void on_warning(const RunRecord& run, const std::string& text) = 0;
+  virtual void on_finished(const RunRecord& run) = 0;   // the run may be destroyed later, from the loop
+};
+
+// All that a run needs; outlives it.
+struct RunContext {
+  Timers& timers;
+  RunStore& store;
+  InsPort& port;
+  Estimators& estimators;
+  RunObserver& observer;
+};
+
+class CalibrationRun {
+ public:
+  // A new run (record.state connecting) or one found unfinished in the database. `folder` is its own.
+  CalibrationRun(RunContext context, InsConfig config, Schedule schedule, UnlockKey key, RunRecord record,
+                 std::filesystem::path folder);
+  ~CalibrationRun();
+  CalibrationRun(const CalibrationRun&) = delete;
+  CalibrationRun& operator=(const CalibrationRun&) = delete;
+
+  void begin();       // a new run
+  void resume();      // after a restart of the daemon
+  void abort(const std::string& reason);
+  const RunRecord& record() const { return record_; }
+  const RunProgress& progress() const { return progress_; }
+
+ private:
+  using Step = Answer<Event>;
+
+  void post(Event event);
+  void fire(Event event);
+  bool holds(Guard guard) const;
+  void perform(Action action);
+  Task<Step> step(Action action);
+  Task<Done> run_step(Action action);
+  void settle(const Step& step);
+  void conclude();
+  void remember(const std::string& kind, const std::string& text);
+  void fail_with(const std::string& reason, ErrorKind kind = ErrorKind::device);
+  void storage_failed(const Error& error, State from);
+  void report_progress(bool at_once = false);
+
+  void warn(const std::string& text);
+  void on_status(const ins::Status& status);
+  std::chrono::nanoseconds ins_time(double seconds) const;   // real time in which the INS's clock runs so long
+
+  // Steps, in the order of the table; each answers with the event that follows.
+  Task<Step> identify();
+  Task<Step> unlock();
+  Task<Step> write_schedule();
+  Task<Step> start_rotation();
+  Task<Step> follow_rotation();
+  Task<Step> pull_last_pages();
+  Task<Step> measure_drift(double RunRecord::*figure);
+  Task<Step> erase_inactive_slot();
+  Task<Step> write_set();
+  Task<Step> read_back();
+  Task<Step> commit();
+  Task<Step> reset_ins();
+  Task<Step> read_in_force();
+  Task<Step> stop_gimbal();
+  Task<Step> recover_link();
+
+  // Parts of steps.
+  Task<Answer<Done>> check_serial();
+  Task<Answer<Done>> take_stock();            // the INS's state and the set in force
+  Task<Answer<Done>> poll_state();
+  Task<Answer<Done>> open_pages();
+  Task<Answer<Done>> pull(std::uint32_t end);  // what is missing below `end`, once
+  Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
+  void note_bad_page(std::uint32_t page, const std::string& why);
+  void estimate();
+  void judge();
+  void on_estimate_progress(const CalibrationProgress& progress);
+  void on_estimate(Expected<Estimate> answer);
+  Expected<void> store_result();
+  Expected<void> make_new_set();
+  void warn_of_history(const RunStore::Parameters& parameters);
+  void finish_recording();
+
+  RunContext context_;
+  InsConfig config_;
+  Schedule schedule_;
+  UnlockKey key_;
+  RunRecord record_;
+  std::filesystem::path folder_;
+  InsClient client_;
+  RunProgress progress_;
+
+  Task<Done> task_;
+  Timers::Id event_timer_ = 0;
+  std::optional<Event> pending_;
+  std::optional<PageFile> pages_;
+  std::map<std::uint32_t, int> bad_pages_;    // page, how often it came wrong
+  std::optional<Error> storage_error_;
+  std::optional<Estimate> estimate_;
+  std::vector<std::string> objections_;
+  ins::StateRecord stock_;                    // the INS as it was found after recovery
+  Bytes in_force_;                            // coefficient records, as on the bus
+  Bytes new_set_;
+  SteadyTime lost_at_{};
+  SteadyTime status_at_{};
+  SteadyTime reported_at_{};
+  std::string link_trouble_;
+  int failure_status_ = static_cast<int>(ErrorKind::device);
+  int last_nrc_ = -1;
+  bool failed_ = false;
+  bool storage_lost_ = false;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,49 @@
+// How the calibration talks to one INS: a request and its answer, status frames, and nothing about sockets. The CAN
+// socket stands behind it in the daemon, a fake INS in tests.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "protocol/error.hpp"
+#include "protocol/ins_interface/status.hpp"
+
+namespace selfcal {
+
+// Why a request has no positive answer.
+struct PortError {
+  enum class Kind {
+    link,       // no answer, or the interface is down: worth trying again later
+    negative,   // the INS said no, with nrc
+    protocol,   // it answered something that makes no sense
+  };
+  Kind kind = Kind::link;
+  std::uint8_t nrc = 0;
+  std::string message;
+};
+
+template <typename T>
+using Answer = tl::expected<T, PortError>;
+
+using Bytes = std::vector<std::uint8_t>;
+
+class InsPort {
+ public:
+  virtual ~InsPort() = default;
+
+  // Sends a UDS request (service identifier first). The callback gets the positive response, or why there is none;
+  // it comes later, from the loop, never from inside this call. One request at a time.
+  virtual void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) = 0;
+  virtual void cancel() = 0;    // forget the request in progress
+  virtual void reopen() = 0;    // after the link was lost: a fresh socket and transport
+  virtual std::uint64_t lost_frames() const = 0;
+
+  // What the status frames told last, after each batch that held one.
+  std::function<void(const ins::Status&)> on_status;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,24 @@
+// One line for each event that matters, to systemd's journal with structured fields, or to standard error where
+// there is no journal. Never a key, never a seed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace selfcal::journal {
+
+enum class Level { error = 3, warning = 4, notice = 5, info = 6 };   // syslog's numbers
+
+// Fields SELFCAL_RUN, SELFCAL_INS, SELFCAL_SERIAL, SELFCAL_STATE, SELFCAL_NRC; empty or negative: left out.
+struct Fields {
+  std::int64_t run = 0;
+  std::string ins;
+  std::string serial;
+  std::string state;
+  int nrc = -1;
+};
+
+void write(Level level, std::string_view message, const Fields& fields = {});
+
+}  // namespace selfcal::journal

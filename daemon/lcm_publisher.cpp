@@ -1,0 +1,116 @@
+#include "daemon/lcm_publisher.hpp"
+
+#include <fmt/format.h>
+
+#include <lcm/lcm-cpp.hpp>
+#include <selfcal_lcm/alarm.hpp>
+#include <selfcal_lcm/estimate.hpp>
+#include <selfcal_lcm/ins_status.hpp>
+#include <selfcal_lcm/service_status.hpp>
+
+#include "daemon/journal.hpp"
+#include "daemon/wall_clock.hpp"
+
+namespace selfcal {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto retry_interval = 10s;
+constexpr std::int32_t schema = 1;
+constexpr std::string_view software_version = SELFCAL_VERSION;
+
+}  // namespace
+
+LcmPublisher::LcmPublisher(Timers& timers, std::string url)
+    : timers_(timers), url_(std::move(url)), started_(timers.now()) {}
+
+LcmPublisher::~LcmPublisher() = default;
+
+void LcmPublisher::open() {
+  tried_ = true;
+  tried_at_ = timers_.now();
+  lcm_ = std::make_unique<lcm::LCM>(url_);
+  if (lcm_->good()) return;
+  lcm_.reset();
+}
+
+template <typename Message>
+void LcmPublisher::publish(const std::string& channel, const Message& message) {
+  if (url_.empty()) return;
+  if (!lcm_ && (!tried_ || timers_.now() - tried_at_ >= retry_interval)) open();
+  const bool sent = lcm_ && lcm_->publish(channel, &message) == 0;
+  if (!sent) lcm_.reset();
+  if (sent == !down_said_) return;
+  down_said_ = !sent;
+  journal::write(journal::Level::warning, sent ? fmt::format("LCM: publishing on {} again", url_)
+                                               : fmt::format("LCM: nothing can be published on {} (no route?); "
+                                                             "calibration goes on without it", url_));
+}
+
+void LcmPublisher::publish_service(int instruments, int runs_in_progress) {
+  selfcal_lcm::service_status message;
+  message.schema = schema;
+  message.utime_us = utc_now_us();
+  message.software = software_version;
+  message.instruments = instruments;
+  message.runs_in_progress = runs_in_progress;
+  message.uptime_s = std::chrono::duration<double>(timers_.now() - started_).count();
+  publish("SELFCAL_SERVICE", message);
+}
+
+void LcmPublisher::publish_ins(const PublishedIns& ins) {
+  static const RunProgress nothing;
+  const RunProgress& progress = ins.progress == nullptr ? nothing : *ins.progress;
+  selfcal_lcm::ins_status message;
+  message.schema = schema;
+  message.utime_us = utc_now_us();
+  message.ins = ins.name;
+  message.serial = ins.serial;
+  message.state = ins.state_idle ? "idle" : std::string(name(progress.state));
+  message.run = progress.run;
+  message.link_up = progress.link_up;
+  message.outer_deg = progress.ins.outer_deg;
+  message.inner_deg = progress.ins.inner_deg;
+  message.position = progress.ins.position;
+  message.positions = progress.positions;
+  message.time_left_s = progress.ins.time_left_s;
+  message.pages_pulled = static_cast<std::int32_t>(progress.pages_pulled);
+  message.pages_written = static_cast<std::int32_t>(progress.ins.pages_written);
+  message.pages_expected = static_cast<std::int32_t>(progress.pages_expected);
+  message.lost_frames = static_cast<std::int64_t>(progress.lost_frames);
+  publish("SELFCAL_INS_" + ins.name, message);
+}
+
+void LcmPublisher::publish_estimate(const PublishedIns& ins) {
+  if (ins.progress == nullptr || !ins.progress->estimate_known) return;
+  const RunProgress& progress = *ins.progress;
+  selfcal_lcm::estimate message;
+  message.schema = schema;
+  message.utime_us = utc_now_us();
+  message.ins = ins.name;
+  message.run = progress.run;
+  message.pass_number = progress.pass;
+  message.pass_fraction = progress.pass_fraction;
+  message.count = sensor_parameter_count;
+  for (const SensorParameter& parameter : sensor_parameters) {
+    message.name.emplace_back(parameter.name);
+    message.unit.emplace_back(parameter.unit);
+  }
+  message.value.assign(progress.value.begin(), progress.value.end());
+  message.sigma.assign(progress.sigma.begin(), progress.sigma.end());
+  publish("SELFCAL_ESTIMATE_" + ins.name, message);
+}
+
+void LcmPublisher::publish_alarm(const std::string& ins, RunId run, bool standing, const std::string& text) {
+  selfcal_lcm::alarm message;
+  message.schema = schema;
+  message.utime_us = utc_now_us();
+  message.ins = ins;
+  message.run = run;
+  message.standing = standing;
+  message.text = text;
+  publish("SELFCAL_ALARM", message);
+}
+
+}  // namespace selfcal

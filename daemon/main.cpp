@@ -1,0 +1,81 @@
+// selfcald: the calibration service.
+#include <fmt/format.h>
+#include <signal.h>
+#include <systemd/sd-daemon.h>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/journal.hpp"
+#include "daemon/service.hpp"
+
+namespace {
+
+using namespace selfcal;
+
+int complain(const Error& error) {
+  fmt::print(stderr, "{}\n", error.message);
+  return static_cast<int>(error.kind);
+}
+
+int serve(const std::string& config_file) {
+  auto config = load_config(config_file);
+  if (!config) return complain(config.error());
+
+  // Signals come through the loop only; blocked before any thread exists, so that all inherit it.
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, signal);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+
+  EventLoop loop;
+  auto service = Service::create(loop, std::move(*config), config_file);
+  if (!service) return complain(service.error());
+
+  for (const int number : {SIGTERM, SIGINT}) {
+    loop.on_signal(number, [&] {
+      sd_notify(0, "STOPPING=1\nSTATUS=Stopping; runs in progress go on at the next start");
+      (*service)->prepare_to_stop();
+      loop.stop(0);
+    });
+  }
+  loop.on_signal(SIGHUP, [&] {
+    sd_notify(0, "RELOADING=1");
+    (*service)->reload();
+    sd_notify(0, "READY=1");
+  });
+  loop.enable_watchdog();
+  sd_notify(0, "READY=1\nSTATUS=Ready");
+  journal::write(journal::Level::notice, fmt::format("selfcald {} ready", SELFCAL_VERSION));
+  (*service)->resume_unfinished();
+  return loop.run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"selfcald: calibrates inertial navigation systems on their own gimbals"};
+  std::string config_file = "/etc/selfcal/selfcald.toml";
+  bool check_only = false;
+  app.add_option("-c,--config", config_file, "configuration file")->capture_default_str();
+  app.add_flag("--check-config", check_only, "check the configuration and end");
+  app.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int status = app.exit(error);
+    return status == 0 ? 0 : static_cast<int>(ErrorKind::usage);
+  }
+  if (check_only) {
+    const auto config = load_config(config_file);
+    if (!config) return complain(config.error());
+    fmt::print("{}: well-formed, {} INS\n", config_file, config->instruments.size());
+    return 0;
+  }
+  try {
+    return serve(config_file);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "selfcald: {}\n", error.what());
+    return static_cast<int>(ErrorKind::internal);
+  }
+}

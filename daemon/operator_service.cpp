@@ -1,0 +1,183 @@
+#include "daemon/operator_service.hpp"
+
+#include <fmt/format.h>
+#include <operator_api/ins1_adaptor.hpp>
+#include <operator_api/manager1_adaptor.hpp>
+#include <pwd.h>
+
+#include "protocol/operator_api/names.hpp"
+
+namespace selfcal {
+namespace {
+
+using Entries = std::map<std::string, sdbus::Variant>;
+
+template <typename T>
+T granted(Granted<T> answer) {
+  if (!answer) throw sdbus::Error(answer.error().name, answer.error().message);
+  return std::move(*answer);
+}
+
+std::string user_name(uid_t uid) {
+  passwd entry{};
+  passwd* found = nullptr;
+  char buffer[4096];
+  if (getpwuid_r(uid, &entry, buffer, sizeof buffer, &found) == 0 && found != nullptr) return found->pw_name;
+  return fmt::format("uid {}", uid);
+}
+
+Entries entries(const RunProgress& progress) {
+  Entries all{
+      {"position", std::int32_t{progress.ins.position}},
+      {"positions", std::int32_t{progress.positions}},
+      {"time_left_s", progress.ins.time_left_s},
+      {"outer_deg", progress.ins.outer_deg},
+      {"inner_deg", progress.ins.inner_deg},
+      {"pages_pulled", progress.pages_pulled},
+      {"pages_expected", progress.pages_expected},
+      {"pages_refetched", progress.pages_refetched},
+      {"pass", std::int32_t{progress.pass}},
+      {"pass_fraction", progress.pass_fraction},
+      {"link_up", progress.link_up},
+      {"lost_frames", std::uint64_t{progress.lost_frames}},
+      {"state", std::string(name(progress.state))},
+      {"words", std::string(words(progress.state))},
+  };
+  if (progress.estimate_known) {
+    all["value"] = std::vector<double>(progress.value.begin(), progress.value.end());
+    all["sigma"] = std::vector<double>(progress.sigma.begin(), progress.sigma.end());
+  }
+  return all;
+}
+
+// One option out of a request; `options` loses it, so that what is left is unknown.
+template <typename T>
+T take(Entries& options, const std::string& key, T otherwise) {
+  const auto found = options.find(key);
+  if (found == options.end()) return otherwise;
+  T value = found->second.get<T>();
+  options.erase(found);
+  return value;
+}
+
+}  // namespace
+
+class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::Manager1_adaptor> {
+ public:
+  Manager(sdbus::IConnection& connection, Operations& operations)
+      : AdaptorInterfaces(connection, operator_api::manager_path), operations_(operations) {
+    registerAdaptor();
+  }
+  ~Manager() { unregisterAdaptor(); }
+
+ private:
+  std::string caller() const {
+    const sdbus::Message* message = getObject().getCurrentlyProcessedMessage();
+    return message == nullptr ? "?" : user_name(message->getCredsUid());
+  }
+
+  std::uint64_t Start(const std::string& ins, const Entries& given) override {
+    Entries options = given;
+    StartRequest request;
+    request.ins = ins;
+    request.schedule = take<std::string>(options, "schedule", "");
+    request.dry_run = take(options, "dry_run", false);
+    request.force_reason = take<std::string>(options, "force", "");
+    if (!options.empty()) {
+      throw sdbus::Error(operator_api::error_unknown, fmt::format("unknown option {}", options.begin()->first));
+    }
+    request.user = caller();
+    return static_cast<std::uint64_t>(granted(operations_.start(request)));
+  }
+  void Abort(const std::string& ins, const std::string& reason) override {
+    granted(operations_.abort(ins, fmt::format("aborted by {}{}{}", caller(), reason.empty() ? "" : ": ", reason)));
+  }
+  std::uint64_t Rollback(const std::string& serial, const std::string& reason) override {
+    return static_cast<std::uint64_t>(granted(operations_.rollback(serial, reason, caller())));
+  }
+  std::string Show(const std::uint64_t& run) override {
+    return granted(operations_.show(static_cast<RunId>(run)));
+  }
+  std::string History(const std::string& serial) override { return granted(operations_.history(serial)); }
+  std::string CheckDatabase() override { return granted(operations_.check_database()); }
+  std::string BackupDatabase(const std::string& file) override { return granted(operations_.backup_database(file)); }
+  std::string Version() override { return SELFCAL_VERSION; }
+  std::vector<std::string> Instruments() override { return operations_.instruments(); }
+
+  Operations& operations_;
+};
+
+class OperatorService::Ins : public sdbus::AdaptorInterfaces<org::selfcal::Ins1_adaptor> {
+ public:
+  Ins(sdbus::IConnection& connection, Operations& operations, std::string ins)
+      : AdaptorInterfaces(connection, operator_api::ins_path(ins)), operations_(operations), ins_(std::move(ins)) {
+    registerAdaptor();
+  }
+  ~Ins() { unregisterAdaptor(); }
+
+ private:
+  const RunRecord* record() const { return operations_.record(ins_); }
+
+  std::string Serial() override { return record() == nullptr ? "" : record()->serial; }
+  std::string State() override {
+    return record() == nullptr || is_final(record()->state) ? "idle" : std::string(name(record()->state));
+  }
+  std::uint64_t Run() override { return record() == nullptr ? 0 : static_cast<std::uint64_t>(record()->id); }
+  std::string User() override { return record() == nullptr ? "" : record()->user; }
+  std::string Since() override { return record() == nullptr ? "" : record()->started_utc; }
+  Entries Progress() override {
+    const RunProgress* progress = operations_.progress(ins_);
+    return progress == nullptr ? Entries{} : entries(*progress);
+  }
+
+  Operations& operations_;
+  std::string ins_;
+};
+
+OperatorService::OperatorService(sdbus::IConnection& connection, Operations& operations)
+    : connection_(connection), operations_(operations), manager_(std::make_unique<Manager>(connection, operations)) {
+  update_instruments();
+  connection_.requestName(operator_api::bus_name);
+}
+
+OperatorService::~OperatorService() = default;
+
+void OperatorService::update_instruments() {
+  const auto names = operations_.instruments();
+  std::erase_if(instruments_, [&](const auto& entry) {
+    return std::find(names.begin(), names.end(), entry.first) == names.end();
+  });
+  for (const std::string& ins : names) {
+    if (!instruments_.contains(ins)) instruments_[ins] = std::make_unique<Ins>(connection_, operations_, ins);
+  }
+}
+
+OperatorService::Ins* OperatorService::find(const std::string& ins) {
+  const auto found = instruments_.find(ins);
+  return found == instruments_.end() ? nullptr : found->second.get();
+}
+
+void OperatorService::state_changed(const RunRecord& run) {
+  if (Ins* ins = find(run.ins)) {
+    ins->emitStateChanged(static_cast<std::uint64_t>(run.id), std::string(name(run.state)),
+                          std::string(words(run.state)));
+  }
+}
+
+void OperatorService::progress_changed(const RunRecord& run) {
+  const RunProgress* progress = operations_.progress(run.ins);
+  Ins* ins = find(run.ins);
+  if (ins != nullptr && progress != nullptr) {
+    ins->emitProgressChanged(static_cast<std::uint64_t>(run.id), entries(*progress));
+  }
+}
+
+void OperatorService::warning(const RunRecord& run, const std::string& text) {
+  if (Ins* ins = find(run.ins)) ins->emitWarning(static_cast<std::uint64_t>(run.id), text);
+}
+
+void OperatorService::finished(const RunRecord& run) {
+  if (Ins* ins = find(run.ins)) ins->emitFinished(static_cast<std::uint64_t>(run.id), run.exit_status, run.reason);
+}
+
+}  // namespace selfcal

@@ -1,0 +1,84 @@
+// The daemon: configuration, one session for each INS, the operator interface, the publisher, all on one loop.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/bus_connection.hpp"
+#include "daemon/calibration_run.hpp"
+#include "daemon/config.hpp"
+#include "daemon/estimate_worker.hpp"
+#include "daemon/event_loop.hpp"
+#include "daemon/lcm_publisher.hpp"
+#include "daemon/operator_service.hpp"
+#include "daemon/run_store.hpp"
+
+namespace selfcal {
+
+class Service : public Operations, public RunObserver {
+ public:
+  // `config_file` is read again on reload().
+  static Expected<std::unique_ptr<Service>> create(EventLoop& loop, Config config, std::string config_file);
+  ~Service() override;
+
+  void resume_unfinished();   // after a crash or restart
+  void reload();              // runs in progress keep what they began with
+  void prepare_to_stop();     // nothing is begun any more; runs in progress stay resumable
+
+ private:
+  // One configured INS. The port and the run exist from the first run on.
+  struct Session {
+    InsConfig config;
+    std::unique_ptr<InsPort> port;
+    std::unique_ptr<EstimateWorker> estimators;
+    std::unique_ptr<CalibrationRun> run;
+    bool active() const { return run && !is_final(run->record().state); }
+  };
+
+  Service(EventLoop& loop, Config config, std::string config_file, std::unique_ptr<RunStore> store);
+  Expected<void> connect_bus();
+  void bus_lost();
+  template <typename Call>
+  void tell_bus(Call call);
+  void publish();
+  void prune_recordings();
+  void notify_status();
+  Granted<RunId> launch(Session& session, RunRecord record, const std::string& schedule_name);
+  Expected<void> attach(Session& session, RunRecord record, const std::string& schedule_name);
+  Expected<void> room_for_a_run() const;
+  std::filesystem::path run_folder(RunId run) const;
+  Session* session(const std::string& ins);
+  const Session* session(const std::string& ins) const;
+
+  Granted<RunId> start(const StartRequest& request) override;
+  Granted<RunId> rollback(const std::string& serial, const std::string& reason, const std::string& user) override;
+  Granted<Done> abort(const std::string& ins, const std::string& reason) override;
+  Granted<std::string> show(RunId run) override;
+  Granted<std::string> history(const std::string& serial) override;
+  Granted<std::string> check_database() override;
+  Granted<std::string> backup_database(const std::string& name) override;
+  std::vector<std::string> instruments() const override;
+  const RunProgress* progress(const std::string& ins) const override;
+  const RunRecord* record(const std::string& ins) const override;
+
+  void on_state(const RunRecord& run) override;
+  void on_progress(const RunRecord& run) override;
+  void on_warning(const RunRecord& run, const std::string& text) override;
+  void on_finished(const RunRecord& run) override;
+
+  EventLoop& loop_;
+  Config config_;
+  std::string config_file_;
+  std::unique_ptr<RunStore> store_;
+  std::map<std::string, Session> sessions_;
+  LcmPublisher publisher_;
+  std::unique_ptr<sdbus::IConnection> connection_;
+  std::unique_ptr<OperatorService> operator_service_;
+  std::unique_ptr<BusPump> bus_;
+  unsigned publish_count_ = 0;
+  bool stopping_ = false;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,185 @@
+// What operators may ask of the service (operator_service.hpp).
+#include <fmt/format.h>
+
+#include "daemon/can_port.hpp"
+#include "daemon/run_documents.hpp"
+#include "daemon/service.hpp"
+#include "daemon/unlock_key.hpp"
+#include "daemon/wall_clock.hpp"
+#include "protocol/operator_api/names.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
+
+namespace selfcal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double mebibyte = 1048576.0;
+
+tl::unexpected<Refusal> refuse(const char* name, std::string message) {
+  return tl::unexpected<Refusal>(Refusal{name, std::move(message)});
+}
+
+tl::unexpected<Refusal> unavailable(const Error& error) {
+  return refuse(operator_api::error_unavailable, error.message);
+}
+
+}  // namespace
+
+Expected<void> Service::room_for_a_run() const {
+  std::error_code error;
+  const auto space = fs::space(config_.state_directory, error);
+  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", config_.state_directory, error.message()));
+  const double free_mib = static_cast<double>(space.available) / mebibyte;
+  if (free_mib >= config_.free_space_mib) return {};
+  return fail(ErrorKind::device, fmt::format("{}: {:.0f} MiB free, a run needs {:.0f} MiB (free_space_mib)",
+                                             config_.state_directory, free_mib, config_.free_space_mib));
+}
+
+Expected<void> Service::attach(Session& session, RunRecord record, const std::string& schedule_name) {
+  auto schedule = find_schedule(schedule_name, session.config.dwell_s, session.config.rotation_s);
+  if (!schedule) return tl::unexpected(schedule.error());
+  const auto key = load_unlock_key(session.config);
+  if (!key) return tl::unexpected(key.error());
+  std::error_code error;
+  fs::create_directories(run_folder(record.id), error);
+  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", run_folder(record.id).string(), error.message()));
+  session.run.reset();
+  session.port = std::make_unique<CanPort>(loop_, session.config);
+  if (!session.estimators) session.estimators = std::make_unique<EstimateWorker>(loop_);
+  const std::filesystem::path folder = run_folder(record.id);
+  session.run = std::make_unique<CalibrationRun>(
+      RunContext{loop_, *store_, *session.port, *session.estimators, *this}, session.config, std::move(*schedule),
+      *key, std::move(record), folder);
+  return {};
+}
+
+Granted<RunId> Service::launch(Session& session, RunRecord record, const std::string& schedule_name) {
+  if (session.active()) {
+    const RunRecord& other = session.run->record();
+    return refuse(operator_api::error_busy,
+                  fmt::format("busy, run {} by user {} since {}", other.id, other.user, other.started_utc));
+  }
+  if (stopping_) return refuse(operator_api::error_unavailable, "the daemon is stopping");
+  if (auto room = room_for_a_run(); !room) return unavailable(room.error());
+  // Checked before a run exists, so that a wrong name leaves no trace.
+  if (auto schedule = find_schedule(schedule_name, session.config.dwell_s, session.config.rotation_s); !schedule) {
+    return refuse(operator_api::error_unknown, schedule.error().message);
+  }
+  if (const auto key = load_unlock_key(session.config); !key) return unavailable(key.error());
+  record.ins = session.config.name;
+  record.schedule = schedule_name;
+  record.started_utc = utc_now();
+  record.software = SELFCAL_VERSION;
+  const auto id = store_->create_run(record);
+  if (!id) return unavailable(id.error());
+  record.id = *id;
+  if (auto attached = attach(session, record, schedule_name); !attached) return unavailable(attached.error());
+  session.run->begin();
+  notify_status();
+  return *id;
+}
+
+Granted<RunId> Service::start(const StartRequest& request) {
+  Session* chosen = session(request.ins);
+  if (request.ins.empty() && sessions_.size() == 1) chosen = &sessions_.begin()->second;
+  if (chosen == nullptr) {
+    return refuse(operator_api::error_unknown,
+                  fmt::format("no INS \"{}\"; configured: {}", request.ins, fmt::join(instruments(), ", ")));
+  }
+  RunRecord record;
+  record.user = request.user;
+  record.dry_run = request.dry_run;
+  record.force_reason = request.force_reason;
+  return launch(*chosen, record, request.schedule.empty() ? chosen->config.schedule : request.schedule);
+}
+
+Granted<RunId> Service::rollback(const std::string& serial, const std::string& reason, const std::string& user) {
+  if (reason.empty()) return refuse(operator_api::error_unknown, "a rollback needs a reason");
+  const auto runs = store_->runs_of_serial(serial);
+  if (!runs) return unavailable(runs.error());
+  const RunRecord* last = nullptr;
+  for (const RunRecord& run : *runs) {
+    if (!serial.empty() && run.state == State::completed && !run.dry_run) last = &run;
+  }
+  if (last == nullptr) {
+    return refuse(operator_api::error_nothing, fmt::format("no completed calibration of \"{}\" is known", serial));
+  }
+  Session* chosen = session(last->ins);
+  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", last->ins));
+  const auto previous = store_->set(last->id, SetRole::previous);
+  if (!previous) return unavailable(previous.error());
+  if (!*previous) return refuse(operator_api::error_nothing, fmt::format("run {} kept no former set", last->id));
+  RunRecord record;
+  record.user = user;
+  record.serial = serial;
+  record.rollback = true;
+  record.force_reason = reason;
+  const auto id = launch(*chosen, record, chosen->config.schedule);
+  if (!id) return id;
+  if (auto stored = store_->store_set(*id, SetRole::written, **previous); !stored) {
+    (void)abort(last->ins, stored.error().message);
+    return unavailable(stored.error());
+  }
+  return id;
+}
+
+Granted<Done> Service::abort(const std::string& ins, const std::string& reason) {
+  Session* chosen = session(ins);
+  if (ins.empty() && sessions_.size() == 1) chosen = &sessions_.begin()->second;
+  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("no INS \"{}\"", ins));
+  if (!chosen->active()) return refuse(operator_api::error_nothing, fmt::format("{}: no run in progress", chosen->config.name));
+  chosen->run->abort(reason);
+  return Done{};
+}
+
+Granted<std::string> Service::show(RunId id) {
+  const auto run = store_->run(id);
+  if (!run) return unavailable(run.error());
+  if (!*run) return refuse(operator_api::error_unknown, fmt::format("no run {}", id));
+  auto document = run_document(*store_, **run);
+  if (!document) return unavailable(document.error());
+  return std::move(*document);
+}
+
+Granted<std::string> Service::history(const std::string& serial) {
+  auto document = history_document(*store_, serial);
+  if (!document) return unavailable(document.error());
+  return std::move(*document);
+}
+
+Granted<std::string> Service::check_database() {
+  const auto ok = RunStore::check(fs::path(config_.state_directory) / "selfcal.db");
+  return ok ? std::string() : ok.error().message;
+}
+
+Granted<std::string> Service::backup_database(const std::string& file) {
+  if (file.empty() || file.front() == '.' || file.find('/') != std::string::npos) {
+    return refuse(operator_api::error_unknown, fmt::format("\"{}\": a plain file name is wanted", file));
+  }
+  const fs::path folder = fs::path(config_.state_directory) / "backups";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return refuse(operator_api::error_unavailable, fmt::format("{}: {}", folder.string(), error.message()));
+  const auto copied = RunStore::copy(fs::path(config_.state_directory) / "selfcal.db", folder / file);
+  if (!copied) return unavailable(copied.error());
+  return (folder / file).string();
+}
+
+std::vector<std::string> Service::instruments() const {
+  std::vector<std::string> names;
+  for (const auto& [name, unused] : sessions_) names.push_back(name);
+  return names;
+}
+
+const RunProgress* Service::progress(const std::string& ins) const {
+  const Session* chosen = session(ins);
+  return chosen == nullptr || !chosen->run ? nullptr : &chosen->run->progress();
+}
+
+const RunRecord* Service::record(const std::string& ins) const {
+  const Session* chosen = session(ins);
+  return chosen == nullptr || !chosen->run ? nullptr : &chosen->run->record();
+}
+
+}  // namespace selfcal

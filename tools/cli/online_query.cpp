@@ -1,0 +1,137 @@
+// selfcal status, abort, show, history, db: one question to the daemon, one answer.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "tools/cli/command.hpp"
+#include "tools/cli/online_client.hpp"
+#include "tools/cli/online_text.hpp"
+#include "tools/cli/terminal.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+struct Options {
+  std::string ins, reason, serial, name;
+  std::uint64_t run = 0;
+  bool json = false, csv = false;
+};
+
+using Body = Expected<int> (*)(ManagerClient&, const Options&);
+
+// Connects, then does it.
+CommandRun online(std::shared_ptr<Options> options, Body body) {
+  return [options, body]() -> Expected<int> {
+    auto manager = ManagerClient::connect();
+    if (!manager) return tl::unexpected(manager.error());
+    return body(**manager, *options);
+  };
+}
+
+Expected<int> status(ManagerClient& manager, const Options& options) {
+  const auto instruments = manager.instruments();
+  if (!instruments) return tl::unexpected(instruments.error());
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const std::string& ins : *instruments) {
+    if (!options.ins.empty() && options.ins != ins) continue;
+    const auto snapshot = InsWatch(manager.connection(), ins).snapshot();
+    if (!snapshot) return tl::unexpected(snapshot.error());
+    const Entries& progress = snapshot->progress;
+    all.push_back({{"ins", ins},
+                   {"serial", snapshot->serial},
+                   {"state", snapshot->state},
+                   {"run", snapshot->run},
+                   {"user", snapshot->user},
+                   {"since", snapshot->since},
+                   {"position", entry<std::int32_t>(progress, "position", 0)},
+                   {"positions", entry<std::int32_t>(progress, "positions", 0)},
+                   {"time_left_s", entry(progress, "time_left_s", 0.0)},
+                   {"pages_pulled", entry<std::uint32_t>(progress, "pages_pulled", 0)},
+                   {"pages_expected", entry<std::uint32_t>(progress, "pages_expected", 0)},
+                   {"pages_refetched", entry<std::uint32_t>(progress, "pages_refetched", 0)},
+                   {"lost_frames", entry<std::uint64_t>(progress, "lost_frames", 0)},
+                   {"pass", entry<std::int32_t>(progress, "pass", 0)},
+                   {"link_up", entry(progress, "link_up", true)}});
+  }
+  if (all.empty()) return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
+  if (options.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"instruments", all}}.dump());
+    return 0;
+  }
+  for (const auto& ins : all) {
+    fmt::print("{} {}: {}", ins["ins"].get<std::string>(), ins["serial"].get<std::string>(),
+               ins["state"].get<std::string>());
+    if (ins["state"] != "idle") {
+      fmt::print(", run {} by {} since {}, position {} of {}, pages {}/{}", ins["run"].get<std::uint64_t>(),
+                 ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
+                 ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());
+    }
+    fmt::print("\n");
+  }
+  return 0;
+}
+
+CommandRun configure_status(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("INS", options->ins, "one INS; all if left out");
+  app.add_flag("--json", options->json, "as JSON");
+  return online(options, status);
+}
+
+Expected<int> abort_run(ManagerClient& manager, const Options& options) {
+  const auto ins = choose_ins(manager, options.ins);
+  if (!ins) return tl::unexpected(ins.error());
+  if (auto asked = manager.abort(*ins, options.reason); !asked) return tl::unexpected(asked.error());
+  if (options.json) fmt::print("{}\n", nlohmann::json{{"ins", *ins}, {"stopping", true}}.dump());
+  return 0;
+}
+
+CommandRun configure_abort(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("INS", options->ins, "which INS; may be left out where there is one");
+  app.add_option("--reason", options->reason, "why; it is recorded");
+  app.add_flag("--json", options->json, "as JSON");
+  return online(options, abort_run);
+}
+
+Expected<int> show(ManagerClient& manager, const Options& options) {
+  const auto document = manager.show(options.run);
+  if (!document) return tl::unexpected(document.error());
+  fmt::print("{}", options.json ? *document + "\n" : run_text(*document, use_colour(stdout), true));
+  return 0;
+}
+
+CommandRun configure_show(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("RUN", options->run, "number of the run")->required();
+  app.add_flag("--json", options->json, "as JSON");
+  return online(options, show);
+}
+
+Expected<int> history(ManagerClient& manager, const Options& options) {
+  const auto document = manager.history(options.serial);
+  if (!document) return tl::unexpected(document.error());
+  fmt::print("{}", options.json  ? *document + "\n"
+                   : options.csv ? history_csv(*document)
+                                 : history_text(*document));
+  return 0;
+}
+
+CommandRun configure_history(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("SERIAL", options->serial, "serial number of the INS; the runs of all if left out");
+  auto* json = app.add_flag("--json", options->json, "as JSON");
+  app.add_flag("--csv", options->csv, "each value of each parameter, as CSV")->excludes(json);
+  return online(options, history);
+}
+
+const CommandRegistration registrations[] = {
+    {{"status", "what each INS is doing", configure_status}},
+    {{"abort", "stop a run safely", configure_abort}},
+    {{"show", "the story and the result of a run", configure_show}},
+    {{"history", "all runs of an INS, and its parameters over the years", configure_history}},
+};
+
+}  // namespace
+}  // namespace selfcal::cli
