@@ -1,0 +1,177 @@
+// selfcal bus log, selfcal bus decode: what goes over the CAN bus, as text.
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "protocol/can/bus_log.hpp"
+#include "protocol/can/socket.hpp"
+#include "protocol/uds/decode.hpp"
+#include "tools/cli/command.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+struct LogArguments {
+  std::string interface;
+  std::optional<std::uint64_t> count;
+  std::optional<double> seconds;
+};
+
+struct DecodeArguments {
+  std::string file;
+  uds::DecoderOptions decoder;
+};
+
+volatile std::sig_atomic_t stop_asked = 0;
+
+// SIGINT and SIGTERM interrupt poll() only: what has been received is still written.
+class StopSignals {
+ public:
+  StopSignals() {
+    struct sigaction action {};
+    action.sa_handler = [](int) { stop_asked = 1; };
+    ::sigaction(SIGINT, &action, nullptr);
+    ::sigaction(SIGTERM, &action, nullptr);
+    sigset_t both;
+    ::sigemptyset(&both);
+    ::sigaddset(&both, SIGINT);
+    ::sigaddset(&both, SIGTERM);
+    ::sigprocmask(SIG_BLOCK, &both, &outside_);   // delivered inside ppoll() alone: none is missed
+  }
+  const sigset_t* while_waiting() const { return &outside_; }
+
+ private:
+  sigset_t outside_{};
+};
+
+// True when frames wait, false at the deadline or a signal.
+Expected<bool> wait_for_frames(int descriptor, const StopSignals& signals, std::optional<double> seconds_left) {
+  pollfd waiting{descriptor, POLLIN, 0};
+  timespec timeout{};
+  if (seconds_left) {
+    const double left = std::max(0.0, *seconds_left);
+    timeout.tv_sec = static_cast<time_t>(left);
+    timeout.tv_nsec = static_cast<long>((left - static_cast<double>(timeout.tv_sec)) * 1e9);
+  }
+  const int ready = ::ppoll(&waiting, 1, seconds_left ? &timeout : nullptr, signals.while_waiting());
+  if (ready < 0 && errno != EINTR) {
+    return fail(ErrorKind::internal, fmt::format("cannot wait for frames: {}", std::strerror(errno)));
+  }
+  return ready > 0;
+}
+
+Expected<int> log_bus(const LogArguments& arguments) {
+  can::SocketOptions options;
+  options.interface = arguments.interface;
+  Expected<can::Socket> socket = can::Socket::open(options);
+  if (!socket) {
+    return tl::unexpected(socket.error());
+  }
+  const StopSignals signals;
+  const auto begin = std::chrono::steady_clock::now();
+  std::array<char, can::max_log_line> buffer{};
+  std::uint64_t written = 0;
+  while (stop_asked == 0 && (!arguments.count || written < *arguments.count)) {
+    std::fflush(stdout);   // what has come is shown before the wait
+    std::optional<double> left;
+    if (arguments.seconds) {
+      left = *arguments.seconds - std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      if (*left <= 0.0) {
+        break;
+      }
+    }
+    const Expected<bool> ready = wait_for_frames(socket->fd(), signals, left);
+    if (!ready) {
+      return tl::unexpected(ready.error());
+    }
+    if (!*ready) {
+      continue;
+    }
+    const auto received = socket->receive();
+    if (!received) {
+      return tl::unexpected(received.error());
+    }
+    for (const can::ReceivedFrame& frame : *received) {
+      if (!arguments.count || written < *arguments.count) {
+        fmt::print("{}\n", can::format_log_line(frame.kernel_time, arguments.interface, frame.frame,
+                                                frame.event.has_value(), buffer));
+        ++written;
+      }
+    }
+  }
+  if (socket->lost_frames() > 0) {
+    fmt::print(stderr, "selfcal bus log: {}: {} frames lost, the reader was too slow\n", arguments.interface,
+               socket->lost_frames());
+    return 1;
+  }
+  return 0;
+}
+
+Expected<int> decode_log(const DecodeArguments& arguments) {
+  std::ifstream file;
+  if (arguments.file != "-") {
+    file.open(arguments.file);
+    if (!file) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: cannot open: {}", arguments.file, std::strerror(errno)));
+    }
+  }
+  can::LogReader reader(arguments.file == "-" ? std::cin : file);
+  uds::LogDecoder decoder(arguments.decoder);
+  for (;;) {
+    const auto entry = reader.next();
+    if (!entry) {
+      return fail(entry.error().kind, fmt::format("{}: {}", arguments.file, entry.error().message));
+    }
+    if (!*entry) {
+      break;
+    }
+    if ((*entry)->error_frame) {
+      fmt::print("({:.6f}) error frame: {}\n", std::chrono::duration<double>((*entry)->time).count(),
+                 can::name(can::decode_error_frame((*entry)->frame.id, (*entry)->frame.payload())));
+    } else if (const auto line = decoder.on_frame((*entry)->frame, (*entry)->time)) {
+      fmt::print("{}\n", *line);
+    }
+  }
+  if (decoder.malformed() > 0) {
+    fmt::print(stderr, "selfcal bus decode: {}: {} of {} messages malformed\n", arguments.file, decoder.malformed(),
+               decoder.messages() + decoder.malformed());
+    return 1;
+  }
+  return 0;
+}
+
+CommandRun configure(CLI::App& app) {
+  app.require_subcommand(1);
+  auto log = std::make_shared<LogArguments>();
+  CLI::App* log_app = app.add_subcommand("log", "every frame of the bus, as `candump -L` writes it; until Ctrl-C");
+  log_app->add_option("INTERFACE", log->interface, "CAN interface, for example can0")->required();
+  log_app->add_option("--count", log->count, "stop after so many frames");
+  log_app->add_option("--seconds", log->seconds, "stop after so long")->check(CLI::PositiveNumber);
+  auto decode = std::make_shared<DecodeArguments>();
+  CLI::App* decode_app = app.add_subcommand("decode", "UDS messages and status frames of a log, by name");
+  decode_app->add_option("LOG", decode->file, "`candump -L` log; - for standard input")->required();
+  decode_app->add_option("--request-id", decode->decoder.request_id, "CAN identifier, tester to INS")
+      ->capture_default_str();
+  decode_app->add_option("--response-id", decode->decoder.response_id, "INS to tester")->capture_default_str();
+  decode_app->add_option("--functional-id", decode->decoder.functional_id, "tester to all")->capture_default_str();
+  decode_app->add_flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
+  return [log_app, log, decode]() -> Expected<int> {
+    return log_app->parsed() ? log_bus(*log) : decode_log(*decode);
+  };
+}
+
+const CommandRegistration registration{{"bus", "log and decode the CAN bus", configure}};
+
+}  // namespace
+}  // namespace selfcal::cli
