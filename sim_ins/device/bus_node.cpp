@@ -1,0 +1,276 @@
+#include "sim_ins/device/bus_node.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/ins_interface/status.hpp"
+
+namespace selfcal::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::size_t frames_per_call = 128;
+constexpr double status_interval_s = 0.2;              // INS time, but
+constexpr double least_real_interval_s = 0.005;        // never more often than this in real time
+// Largest steps of the INS's clock in one turn of the loop. During an upload small ones, so that frames go out as a
+// real bus would carry them, however fast the clock is asked to run.
+constexpr double longest_step_s = 0.25;
+constexpr double longest_step_in_upload_s = 0.02;
+// During an upload, while it is the tester's turn, the clock stands: a tester in compressed time is not charged its
+// own run time a hundredfold. But not for longer than this, should it have gone.
+constexpr Time patience = 200ms;
+constexpr std::uint64_t fault_stream = 77;
+
+Time real_now() {
+  return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+double seconds(Time t) { return std::chrono::duration<double>(t).count(); }
+
+isotp::Options transport_options(const NodeOptions& o) {
+  isotp::Options options;
+  options.address = {o.response_id, o.request_id, o.functional_id, o.extended_ids};
+  options.fd = o.fd;
+  options.frame_bytes = o.fd ? can::max_fd_bytes : can::max_classic_bytes;
+  options.max_message = 65535;
+  return options;
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<BusNode>> BusNode::open(const NodeOptions& options, Instrument& instrument) {
+  can::SocketOptions socket_options;
+  socket_options.interface = options.interface;
+  socket_options.fd = options.fd;
+  for (const std::uint32_t id : {options.request_id, options.functional_id}) {
+    can::Filter filter;
+    filter.id = id;
+    filter.extended = options.extended_ids;
+    socket_options.filters.push_back(filter);
+  }
+  auto socket = can::Socket::open(socket_options);
+  if (!socket) {
+    return tl::unexpected(socket.error());
+  }
+  std::unique_ptr<BusNode> node(new BusNode(options, instrument, std::move(*socket)));
+  node->socket_options_ = socket_options;
+  return node;
+}
+
+BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket socket)
+    : options_(options),
+      instrument_(instrument),
+      diagnostics_(instrument, options.diagnostics),
+      server_(transport_options(options), uds::ServerTimings{}, diagnostics_),
+      socket_(std::move(socket)),
+      bus_(options.rates),
+      random_(options.seed, fault_stream) {}
+
+Time BusNode::ins_time() const {
+  return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_));
+}
+
+void BusNode::reset(Time now) {
+  instrument_.power_on(now_s_);
+  diagnostics_.power_on(now);
+  server_.reset();
+}
+
+void BusNode::lose_link(const Error& why) {
+  fmt::print(stderr, "sim_ins: {}; trying again\n", why.message);
+  socket_.reset();
+  server_.reset();
+}
+
+void BusNode::try_reopen(Time now) {
+  if (now < retry_at_) {
+    return;
+  }
+  retry_at_ = now + 200ms;
+  if (auto socket = can::Socket::open(socket_options_); socket) {
+    socket_ = std::move(*socket);
+    fmt::print(stderr, "sim_ins: {}: up again\n", options_.interface);
+  }
+}
+
+void BusNode::receive(Time now) {
+  while (socket_) {
+    const auto frames = socket_->receive();
+    if (!frames) {
+      lose_link(frames.error());
+      return;
+    }
+    if (frames->empty()) {
+      return;
+    }
+    for (const can::ReceivedFrame& received : *frames) {
+      if (received.event) {
+        continue;
+      }
+      bus_.transmit(received.frame, ins_time());
+      tester_heard_ = now;
+      if (instrument_.ready()) {   // nobody listens while the INS starts
+        server_.on_frame(received.frame, now);
+      }
+    }
+  }
+}
+
+void BusNode::advance_clock(Time now) {
+  const double real_step = seconds(now - real_before_);
+  real_before_ = now;
+  const bool testers_turn = transaction() && !more_to_send_ && now - tester_heard_ < patience;
+  if (!testers_turn) {
+    now_s_ += std::min(options_.speed * real_step, transaction() ? longest_step_in_upload_s : longest_step_s);
+  }
+  diagnostics_.set_instrument_time(now_s_);
+  instrument_.advance(now_s_);
+  if (options_.reset_at_s && now_s_ >= *options_.reset_at_s) {
+    options_.reset_at_s.reset();
+    fmt::print(stderr, "sim_ins: reset on demand at {:.3f} s\n", now_s_);
+    reset(now);
+  }
+}
+
+void BusNode::queue_status() {
+  if (now_s_ < next_status_s_) {
+    return;
+  }
+  next_status_s_ = now_s_ + std::max(status_interval_s, least_real_interval_s * options_.speed);
+  ins::Status status = instrument_.status();
+  status.unlocked = diagnostics_.unlocked();
+  status_frames_ = {ins::encode_state_frame(status, alive_, options_.status_id),
+                    ins::encode_gimbal_frame(status, alive_, options_.status_id + 1)};
+  for (can::CanFrame& frame : status_frames_) {
+    frame.extended = options_.extended_ids;
+  }
+  ++alive_;
+}
+
+// Frames as the faulty bus passes them on. False where the kernel's queue is full or the link is gone.
+bool BusNode::put_on_bus(std::span<const can::CanFrame> frames) {
+  std::array<can::CanFrame, 2 * frames_per_call> passed;
+  std::size_t count = 0;
+  const FrameFaults& faults = options_.frame_faults;
+  for (const can::CanFrame& frame : frames) {
+    if (faults.drop > 0.0 && random_.uniform() < faults.drop) {
+      continue;
+    }
+    passed[count] = frame;
+    if (faults.corrupt > 0.0 && frame.size > 0 && random_.uniform() < faults.corrupt) {
+      const auto bit = static_cast<std::size_t>(random_.uniform() * 8.0 * frame.size);
+      passed[count].data[bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
+    }
+    ++count;
+    if (faults.duplicate > 0.0 && random_.uniform() < faults.duplicate) {
+      passed[count] = passed[count - 1];
+      ++count;
+    }
+  }
+  std::size_t done = 0;
+  while (socket_ && done < count) {
+    const auto sent = socket_->send(std::span(passed).subspan(done, count - done));
+    if (!sent) {
+      lose_link(sent.error());
+      return false;
+    }
+    done += *sent;
+    if (done < count) {   // the queue is full: wait for the kernel, the INS's clock stands meanwhile
+      pollfd waiting{socket_->fd(), POLLOUT, 0};
+      ::poll(&waiting, 1, 1);
+    }
+  }
+  return socket_.has_value();
+}
+
+// What the bus can carry up to now: a frame starts when the one before has ended.
+void BusNode::transmit(Time now) {
+  if (!socket_) {
+    status_frames_.clear();
+    return;
+  }
+  const Time until = ins_time();
+  for (const can::CanFrame& frame : status_frames_) {
+    bus_.transmit(frame, until);
+  }
+  if (!status_frames_.empty() && !put_on_bus(status_frames_)) {
+    return;
+  }
+  status_frames_.clear();
+  std::array<can::CanFrame, frames_per_call> frames;
+  more_to_send_ = false;
+  while (true) {
+    const std::size_t offered = server_.pending(frames, now);
+    std::size_t fits = 0;
+    while (fits < offered && bus_.free_at() <= until) {
+      // Offered since the bus was free, or since this turn's step began.
+      bus_.transmit(frames[fits], std::max(bus_.free_at(), until - 1ms));
+      ++fits;
+    }
+    if (fits > 0 && !put_on_bus(std::span(frames).first(fits))) {
+      return;
+    }
+    if (fits > 0) {
+      server_.sent(fits, now);
+    }
+    if (fits < offered) {
+      more_to_send_ = true;
+      return;
+    }
+    if (offered == 0) {
+      return;
+    }
+  }
+}
+
+void BusNode::tell_progress() {
+  const auto stopped = instrument_.gimbal_stopped_at_s();
+  if (!stopped) {
+    stop_told_ = upload_told_ = false;
+    return;
+  }
+  if (!stop_told_) {
+    stop_told_ = true;
+    fmt::print(stderr, "sim_ins: gimbal stopped at {:.3f} s, {} pages written, {} uploaded\n", *stopped,
+               instrument_.raw().pages_written(), diagnostics_.pages_served());
+  }
+  if (!upload_told_ && diagnostics_.pages_served() == instrument_.raw().pages_written() && !more_to_send_) {
+    upload_told_ = true;
+    fmt::print(stderr, "sim_ins: last page uploaded {:.3f} s after the gimbal stopped; bus {:.1f} % busy so far\n",
+               std::max(0.0, seconds(bus_.free_at()) - *stopped), 100.0 * seconds(bus_.busy()) / now_s_);
+  }
+}
+
+void BusNode::run(const volatile int& stop) {
+  real_before_ = real_now();
+  reset(real_before_);
+  while (stop == 0) {
+    const Time now = real_now();
+    if (!socket_) {
+      try_reopen(now);
+    }
+    receive(now);
+    server_.run_session_timer(diagnostics_.session_timer_wanted(), now);
+    server_.on_time(now);
+    advance_clock(now);
+    queue_status();
+    transmit(now);
+    tell_progress();
+    if (diagnostics_.take_reset_request()) {
+      reset_pending_ = true;
+    }
+    if (reset_pending_ && server_.idle()) {
+      reset_pending_ = false;
+      reset(now);
+    }
+    pollfd waiting{socket_ ? socket_->fd() : -1, POLLIN, 0};
+    ::poll(&waiting, 1, more_to_send_ ? 0 : 1);
+  }
+}
+
+}  // namespace selfcal::sim

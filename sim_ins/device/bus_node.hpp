@@ -1,0 +1,85 @@
+// The INS on a CAN interface: drives the clock, paces its frames by their bit time, answers requests, tells its status.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/can/bus_load.hpp"
+#include "protocol/can/socket.hpp"
+#include "protocol/uds/server.hpp"
+#include "sim_ins/device/diagnostics.hpp"
+#include "sim_ins/device/instrument.hpp"
+#include "sim_ins/random.hpp"
+
+namespace selfcal::sim {
+
+// What the bus does to frames that the INS sends: probability of each per frame.
+struct FrameFaults {
+  double drop = 0.0;
+  double duplicate = 0.0;
+  double corrupt = 0.0;         // one bit of the data flips, as if its CRC had let it pass
+};
+
+struct NodeOptions {
+  std::string interface = "vcan0";
+  std::uint32_t request_id = 0;
+  std::uint32_t response_id = 0;
+  std::uint32_t functional_id = 0;
+  std::uint32_t status_id = 0;           // and status_id + 1
+  bool extended_ids = false;
+  bool fd = false;
+  can::BitRates rates;
+  double speed = 1.0;                    // INS seconds per second
+  FrameFaults frame_faults;
+  std::optional<double> reset_at_s;      // INS time of one spontaneous reset
+  std::uint64_t seed = 1;
+  DiagnosticOptions diagnostics;
+};
+
+class BusNode {
+ public:
+  [[nodiscard]] static Expected<std::unique_ptr<BusNode>> open(const NodeOptions& options, Instrument& instrument);
+
+  // Runs until `stop` is set by a signal handler.
+  void run(const volatile int& stop);
+
+ private:
+  BusNode(const NodeOptions& options, Instrument& instrument, can::Socket socket);
+
+  void reset(Time now);
+  void receive(Time now);
+  void lose_link(const Error& why);
+  void try_reopen(Time now);
+  void advance_clock(Time now);
+  void transmit(Time now);
+  bool put_on_bus(std::span<const can::CanFrame> frames);
+  void queue_status();
+  void tell_progress();
+  bool transaction() const { return diagnostics_.uploading(); }
+  Time ins_time() const;
+
+  NodeOptions options_;
+  Instrument& instrument_;
+  Diagnostics diagnostics_;
+  uds::Server server_;
+  can::SocketOptions socket_options_;
+  std::optional<can::Socket> socket_;
+  can::BusClock bus_;
+  Random random_;
+
+  double now_s_ = 0.0;              // INS time
+  Time real_before_{0};
+  Time tester_heard_{0};            // real time of its last frame
+  Time retry_at_{0};
+  bool more_to_send_ = false;
+  double next_status_s_ = 0.0;
+  std::uint8_t alive_ = 0;
+  std::vector<can::CanFrame> status_frames_;
+  bool stop_told_ = true, upload_told_ = true;
+  bool reset_pending_ = false;
+};
+
+}  // namespace selfcal::sim

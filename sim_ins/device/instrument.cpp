@@ -1,0 +1,293 @@
+#include "sim_ins/device/instrument.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimator/geometry/units.hpp"
+#include "sim_ins/gimbal.hpp"
+#include "sim_ins/random.hpp"
+#include "sim_ins/simulate.hpp"
+
+namespace selfcal::sim {
+namespace {
+
+constexpr double start_up_s = 1.0;
+constexpr std::uint64_t gimbal_stream = 2;             // as simulate(): the same seed gives the same recording
+constexpr double stuck_noticed_after_s = 2.0;
+
+std::uint16_t gimbal_counts(double angle) {
+  const double turns = angle / (360.0 * units::degree);
+  return static_cast<std::uint16_t>(std::llround((turns - std::floor(turns)) * flash::counts_per_turn) % 65536);
+}
+
+Schedule as_schedule(const ins::ScheduleRecord& record) {
+  Schedule schedule;
+  schedule.rotation_s = record.rotation_ms / 1000.0;
+  for (const auto& p : record.positions) {
+    schedule.positions.push_back({p.outer_mdeg / 1000.0, p.inner_mdeg / 1000.0});
+    schedule.dwell_s.push_back(p.dwell_ms / 1000.0);
+  }
+  return schedule;
+}
+
+double degrees_in_turn(double radians) {
+  const double degrees = std::fmod(radians / units::degree, 360.0);
+  return degrees < 0.0 ? degrees + 360.0 : degrees;
+}
+
+}  // namespace
+
+Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics,
+                       FlashMemory flash, const InstrumentFaults& faults)
+    : config_(config),
+      seed_(seed),
+      physics_(physics),
+      faults_wanted_(faults),
+      flash_(std::move(flash)),
+      coefficients_(flash_),
+      counters_(flash_),
+      raw_(flash_),
+      site_{config.latitude_deg, config.longitude_deg, config.height_m} {}
+
+Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config, std::uint64_t seed,
+                                                         const ConcealedPhysics& physics, FlashMemory flash,
+                                                         const InstrumentFaults& faults) {
+  std::unique_ptr<Instrument> instrument(new Instrument(config, seed, physics, std::move(flash), faults));
+  // Proves configuration and physics before anybody relies on them.
+  if (auto imu = instrument->make_imu({{GimbalPosition{}}, {1.0}, 5.0}); !imu) {
+    return tl::unexpected(imu.error());
+  }
+  ins::Coefficients factory;
+  factory.author = "factory";
+  instrument->coefficients_.write_factory_if_blank(factory);
+  return instrument;
+}
+
+Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& schedule) const {
+  Random random(seed_, gimbal_stream);
+  auto imu = ImuSimulator::create(config_, plan_gimbal(config_.gimbal, schedule, random), seed_, physics_);
+  if (!imu) {
+    return tl::unexpected(imu.error());
+  }
+  return std::make_unique<ImuSimulator>(std::move(*imu));
+}
+
+void Instrument::power_on(double now_s) {
+  imu_.reset();
+  navigation_.reset();
+  check_ = {};
+  schedule_.reset();
+  page_ = {};
+  stopped_at_s_.reset();
+  coefficients_.power_on();
+  counters_.power_on();
+  counters_.set(counters_.get().power_cycles + 1, counters_.get().wrong_keys);
+  raw_.power_on();
+  run_id_ = raw_.directory().run_id;
+  faults_ = coefficients_.fell_back() ? ins::fault::coefficients : std::uint8_t{0};
+  state_ = ins::State::starting;
+  ready_at_s_ = now_s + start_up_s;
+}
+
+Expected<void> Instrument::set_schedule(const ins::ScheduleRecord& schedule) {
+  if (const auto sound = check_schedule(config_.gimbal, as_schedule(schedule)); !sound) {
+    return sound;
+  }
+  schedule_ = schedule;
+  return {};
+}
+
+Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
+  if (!ready() || busy()) {
+    return fail(ErrorKind::device, fmt::format("state {}", ins::name(state_)));
+  }
+  if (!schedule_) {
+    return fail(ErrorKind::device, "no schedule");
+  }
+  const Schedule schedule = as_schedule(*schedule_);
+  auto imu = make_imu(schedule);
+  if (!imu) {
+    return tl::unexpected(imu.error());
+  }
+  imu_ = std::move(*imu);
+  epoch_s_ = now_s;
+  samples_ = 0;
+  samples_wanted_ = static_cast<std::uint64_t>(std::llround(schedule.duration_s() * config_.sample_rate_hz));
+  run_id_ = run_id;
+  const std::uint64_t pages = (samples_wanted_ + flash::samples_per_page - 1) / flash::samples_per_page;
+  raw_.begin(run_id, static_cast<std::uint32_t>(pages));
+  if (faults_wanted_.spoilt_page) {
+    raw_.spoil(*faults_wanted_.spoilt_page);
+  }
+  page_ = {};
+  stopped_at_s_.reset();
+  faults_ = 0;
+  state_ = ins::State::rotating;
+  return {};
+}
+
+void Instrument::stop() {
+  if (state_ == ins::State::rotating) {
+    finish_rotation(ins::State::aborted);
+  } else if (state_ == ins::State::checking) {
+    navigation_.reset();
+    state_ = ins::State::idle;
+  }
+}
+
+void Instrument::finish_rotation(ins::State state) {
+  flush_page(true);
+  raw_.end();
+  stopped_at_s_ = epoch_s_ + static_cast<double>(samples_) / config_.sample_rate_hz;
+  state_ = state;
+}
+
+void Instrument::flush_page(bool last) {
+  if (page_.samples.empty()) {
+    return;
+  }
+  page_.run_id = run_id_;
+  page_.sequence = raw_.pages_written();
+  page_.first_sample = samples_ - page_.samples.size();
+  page_.temperature_c = last_sample_.temperature_c;
+  page_.flags = static_cast<std::uint16_t>(page_.flags | (last ? flash::page_flag::last_of_run : 0));
+  raw_.append(page_);
+  page_.samples.clear();
+  page_.flags = 0;
+}
+
+void Instrument::apply_faults(ImuSample& sample, double t) {
+  if (faults_wanted_.frozen_after_s && t > *faults_wanted_.frozen_after_s) {
+    sample.delta_theta = last_sample_.delta_theta;
+    sample.delta_v = last_sample_.delta_v;
+  }
+  if (faults_wanted_.saturated_after_s && t > *faults_wanted_.saturated_after_s) {
+    sample.delta_v.fill(std::numeric_limits<std::int16_t>::max());
+    page_.flags |= flash::page_flag::sensor_saturated;
+  }
+}
+
+void Instrument::take_sample() {
+  ImuSample sample = imu_->next();
+  const double t = static_cast<double>(samples_ + 1) / config_.sample_rate_hz;
+  apply_faults(sample, t);
+  last_sample_ = sample;
+  ++samples_;
+  if (!sample.missing) {
+    page_.samples.push_back(
+        {sample.delta_theta, sample.delta_v, gimbal_counts(sample.outer), gimbal_counts(sample.inner)});
+  }
+  if (page_.samples.size() == flash::samples_per_page) {
+    flush_page(samples_ == samples_wanted_);
+  }
+  const auto& stuck = faults_wanted_.stuck_after_s;
+  if (stuck && t > *stuck + stuck_noticed_after_s) {
+    faults_ |= ins::fault::gimbal;
+    finish_rotation(ins::State::failed);
+  } else if (samples_ == samples_wanted_) {
+    finish_rotation(ins::State::complete);
+  }
+}
+
+void Instrument::advance(double now_s) {
+  if (state_ == ins::State::starting && now_s >= ready_at_s_) {
+    state_ = ins::State::idle;
+  }
+  while (state_ == ins::State::rotating &&
+         epoch_s_ + static_cast<double>(samples_ + 1) / config_.sample_rate_hz <= now_s) {
+    take_sample();
+  }
+  if (state_ == ins::State::checking) {
+    navigate_until(now_s);
+  }
+}
+
+Expected<void> Instrument::start_navigation_check(const ins::NavigationCheckRequest& request, double now_s) {
+  if (!ready() || busy()) {
+    return fail(ErrorKind::device, fmt::format("state {}", ins::name(state_)));
+  }
+  const Schedule still{{GimbalPosition{}}, {static_cast<double>(request.duration_s)}, 5.0};
+  auto imu = make_imu(still);
+  if (!imu) {
+    return tl::unexpected(imu.error());
+  }
+  imu_ = std::move(*imu);
+  const auto set = request.compensation == ins::Slot::factory ? coefficients_.factory()
+                                                              : std::optional(coefficients_.in_force());
+  const earth::Position start{config_.latitude_deg * units::degree, config_.longitude_deg * units::degree,
+                              config_.height_m};
+  navigation_ = std::make_unique<FreeInertialNavigation>(start, imu_->motion().at(0.0).C_nb,
+                                                         set.value_or(ins::Coefficients{}).value);
+  check_ = {};
+  epoch_s_ = now_s;
+  samples_ = 0;
+  samples_wanted_ = static_cast<std::uint64_t>(std::llround(request.duration_s * config_.sample_rate_hz));
+  state_ = ins::State::checking;
+  return {};
+}
+
+void Instrument::navigate_until(double now_s) {
+  const double dt = 1.0 / config_.sample_rate_hz;
+  const double theta_lsb = config_.gyro_lsb_arcsec * units::arcsecond;
+  const auto scaled = [](const std::array<std::int32_t, 3>& counts, double lsb) {
+    return Vector3(counts[0] * lsb, counts[1] * lsb, counts[2] * lsb);
+  };
+  while (samples_ < samples_wanted_ && epoch_s_ + static_cast<double>(samples_ + 1) * dt <= now_s) {
+    const ImuSample sample = imu_->next();
+    navigation_->step(scaled(sample.delta_theta, theta_lsb), scaled(sample.delta_v, config_.accel_lsb_m_per_s), dt);
+    ++samples_;
+  }
+  check_.elapsed_s = static_cast<double>(samples_) * dt;
+  check_.north_m = navigation_->north_m();
+  check_.east_m = navigation_->east_m();
+  check_.max_horizontal_m = navigation_->max_horizontal_m();
+  if (samples_ == samples_wanted_) {
+    check_.done = true;
+    navigation_.reset();
+    state_ = ins::State::idle;
+  }
+}
+
+ins::Status Instrument::status() const {
+  ins::Status status;
+  status.state = state_;
+  status.faults = faults_;
+  status.pages_written = raw_.pages_written();
+  if (imu_) {
+    const double t = static_cast<double>(samples_) / config_.sample_rate_hz;
+    const GimbalMotion& gimbal = imu_->motion().gimbal();
+    const GimbalState now = gimbal.at(t);
+    status.outer_deg = degrees_in_turn(now.angle[0]);
+    status.inner_deg = degrees_in_turn(now.angle[1]);
+    if (state_ == ins::State::rotating) {
+      const int move = gimbal.last_move(t);
+      status.position = static_cast<std::uint8_t>(std::clamp(move + 2, 1, 255));
+      status.moving = gimbal.turning(t, t + 1e-6);
+      status.time_left_s = static_cast<double>(samples_wanted_ - samples_) / config_.sample_rate_hz;
+    }
+  }
+  return status;
+}
+
+ins::StateRecord Instrument::state_record() const {
+  return {state_,  faults_, coefficients_.in_force_slot(),   coefficients_.in_force().version,
+          coefficients_.in_force_crc(), run_id_, counters_.get().power_cycles};
+}
+
+ins::RunRecord Instrument::run_record() const {
+  return {state_, faults_, status().position, run_id_, raw_.pages_written()};
+}
+
+ins::SampleFormatRecord Instrument::sample_format() const {
+  return {config_.sample_rate_hz,
+          config_.gyro_lsb_arcsec * units::arcsecond,
+          config_.accel_lsb_m_per_s,
+          360.0 * units::degree / flash::counts_per_turn,
+          static_cast<std::uint32_t>(flash::page_bytes),
+          static_cast<std::uint16_t>(flash::samples_per_page)};
+}
+
+}  // namespace selfcal::sim

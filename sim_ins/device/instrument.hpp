@@ -1,0 +1,103 @@
+// The INS on its own clock: gimbal, IMU, FLASH, navigation. Knows nothing of CAN.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "estimator/geometry/schedule.hpp"
+#include "protocol/error.hpp"
+#include "protocol/ins_interface/records.hpp"
+#include "protocol/ins_interface/status.hpp"
+#include "sim_ins/config.hpp"
+#include "sim_ins/device/navigation.hpp"
+#include "sim_ins/device/stores.hpp"
+#include "sim_ins/imu_simulator.hpp"
+#include "sim_ins/physics.hpp"
+
+namespace selfcal::sim {
+
+// What is to go wrong, on the INS's clock counted from the start of a rotation. Unset: nothing does.
+struct InstrumentFaults {
+  std::optional<double> stuck_after_s;        // the gimbal stands still from then on; the INS notices and fails
+  std::optional<double> frozen_after_s;       // the IMU repeats its last increments
+  std::optional<double> saturated_after_s;    // the accelerometers read full scale
+  std::optional<std::uint32_t> spoilt_page;   // its first upload comes with a flipped bit
+};
+
+class Instrument {
+ public:
+  [[nodiscard]] static Expected<std::unique_ptr<Instrument>> create(const SimConfig& config, std::uint64_t seed,
+                                                                    const ConcealedPhysics& physics,
+                                                                    FlashMemory flash,
+                                                                    const InstrumentFaults& faults);
+
+  void power_on(double now_s);                       // also after a reset: everything but FLASH is lost
+  void advance(double now_s);                        // everything due up to then happens
+
+  // Self-calibration. Fails with what stands in its way.
+  [[nodiscard]] Expected<void> set_schedule(const ins::ScheduleRecord& schedule);
+  const std::optional<ins::ScheduleRecord>& schedule() const { return schedule_; }
+  bool busy() const { return state_ == ins::State::rotating || state_ == ins::State::checking; }
+  bool ready() const { return state_ != ins::State::starting; }
+  [[nodiscard]] Expected<void> start_rotation(std::uint32_t run_id, double now_s);
+  void stop();
+
+  [[nodiscard]] Expected<void> start_navigation_check(const ins::NavigationCheckRequest& request, double now_s);
+  const ins::NavigationCheckRecord& navigation_check() const { return check_; }
+
+  ins::Status status() const;                        // `unlocked` is the server's to fill
+  ins::StateRecord state_record() const;
+  ins::RunRecord run_record() const;
+  ins::SampleFormatRecord sample_format() const;
+  const std::string& serial() const { return config_.serial; }
+  ins::SiteRecord site() const { return site_; }
+  void set_site(const ins::SiteRecord& site) { site_ = site; }
+
+  CoefficientStore& coefficients() { return coefficients_; }
+  CounterStore& counters() { return counters_; }
+  RawStore& raw() { return raw_; }
+  FlashMemory& flash() { return flash_; }
+
+  std::optional<double> gimbal_stopped_at_s() const { return stopped_at_s_; }
+
+ private:
+  Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
+             const InstrumentFaults& faults);
+
+  void take_sample();
+  void apply_faults(ImuSample& sample, double t);
+  void flush_page(bool last);
+  void finish_rotation(ins::State state);
+  void navigate_until(double now_s);
+  [[nodiscard]] Expected<std::unique_ptr<ImuSimulator>> make_imu(const Schedule& schedule) const;
+
+  SimConfig config_;
+  std::uint64_t seed_;
+  ConcealedPhysics physics_;
+  InstrumentFaults faults_wanted_;
+  FlashMemory flash_;
+  CoefficientStore coefficients_;
+  CounterStore counters_;
+  RawStore raw_;
+
+  ins::State state_ = ins::State::starting;
+  std::uint8_t faults_ = 0;
+  double ready_at_s_ = 0.0;
+  ins::SiteRecord site_;
+  std::optional<ins::ScheduleRecord> schedule_;
+
+  std::unique_ptr<ImuSimulator> imu_;
+  double epoch_s_ = 0.0;                  // INS time of the rotation's or check's first sample interval
+  std::uint64_t samples_ = 0, samples_wanted_ = 0;
+  std::uint32_t run_id_ = 0;
+  flash::Page page_;
+  ImuSample last_sample_;
+  std::optional<double> stopped_at_s_;
+
+  std::unique_ptr<FreeInertialNavigation> navigation_;
+  ins::NavigationCheckRecord check_;
+};
+
+}  // namespace selfcal::sim

@@ -1,0 +1,189 @@
+// sim_ins: a virtual INS on a CAN interface.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <csignal>
+#include <fstream>
+#include <iostream>
+
+#include "protocol/ins_interface/identifiers.hpp"
+#include "sim_ins/device/bus_node.hpp"
+#include "sim_ins/simulate.hpp"
+
+namespace selfcal::sim {
+namespace {
+
+volatile int stop_requested = 0;
+
+struct Arguments {
+  std::string config, key, flash, truth, physics;
+  std::uint64_t seed = 1;
+  std::vector<std::string> faults;
+  std::uint32_t arbitration_rate = 1'000'000, data_rate = 5'000'000;
+  NodeOptions node;
+};
+
+Expected<double> number(const std::string& fault, const std::string& text) {
+  double value = 0.0;
+  const bool hex = text.starts_with("0x");
+  unsigned whole = 0;
+  const char* end = text.data() + text.size();
+  const auto result = hex ? std::from_chars(text.data() + 2, end, whole, 16) : std::from_chars(text.data(), end, value);
+  if (result.ec != std::errc{} || result.ptr != end || value < 0.0) {
+    return fail(ErrorKind::usage, fmt::format("--fault {}: '{}' is not a number", fault, text));
+  }
+  return hex ? whole : value;
+}
+
+// KEY=VALUE, as the help text lists them.
+Expected<void> take_fault(const std::string& text, NodeOptions& node, InstrumentFaults& instrument) {
+  const auto equals = text.find('=');
+  const std::string key = text.substr(0, equals);
+  const auto value = number(text, equals == std::string::npos ? "" : text.substr(equals + 1));
+  if (!value) {
+    return tl::unexpected(value.error());
+  }
+  if (key == "nrc") {
+    node.diagnostics.answer_all_with = static_cast<uds::Nrc>(static_cast<std::uint8_t>(*value));
+  } else if (key == "crc") {
+    instrument.spoilt_page = static_cast<std::uint32_t>(*value);
+  } else if (key == "stuck") {
+    instrument.stuck_after_s = *value;
+  } else if (key == "frozen") {
+    instrument.frozen_after_s = *value;
+  } else if (key == "saturated") {
+    instrument.saturated_after_s = *value;
+  } else if (key == "reset") {
+    node.reset_at_s = *value;
+  } else if (key == "drop") {
+    node.frame_faults.drop = *value;
+  } else if (key == "duplicate") {
+    node.frame_faults.duplicate = *value;
+  } else if (key == "corrupt") {
+    node.frame_faults.corrupt = *value;
+  } else {
+    return fail(ErrorKind::usage, fmt::format("--fault {}: unknown fault '{}'", text, key));
+  }
+  return {};
+}
+
+Expected<uds::SecurityKey> read_key(const std::string& path) {
+  std::ifstream file(path);
+  std::string digits;
+  file >> digits;
+  uds::SecurityKey key{};
+  bool good = digits.size() == 2 * key.size();
+  for (std::size_t i = 0; good && i < key.size(); ++i) {
+    const char* at = digits.data() + 2 * i;
+    const auto [end, error] = std::from_chars(at, at + 2, key[i], 16);
+    good = error == std::errc{} && end == at + 2;
+  }
+  if (!good) {
+    return fail(ErrorKind::bad_input, fmt::format("key file {}: 32 hexadecimal digits expected", path));
+  }
+  return key;
+}
+
+void configure(CLI::App& app, Arguments& a) {
+  NodeOptions& node = a.node;
+  node.request_id = ins::can_id::request;
+  node.response_id = ins::can_id::response;
+  node.functional_id = ins::can_id::functional;
+  node.status_id = ins::can_id::status;
+  app.add_option("--interface", node.interface, "CAN interface")->capture_default_str();
+  app.add_option("--config", a.config, "sim.toml: site, attitude, sensors, gimbal");
+  app.add_option("--seed", a.seed, "of every random draw: the same seed gives the same bits")->capture_default_str();
+  app.add_option("--key", a.key, "file with the SecurityAccess key, 32 hexadecimal digits")->required();
+  app.add_option("--flash", a.flash, "file that holds the FLASH; without it nothing outlives the process");
+  app.add_option("--truth", a.truth, "write the true sensor errors to this JSON file");
+  app.add_option("--physics", a.physics, "concealed physics, TOML");
+  app.add_option("--speed", node.speed, "INS seconds per second")->check(CLI::Range(0.01, 1e5))->capture_default_str();
+  app.add_flag("--fd", node.fd, "CAN FD with bit rate switch");
+  app.add_option("--bit-rate", a.arbitration_rate, "bit/s")->capture_default_str();
+  app.add_option("--data-bit-rate", a.data_rate, "bit/s, FD data phase")->capture_default_str();
+  app.add_option("--request-id", node.request_id, "CAN identifier of requests");
+  app.add_option("--response-id", node.response_id, "CAN identifier of responses");
+  app.add_option("--functional-id", node.functional_id, "CAN identifier of functional requests");
+  app.add_option("--status-id", node.status_id, "CAN identifier of the state frame; the gimbal frame has the next");
+  app.add_flag("--extended-ids", node.extended_ids, "29-bit identifiers");
+  app.add_option("--fault", a.faults,
+                 "KEY=VALUE, repeated. nrc=0x22: refuse every request so; crc=P: page P arrives spoilt once; "
+                 "stuck=T, frozen=T, saturated=T: gimbal, IMU, accelerometers from T s of the rotation on; reset=T: at "
+                 "T s; drop=P, duplicate=P, corrupt=P: probability per frame sent");
+}
+
+Expected<int> run(Arguments& a) {
+  Expected<SimConfig> config{SimConfig{}};
+  if (!a.config.empty()) {
+    config = read_sim_config(a.config);
+  }
+  if (!config) {
+    return tl::unexpected(config.error());
+  }
+  Expected<ConcealedPhysics> physics{ConcealedPhysics{}};
+  if (!a.physics.empty()) {
+    physics = read_physics(a.physics);
+  }
+  if (!physics) {
+    return tl::unexpected(physics.error());
+  }
+  const auto key = read_key(a.key);
+  if (!key) {
+    return tl::unexpected(key.error());
+  }
+  InstrumentFaults faults;
+  for (const std::string& fault : a.faults) {
+    if (const auto taken = take_fault(fault, a.node, faults); !taken) {
+      return tl::unexpected(taken.error());
+    }
+  }
+  auto flash = FlashMemory::open(a.flash, flash_bytes);
+  if (!flash) {
+    return tl::unexpected(flash.error());
+  }
+  auto instrument = Instrument::create(*config, a.seed, *physics, std::move(*flash), faults);
+  if (!instrument) {
+    return tl::unexpected(instrument.error());
+  }
+  a.node.seed = a.seed;
+  a.node.rates = {a.arbitration_rate, a.data_rate};
+  a.node.diagnostics.key = *key;
+  a.node.diagnostics.longest_response = a.node.fd ? 65535 : 4095;
+  auto node = BusNode::open(a.node, **instrument);
+  if (!node) {
+    return tl::unexpected(node.error());
+  }
+  if (!a.truth.empty()) {
+    if (const auto written = write_truth(a.truth, *config, a.seed, *physics); !written) {
+      return tl::unexpected(written.error());
+    }
+  }
+  (*node)->run(stop_requested);
+  return 0;
+}
+
+}  // namespace
+}  // namespace selfcal::sim
+
+int main(int argc, char** argv) {
+  CLI::App app{"A virtual INS with its own two-axis gimbal, on a CAN interface"};
+  selfcal::sim::Arguments arguments;
+  selfcal::sim::configure(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  struct sigaction action {};
+  action.sa_handler = [](int) { selfcal::sim::stop_requested = 1; };
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGINT, &action, nullptr);
+  const auto status = selfcal::sim::run(arguments);
+  if (!status) {
+    fmt::print(stderr, "sim_ins: {}\n", status.error().message);
+    return static_cast<int>(status.error().kind);
+  }
+  return *status;
+}
