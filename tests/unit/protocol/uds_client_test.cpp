@@ -1,0 +1,145 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "protocol/uds/client.hpp"
+#include "protocol/uds/messages.hpp"
+#include "protocol/uds/security.hpp"
+#include "tests/unit/protocol/frames.hpp"
+
+namespace selfcal::uds {
+namespace {
+
+using test::frame;
+using test::ms;
+using test::take_all;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class UdsClient : public testing::Test {
+ protected:
+  void ask(const Bytes& request, Time now) {
+    ASSERT_TRUE(client.request(request, now));
+    take_all(client, now);
+  }
+  Client client{test::tester_options(), ClientTimings{}};
+};
+
+TEST_F(UdsClient, PositiveResponse) {
+  ask(read_request(0xF18C), ms(0));
+  EXPECT_FALSE(client.request(read_request(0xF18C), ms(0)));
+  const auto outcome = client.on_frame(frame("648#0562F18C4142"), ms(10));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
+  const auto record = read_read_response(outcome->response, 0xF18C);
+  ASSERT_TRUE(record);
+  EXPECT_THAT(*record, ElementsAre('A', 'B'));
+  EXPECT_FALSE(client.busy());
+}
+
+TEST_F(UdsClient, NegativeResponseHasItsName) {
+  ask(upload_request(0, 4096), ms(0));
+  take_all(client, ms(0));
+  client.on_frame(frame("648#300000"), ms(1));
+  take_all(client, ms(1));
+  const auto outcome = client.on_frame(frame("648#037F3522"), ms(10));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::negative);
+  EXPECT_EQ(describe_nrc(outcome->nrc), "conditionsNotCorrect (0x22)");
+}
+
+TEST_F(UdsClient, P2AndP2StarWithResponsePending) {
+  ask(tester_present_request(false), ms(0));
+  EXPECT_EQ(client.next_deadline(), ms(150));
+  EXPECT_FALSE(client.on_time(ms(149)));
+  EXPECT_FALSE(client.on_frame(frame("648#037F3E78"), ms(149)));
+  EXPECT_FALSE(client.on_time(ms(5148)));
+  const auto outcome = client.on_time(ms(5149));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::timeout);
+}
+
+TEST_F(UdsClient, ResponsePendingHasALimit) {
+  ask(tester_present_request(false), ms(0));
+  Time now{0};
+  std::optional<Outcome> outcome;
+  while (!outcome && now < ms(100'000)) {
+    outcome = client.on_frame(frame("648#037F3E78"), now);
+    now += ms(4000);
+    outcome = client.on_time(now);
+  }
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(now, ms(60'000));
+}
+
+TEST_F(UdsClient, LateAnswersToAnotherRequestArePassedOver) {
+  ask(read_request(0x0200), ms(0));
+  client.cancel();
+  EXPECT_FALSE(client.on_frame(frame("648#0462020001"), ms(1)));
+  ask(transfer_exit_request(), ms(2));
+  EXPECT_FALSE(client.on_frame(frame("648#0462020001"), ms(3)));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2231"), ms(3)));
+  const auto outcome = client.on_frame(frame("648#0177"), ms(4));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
+}
+
+TEST_F(UdsClient, BrokenAnswerIsATransportFailure) {
+  ask(read_request(0x0210), ms(0));
+  EXPECT_FALSE(client.on_frame(frame("648#1014620210010203"), ms(1)));
+  EXPECT_THAT(take_all(client, ms(1)), ElementsAre("640#300000CCCCCCCCCC"));
+  const auto outcome = client.on_frame(frame("648#2200000000000000"), ms(2));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::transport);
+  EXPECT_EQ(outcome->why, isotp::Result::wrong_sequence);
+}
+
+TEST_F(UdsClient, TesterPresentKeepsTheSession) {
+  client.keep_session(true, ms(0));
+  EXPECT_EQ(client.next_deadline(), ms(2000));
+  client.on_time(ms(2000));
+  EXPECT_THAT(take_all(client, ms(2000)), ElementsAre("7DF#023E80CCCCCCCCCC"));
+  client.keep_session(false, ms(2001));
+  EXPECT_EQ(client.next_deadline(), std::nullopt);
+}
+
+TEST(UdsMessages, RequestsAreLiteral) {
+  EXPECT_EQ(session_request(Session::extended), (Bytes{0x10, 3}));
+  EXPECT_EQ(reset_request(ResetType::hard), (Bytes{0x11, 1}));
+  EXPECT_EQ(seed_request(), (Bytes{0x27, 1}));
+  EXPECT_EQ(key_request(Bytes{9, 8}), (Bytes{0x27, 2, 9, 8}));
+  EXPECT_EQ(write_request(0x0202, Bytes{1}), (Bytes{0x2E, 2, 2, 1}));
+  EXPECT_EQ(routine_request(RoutineAction::start, 0x0301, Bytes{0, 0, 0, 5}), (Bytes{0x31, 1, 3, 1, 0, 0, 0, 5}));
+  EXPECT_EQ(upload_request(0x01020304, 0x1000), (Bytes{0x35, 0, 0x44, 1, 2, 3, 4, 0, 0, 0x10, 0}));
+  EXPECT_EQ(transfer_request(255), (Bytes{0x36, 255}));
+  EXPECT_EQ(transfer_exit_request(), (Bytes{0x37}));
+}
+
+TEST(UdsMessages, ResponsesAreReadAndChecked) {
+  const auto timings = read_session_response(Bytes{0x50, 3, 0, 50, 1, 0xF4}, Session::extended);
+  ASSERT_TRUE(timings);
+  EXPECT_EQ(timings->p2, ms(50));
+  EXPECT_EQ(timings->p2_star, ms(5000));
+  EXPECT_EQ(session_response(Session::extended, *timings), (Bytes{0x50, 3, 0, 50, 1, 0xF4}));
+  EXPECT_EQ(read_upload_response(Bytes{0x75, 0x20, 0x0F, 0xFF}).value(), 4095U);
+  EXPECT_EQ(read_upload_response(upload_response(65535)).value(), 65535U);
+  EXPECT_FALSE(read_upload_response(Bytes{0x75, 0x50, 1, 2, 3, 4, 5}));
+  EXPECT_FALSE(read_upload_response(Bytes{0x75, 0x10, 2}));
+  const auto wrong = read_transfer_response(Bytes{0x76, 5, 1, 2}, 4);
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(wrong.error().message, HasSubstr("TransferData: byte 1 of the response is 0x05, the request had 0x04"));
+  EXPECT_FALSE(read_seed_response(Bytes{0x67, 1, 0}));
+}
+
+// RFC 4493, examples 2: key, message and tag of the document.
+TEST(UdsSecurity, AesCmacOfTheStandard) {
+  const SecurityKey key = {0x2b, 0x7e, 0x15, 0x16, 0x28, 0xae, 0xd2, 0xa6, 0xab, 0xf7, 0x15, 0x88, 0x09, 0xcf, 0x4f, 0x3c};
+  const Bytes message = {0x6b, 0xc1, 0xbe, 0xe2, 0x2e, 0x40, 0x9f, 0x96, 0xe9, 0x3d, 0x7e, 0x11, 0x73, 0x93, 0x17, 0x2a};
+  const Bytes tag = {0x07, 0x0a, 0x16, 0xb4, 0x6b, 0x4d, 0x41, 0x44, 0xf7, 0x9b, 0xdd, 0x9d, 0xd0, 0x4a, 0x28, 0x7c};
+  const auto answer = answer_seed(key, message);
+  ASSERT_TRUE(answer);
+  EXPECT_TRUE(equal_in_constant_time(*answer, tag));
+  EXPECT_FALSE(equal_in_constant_time(*answer, Bytes(16, 0)));
+}
+
+}  // namespace
+}  // namespace selfcal::uds
