@@ -64,6 +64,12 @@ void CalibrationRun::resume() {
 
 void CalibrationRun::abort(const std::string& reason) {
   if (record_.abort_wanted || is_final(record_.state)) return;
+  const Transition* row =
+      find_transition(record_.state, Event::abort_requested, [this](Guard guard) { return holds(guard); });
+  // Declined without an event: the step under way is not to be broken off.
+  if (row == nullptr || row->action == Action::decline_abort) {
+    return remember("operator", "too late to abort, the run ends by itself: " + reason);
+  }
   record_.abort_wanted = true;
   remember("operator", reason);
   if (record_.reason.empty()) record_.reason = reason;
@@ -136,7 +142,6 @@ void CalibrationRun::perform(Action action) {
     case Action::estimate: return estimate();
     case Action::judge: return judge();
     case Action::conclude: return conclude();
-    case Action::decline_abort: return remember("operator", "too late to abort: the run ends by itself");
     default: break;
   }
   if (action == Action::recover_link && progress_.link_up) {

@@ -1,0 +1,325 @@
+// The whole calibration against a fake INS, in simulated time: what the table promises, kept by the engine.
+#include "daemon/calibration_run.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/daemon/fake_ins.hpp"
+
+namespace selfcal {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing_support::FakeIns;
+using testing_support::SimulatedTimers;
+
+// Answers after ten seconds, with bias 1 m/s^2 so that the set written can be recognised.
+class FakeEstimators : public Estimators {
+ public:
+  explicit FakeEstimators(Timers& timers) : timers_(timers) {}
+  void start(EstimateJob, EstimateProgress, std::function<void(Expected<Estimate>)> on_done) override {
+    ++jobs;
+    timer_ = timers_.after(10s, [this, on_done] { on_done(answer); });
+  }
+  void cancel() override { timers_.cancel(timer_); }
+
+  static Estimate good() {
+    Estimate estimate;
+    estimate.result.value.setConstant(1.0);
+    estimate.result.sigma.setConstant(0.1);
+    estimate.result.determined.fill(true);
+    estimate.result_json = "{}";
+    return estimate;
+  }
+
+  Expected<Estimate> answer = good();
+  int jobs = 0;
+
+ private:
+  Timers& timers_;
+  Timers::Id timer_ = 0;
+};
+
+class Observer : public RunObserver {
+ public:
+  void on_state(const RunRecord& run) override { states.push_back(run.state); }
+  void on_progress(const RunRecord&) override {}
+  void on_warning(const RunRecord&, const std::string& text) override { warnings.push_back(text); }
+  void on_finished(const RunRecord&) override { ++finished; }
+  std::vector<State> states;
+  std::vector<std::string> warnings;
+  int finished = 0;
+};
+
+class CalibrationRunTest : public testing::Test {
+ protected:
+  CalibrationRunTest() {
+    std::string pattern = testing::TempDir() + "calibration_run_XXXXXX";
+    folder_ = mkdtemp(pattern.data());
+    store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
+    config_.name = std::string("bench");
+    config_.interface = std::string("fake0");
+    config_.drift_check_s = 30.0;
+    config_.lost_after_s = 20.0;
+    schedule_ = *named_schedule("table2");
+    key_ = ins_.key;
+  }
+  ~CalibrationRunTest() override {
+    run_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  void make(const RunRecord& record) {
+    run_.reset();
+    run_ = std::make_unique<CalibrationRun>(RunContext{timers_, *store_, ins_, estimators_, observer_}, config_,
+                                            schedule_, key_, record, folder_);
+  }
+  void begin(RunRecord record = {}) {
+    record.ins = std::string("bench");
+    record.id = *store_->create_run(record);
+    make(record);
+    run_->begin();
+  }
+  // As after kill -9: everything in memory is gone, the database and the folder stay.
+  void restart_daemon() {
+    const auto unfinished = *store_->unfinished_runs();
+    ASSERT_EQ(unfinished.size(), 1u);
+    make(unfinished[0]);
+    run_->resume();
+  }
+  bool until(State state, std::chrono::nanoseconds limit = 1000s) {
+    return timers_.run_until([&] { return run_->record().state == state; }, limit);
+  }
+  // The longest way there is, with every time-out on it, is far below an hour: beyond it is a hang.
+  State end() {
+    EXPECT_TRUE(timers_.run_until([&] { return is_final(run_->record().state) && observer_.finished > 0; }, 3600s))
+        << "hangs in " << name(run_->record().state);
+    EXPECT_THAT(*store_->unfinished_runs(), IsEmpty());
+    return run_->record().state;
+  }
+  const std::string& reason() const { return run_->record().reason; }
+  bool old_set_in_force() { return ins_.in_force().version == 0; }
+
+  std::filesystem::path folder_;
+  SimulatedTimers timers_;
+  FakeIns ins_{timers_};
+  FakeEstimators estimators_{timers_};
+  Observer observer_;
+  std::unique_ptr<RunStore> store_;
+  InsConfig config_;
+  Schedule schedule_;
+  UnlockKey key_;
+  std::unique_ptr<CalibrationRun> run_;
+};
+
+TEST_F(CalibrationRunTest, RunsFromIdentificationToTheProofThatTheSetIsInForce) {
+  begin();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(run_->record().exit_status, 0);
+  EXPECT_EQ(ins_.in_force().version, 1u);
+  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+  EXPECT_EQ(ins_.starts, 1);
+  EXPECT_EQ(ins_.pages_read.size(), FakeIns::pages);
+  EXPECT_EQ(run_->record().drift_old_m, 500.0);
+  EXPECT_EQ(run_->record().drift_new_m, 50.0);
+  EXPECT_EQ(observer_.finished, 1);
+}
+
+TEST_F(CalibrationRunTest, PagesArePulledWhileTheGimbalTurns) {
+  begin();
+  ASSERT_TRUE(until(State::draining));
+  EXPECT_GE(ins_.pages_read.size(), FakeIns::pages - 2);
+}
+
+TEST_F(CalibrationRunTest, DryRunWritesNothing) {
+  RunRecord record;
+  record.dry_run = true;
+  begin(record);
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_TRUE(old_set_in_force());
+}
+
+TEST_F(CalibrationRunTest, TheGateRefusesAndAReasonOpensIt) {
+  estimators_.answer->objections = {"gyro_scale_y not determined"};
+  estimators_.answer->result.determined[0] = false;
+  begin();
+  EXPECT_EQ(end(), State::refused);
+  EXPECT_EQ(run_->record().exit_status, 1);
+  EXPECT_THAT(reason(), HasSubstr("gyro_scale_y not determined"));
+  EXPECT_TRUE(old_set_in_force());
+
+  observer_.finished = 0;
+  RunRecord forced;
+  forced.force_reason = std::string("trial");
+  begin(forced);
+  EXPECT_EQ(end(), State::completed) << reason();
+  // What was not determined stays as it was.
+  EXPECT_EQ(ins_.in_force().value[0], 0.0);
+  EXPECT_EQ(ins_.in_force().value[1], 1.0);
+}
+
+TEST_F(CalibrationRunTest, AWrongKeyEndsTheRun) {
+  key_[0] = 77;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_EQ(run_->record().exit_status, 4);
+  EXPECT_THAT(reason(), HasSubstr("invalidKey (0x35)"));
+}
+
+TEST_F(CalibrationRunTest, EveryRequestRefused) {
+  ins_.refuse = 0x22;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("conditionsNotCorrect (0x22)"));
+}
+
+TEST_F(CalibrationRunTest, APageWithAWrongCrcIsFetchedAgainAndNoOther) {
+  ins_.bad_pages[3] = 2;
+  begin();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(std::count(ins_.pages_read.begin(), ins_.pages_read.end(), 3u), 3);
+  EXPECT_EQ(ins_.pages_read.size(), FakeIns::pages + 2);
+}
+
+TEST_F(CalibrationRunTest, APageThatStaysWrongStopsTheGimbalAndEndsTheRun) {
+  ins_.bad_pages[3] = 1000;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("page 3: wrong CRC"));
+  EXPECT_NE(ins_.state(), ins::State::rotating);
+  EXPECT_TRUE(old_set_in_force());
+}
+
+TEST_F(CalibrationRunTest, ALinkLostForAWhileIsSurvivedInRotation) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  timers_.run_until([&] { return ins_.pages_read.size() > 5; }, 100s);
+  ins_.dead = true;
+  timers_.after(5s, [this] { ins_.dead = false; });
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 1);
+  EXPECT_EQ(ins_.pages_read.size(), FakeIns::pages);
+  ASSERT_FALSE(observer_.warnings.empty());
+  EXPECT_THAT(observer_.warnings[0], HasSubstr("link lost"));
+}
+
+TEST_F(CalibrationRunTest, AnInsThatLostItsPowerInRotationEndsTheRun) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  ins_.power_cycle();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("the rotation ended before its time"));
+  EXPECT_TRUE(old_set_in_force());
+}
+
+TEST_F(CalibrationRunTest, AStuckGimbalEndsTheRun) {
+  ins_.gimbal_sticks = true;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("the INS is failed"));
+}
+
+TEST_F(CalibrationRunTest, CoefficientsThatReadBackWrongAreNotCommitted) {
+  ins_.loses_writes = true;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("read back are not those written"));
+  ins_.power_cycle();
+  EXPECT_TRUE(old_set_in_force());
+}
+
+TEST_F(CalibrationRunTest, ASetThatIsNotInForceAfterThePowerCycleIsSaid) {
+  ins_.ignores_commit = true;
+  begin();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("not the set written"));
+}
+
+TEST_F(CalibrationRunTest, AnotherInsInItsPlaceEndsTheRun) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  ins_.dead = true;
+  timers_.after(5s, [this] {
+    ins_.dead = false;
+    ins_.serial = std::string("OTHER");
+  });
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("INS OTHER answers"));
+}
+
+TEST_F(CalibrationRunTest, RollbackWritesTheFormerSetWithoutTurning) {
+  begin();
+  ASSERT_EQ(end(), State::completed);
+  const auto former = **store_->set(run_->record().id, SetRole::previous);
+  observer_.finished = 0;
+  RunRecord record;
+  record.rollback = true;
+  record.serial = ins_.serial;
+  record.ins = std::string("bench");
+  record.id = *store_->create_run(record);
+  ASSERT_TRUE(store_->store_set(record.id, SetRole::written, former));
+  make(record);
+  run_->begin();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 1);
+  EXPECT_EQ(ins_.in_force().version, 2u);
+  EXPECT_EQ(ins_.in_force().value[0], 0.0);
+}
+
+// One test for each state in which something can happen to the run.
+class EachState : public CalibrationRunTest, public testing::WithParamInterface<State> {
+ protected:
+  bool committed() const { return GetParam() >= State::committing && GetParam() <= State::checking_new; }
+};
+
+std::string state_name(const testing::TestParamInfo<State>& info) { return std::string(name(info.param)); }
+
+// kill -9 in this state: the next daemon goes on to the end, with one rotation.
+TEST_P(EachState, ADaemonThatIsKilledGoesOn) {
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  restart_daemon();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.second_starts, 0);
+  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+}
+
+// The INS is gone for good: the run ends in the stated time, and the link is said to be why.
+TEST_P(EachState, AnInsThatIsGoneEndsTheRun) {
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  ins_.dead = true;
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_EQ(run_->record().exit_status, 4);
+  EXPECT_THAT(reason(), HasSubstr("link lost for more than 20 s"));
+  if (!committed()) {
+    ins_.power_cycle();
+    EXPECT_TRUE(old_set_in_force());
+  }
+}
+
+// The operator's abort: never with the gimbal left turning, never between two sets.
+TEST_P(EachState, AnAbortIsSafe) {
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  run_->abort("test");
+  const State ended = end();
+  EXPECT_NE(ins_.state(), ins::State::rotating);
+  EXPECT_EQ(ended, committed() ? State::completed : State::aborted) << reason();
+  EXPECT_EQ(ins_.in_force().version, committed() ? 1u : 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Run, EachState,
+                         testing::Values(State::connecting, State::unlocking, State::scheduling, State::starting,
+                                         State::rotating, State::draining, State::estimating, State::judging,
+                                         State::checking_old, State::erasing, State::writing, State::verifying,
+                                         State::committing, State::resetting, State::confirming,
+                                         State::checking_new),
+                         state_name);
+
+}  // namespace
+}  // namespace selfcal

@@ -1,0 +1,184 @@
+#include "tests/unit/daemon/fake_ins.hpp"
+
+#include <algorithm>
+
+#include "protocol/byte_order.hpp"
+#include "protocol/flash/page.hpp"
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/uds/messages.hpp"
+#include "protocol/uds/security.hpp"
+
+namespace selfcal::testing_support {
+
+using namespace std::chrono_literals;
+
+FakeIns::FakeIns(Timers& timers) : timers_(timers) {
+  slots_[0].author = "factory";
+  slots_[1] = slots_[0];
+}
+
+FakeIns::~FakeIns() { cancel(); }
+
+double FakeIns::since_start() const { return std::chrono::duration<double>(timers_.now() - started_).count(); }
+
+ins::State FakeIns::state() {
+  if (!turning_) return resting_;
+  if (gimbal_sticks && since_start() > rotation_s / 2) return ins::State::failed;
+  return since_start() < rotation_s ? ins::State::rotating : ins::State::complete;
+}
+
+std::uint32_t FakeIns::pages_written() {
+  if (rotation_ == 0) return 0;
+  return std::min(pages, static_cast<std::uint32_t>(since_start() / rotation_s * pages));
+}
+
+void FakeIns::power_cycle() {
+  turning_ = unlocked_ = false;
+  resting_ = ins::State::idle;
+  check_started_.reset();
+  inactive_.clear();
+  ++power_cycles_;
+  in_force_ = slots_[1].version > slots_[0].version ? 1 : 0;
+}
+
+void FakeIns::cancel() { timers_.cancel(timer_); }
+
+void FakeIns::request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) {
+  const Bytes bytes(payload.begin(), payload.end());
+  if (dead) {
+    timer_ = timers_.after(1s, [done] {
+      done(tl::unexpected(PortError{PortError::Kind::link, 0, "fake0: no answer within 1 s"}));
+    });
+    return;
+  }
+  timer_ = timers_.after(1ms, [this, bytes, done] { done(respond(bytes)); });
+}
+
+tl::unexpected<PortError> FakeIns::no(std::uint8_t nrc) {
+  return tl::unexpected(PortError{PortError::Kind::negative, nrc, "fake0: INS refused: " + uds::describe_nrc(nrc)});
+}
+
+Bytes FakeIns::page(std::uint32_t number) {
+  flash::Page page;
+  page.run_id = rotation_;
+  page.sequence = number;
+  page.first_sample = std::uint64_t{number} * 10;
+  page.samples.resize(10);
+  flash::PageBytes bytes;
+  flash::encode_page(page, bytes);
+  if (bad_pages[number]-- > 0) bytes[100] = static_cast<std::uint8_t>(bytes[100] ^ 1);
+  pages_read.push_back(number);
+  return {bytes.begin(), bytes.end()};
+}
+
+Answer<Bytes> FakeIns::read(std::uint16_t did) {
+  const auto text = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
+  const auto set = [](const ins::Coefficients& c) {
+    const auto bytes = ins::encode(c);
+    return Bytes(bytes.begin(), bytes.end());
+  };
+  switch (did) {
+    case ins::did::serial_number: return text(serial);
+    case ins::did::software_version: return text("1.0");
+    case ins::did::state: {
+      ins::StateRecord record;
+      record.state = state();
+      record.run_id = rotation_;
+      record.coefficients_version = in_force().version;
+      record.power_cycles = power_cycles_;
+      return ins::encode(record);
+    }
+    case ins::did::coefficients_in_force: return set(in_force());
+    case ins::did::coefficients_inactive: return inactive_.empty() ? set(slots_.at(1 - in_force_)) : inactive_;
+    case ins::did::site: return ins::encode(ins::SiteRecord{40, 116, 50});
+    case ins::did::sample_format:
+      return ins::encode(ins::SampleFormatRecord{200, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
+    case ins::did::raw_data_directory:
+      return ins::encode(ins::DirectoryRecord{rotation_, 0, pages_written(), pages, std::uint64_t{pages_written()} * 10,
+                                              state() != ins::State::rotating});
+    default: return no(0x31);
+  }
+}
+
+Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request) {
+  const auto call = uds::parse_routine_request(request);
+  if (!call) return no(static_cast<std::uint8_t>(call.error()));
+  const bool start = call->action == uds::RoutineAction::start;
+  Bytes status;
+  switch (call->routine) {
+    case ins::routine::self_calibration:
+      if (start) {
+        ++starts;
+        if (state() == ins::State::rotating) ++second_starts;
+        turning_ = true;
+        started_ = timers_.now();
+        rotation_ = ByteReader(call->option).get<std::uint32_t>();
+      } else {
+        ++stops;
+        turning_ = false;
+        resting_ = ins::State::aborted;
+      }
+      break;
+    case ins::routine::erase_inactive: inactive_.assign(ins::coefficients_bytes, 0xFF); break;
+    case ins::routine::commit_coefficients:
+      if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) slots_.at(1 - in_force_) = *set;
+      break;
+    case ins::routine::navigation_check:
+      if (start) check_started_ = timers_.now();
+      if (call->action == uds::RoutineAction::result && check_started_) {
+        const double elapsed = std::chrono::duration<double>(timers_.now() - *check_started_).count();
+        const double drift = in_force().version == 0 ? 500.0 : 50.0;
+        status = ins::encode(ins::NavigationCheckRecord{elapsed >= 30, elapsed, drift, 0, drift});
+      }
+      break;
+    default: return no(0x31);
+  }
+  return uds::routine_response(*call, status);
+}
+
+Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
+  if (refuse) return no(*refuse);
+  ByteReader reader(request.subspan(1));
+  switch (request[0]) {
+    case uds::service::session_control: return uds::session_response(uds::Session::extended, {50ms, 5s});
+    case uds::service::security_access: {
+      if (reader.get<std::uint8_t>() == uds::security_seed_level) return uds::seed_response(seed_);
+      const auto expected = uds::answer_seed(key, seed_);
+      if (!std::equal(expected->begin(), expected->end(), request.begin() + 2)) return no(0x35);
+      unlocked_ = true;
+      return Bytes{0x67, uds::security_key_level};
+    }
+    case uds::service::read_data: {
+      const auto did = reader.get<std::uint16_t>();
+      const auto record = read(did);
+      if (!record) return tl::unexpected(record.error());
+      return uds::read_response(did, *record);
+    }
+    case uds::service::write_data: {
+      const auto did = reader.get<std::uint16_t>();
+      if (!unlocked_) return no(0x33);
+      if (did == ins::did::coefficients_inactive) {
+        inactive_.assign(request.begin() + 3, request.end());
+        if (loses_writes) inactive_[60] = static_cast<std::uint8_t>(inactive_[60] ^ 4);
+      }
+      return uds::write_response(did);
+    }
+    case uds::service::routine_control: return unlocked_ ? respond_to_routine(request) : no(0x33);
+    case uds::service::request_upload: {
+      const auto range = uds::parse_upload_request(request);
+      if (!range || !unlocked_) return no(0x31);
+      upload_page_ = range->first_page;
+      return uds::upload_response(flash::page_bytes + uds::transfer_overhead);
+    }
+    case uds::service::transfer_data: {
+      Bytes out;
+      uds::transfer_response(request[1], page(upload_page_++), out);
+      return out;
+    }
+    case uds::service::transfer_exit: return uds::transfer_exit_response();
+    case uds::service::ecu_reset: power_cycle(); return Bytes{0x51, 0x01};
+    default: return no(0x11);
+  }
+}
+
+}  // namespace selfcal::testing_support

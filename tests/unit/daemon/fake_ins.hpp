@@ -1,0 +1,76 @@
+// An INS behind an InsPort, without a bus: answers requests after a millisecond of simulated time, turns its gimbal,
+// writes pages, keeps its slots, and fails in the ways that a test asks for.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "daemon/ins_port.hpp"
+#include "daemon/unlock_key.hpp"
+#include "protocol/ins_interface/coefficients.hpp"
+#include "protocol/ins_interface/records.hpp"
+#include "tests/unit/daemon/simulated_timers.hpp"
+
+namespace selfcal::testing_support {
+
+class FakeIns : public InsPort {
+ public:
+  explicit FakeIns(Timers& timers);
+  ~FakeIns() override;
+
+  void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) override;
+  void cancel() override;
+  void reopen() override {}
+  std::uint64_t lost_frames() const override { return 0; }
+
+  void power_cycle();   // RAM is lost; the newest valid slot comes into force
+  ins::State state();
+  std::uint32_t pages_written();
+  const ins::Coefficients& in_force() const { return slots_.at(in_force_); }
+
+  // Faults
+  bool dead = false;                    // no answer to anything
+  std::optional<std::uint8_t> refuse;   // every request with this NRC
+  std::map<std::uint32_t, int> bad_pages;   // page: so many readings with a wrong CRC
+  bool loses_writes = false;            // what is written is not what is read back
+  bool ignores_commit = false;
+  bool gimbal_sticks = false;           // the rotation fails half-way
+
+  UnlockKey key{1, 2, 3};
+  std::string serial = "FAKE-1";
+  static constexpr std::uint32_t pages = 20;
+  static constexpr double rotation_s = 100.0;
+
+  int starts = 0;                       // rotations commanded
+  int second_starts = 0;                // of them, on top of one that was not over
+  int stops = 0;
+  std::vector<std::uint32_t> pages_read;
+
+ private:
+  Answer<Bytes> respond(std::span<const std::uint8_t> request);
+  Answer<Bytes> respond_to_routine(std::span<const std::uint8_t> request);
+  Answer<Bytes> read(std::uint16_t did);
+  tl::unexpected<PortError> no(std::uint8_t nrc);
+  Bytes page(std::uint32_t number);
+  double since_start() const;
+
+  Timers& timers_;
+  Timers::Id timer_ = 0;
+  bool unlocked_ = false;
+  std::array<std::uint8_t, 16> seed_{9, 9, 9};
+  ins::State resting_ = ins::State::idle;
+  bool turning_ = false;
+  SteadyTime started_{};
+  std::uint32_t rotation_ = 0;
+  std::uint32_t power_cycles_ = 1;
+  std::array<ins::Coefficients, 2> slots_;
+  std::size_t in_force_ = 0;
+  Bytes inactive_;                      // as written, not committed yet
+  std::optional<SteadyTime> check_started_;
+  std::uint32_t upload_page_ = 0;
+};
+
+}  // namespace selfcal::testing_support
