@@ -1,5 +1,7 @@
 #include "daemon/config.hpp"
 
+// As everywhere in this code base: the library's two ways do not go together in one program.
+#define TOML_EXCEPTIONS 0
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
@@ -193,13 +195,12 @@ const InsConfig* Config::find(std::string_view name) const {
 }
 
 Expected<Config> parse_config(std::string_view content, const std::string& file) {
-  toml::table root;
-  try {
-    root = toml::parse(content, file);
-  } catch (const toml::parse_error& error) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}:{}: {}", file, error.source().begin.line, error.description()));
+  const toml::parse_result parsed = toml::parse(content, file);
+  if (!parsed) {
+    return fail(ErrorKind::bad_input, fmt::format("{}:{}: {}", file, parsed.error().source().begin.line,
+                                                  parsed.error().description()));
   }
+  const toml::table& root = parsed.table();
 
   Config config;
   Reader reader(file);

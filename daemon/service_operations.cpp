@@ -24,6 +24,12 @@ tl::unexpected<Refusal> unavailable(const Error& error) {
   return refuse(operator_api::error_unavailable, error.message);
 }
 
+// The configured timing is that of the named schedules; a file has its own.
+Expected<Schedule> schedule_of(const InsConfig& config, const std::string& name_or_file) {
+  if (named_schedule(name_or_file)) return find_schedule(name_or_file, config.dwell_s, config.rotation_s);
+  return find_schedule(name_or_file);
+}
+
 }  // namespace
 
 Expected<void> Service::room_for_a_run() const {
@@ -37,7 +43,7 @@ Expected<void> Service::room_for_a_run() const {
 }
 
 Expected<void> Service::attach(Session& session, RunRecord record, const std::string& schedule_name) {
-  auto schedule = find_schedule(schedule_name, session.config.dwell_s, session.config.rotation_s);
+  auto schedule = schedule_of(session.config, schedule_name);
   if (!schedule) return tl::unexpected(schedule.error());
   const auto key = load_unlock_key(session.config);
   if (!key) return tl::unexpected(key.error());
@@ -63,7 +69,7 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
   if (stopping_) return refuse(operator_api::error_unavailable, "the daemon is stopping");
   if (auto room = room_for_a_run(); !room) return unavailable(room.error());
   // Checked before a run exists, so that a wrong name leaves no trace.
-  if (auto schedule = find_schedule(schedule_name, session.config.dwell_s, session.config.rotation_s); !schedule) {
+  if (auto schedule = schedule_of(session.config, schedule_name); !schedule) {
     return refuse(operator_api::error_unknown, schedule.error().message);
   }
   if (const auto key = load_unlock_key(session.config); !key) return unavailable(key.error());
