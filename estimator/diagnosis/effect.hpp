@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/geometry/rotation.hpp"
@@ -45,7 +46,7 @@ struct Effect {
   std::vector<EffectParameter> parameters;
   // Grid of the constant; {NaN}: none. Several variants of an effect are alternatives.
   std::vector<double> constants = {NAN};
-  std::string constant_name, constant_unit;
+  std::string_view constant_name, constant_unit;
   // Adds the integrals over the stretch of d(df)/d(coefficient) and d(dw)/d(coefficient), SI.
   void (*sensor)(const EffectContext&, double constant, Columns velocity, Columns angle) = nullptr;
   // Displacement of the base along n per unit coefficient at a time, for motions that are no sensor error.

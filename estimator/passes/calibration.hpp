@@ -15,6 +15,7 @@
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/models/imu_data.hpp"
 #include "estimator/models/sensor_model.hpp"
+#include "estimator/passes/pass.hpp"
 
 namespace selfcal {
 
@@ -92,6 +93,7 @@ struct CalibrationResult {
   Vector3 attitude_sigma;             // phi north, up, east at the start, rad
   double gyro_arw = 0.0, accel_vrw = 0.0, position_sigma = 0.0;   // in use; SI
   double gyro_quantum = 0.0, accel_quantum = 0.0;                 // found in the increments; rad, m/s; 0: none
+  NoiseModel noise;                   // in use, with the motion of a moored base
   bool moored = false;                // coloured motion of the base was found and modelled
   std::vector<PassSummary> passes;
   std::vector<SegmentSummary> segments;

@@ -1,0 +1,21 @@
+// Faults of the data themselves, looked for before any physics: what they do to the filter looks like anything.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimator/models/imu_data.hpp"
+
+namespace selfcal::diagnosis {
+
+struct DataFault {
+  std::string id;               // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_gravity
+  std::string words;
+  std::size_t first_sample = 0;
+  std::size_t count = 0;        // samples concerned
+};
+
+// Each kind at most once, with its first sample and how many there are.
+std::vector<DataFault> find_data_faults(const ImuData& data);
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,276 @@
+#include "estimator/diagnosis/diagnosis.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/naming.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+// The false alarms allowed are shared out: names, the map, whiteness, size of the innovations, noise and lines.
+constexpr double share_names = 0.5, share_map = 0.15, share_white = 0.1, share_size = 0.1, share_noise = 0.15;
+// A still base stands to micrometres; a calibration that asks for more does so because something is left out.
+constexpr double largest_still_sigma = 3e-6;   // m
+constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
+constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
+// What is named must explain all but this share of the misfit, or what remains must be noise.
+constexpr double tolerable_share = 0.1;
+
+const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
+
+double log_normal_tail(double z) { return log_chi_squared_tail(z * z, 1.0); }
+
+const Effect& effect_called(const std::string& id) {
+  const std::vector<Effect>& all = catalogue();
+  return *std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.id == id; });
+}
+
+Finding describe(const Chosen& chosen, double rows) {
+  const Effect& effect = *chosen.candidate.effect;
+  Finding f;
+  f.effect = effect.id;
+  f.equation = effect.equation;
+  f.excited = effect.excited;
+  f.experiment = effect.experiment;
+  for (Eigen::Index k = 0; k < chosen.size.size(); ++k) {
+    const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
+    f.parameters.push_back({p.name, p.unit, chosen.size(k) * p.typical,
+                            std::sqrt(chosen.covariance(k, k)) * p.typical});
+  }
+  if (!std::isnan(chosen.candidate.constant)) {   // sigma: a third of the step of the grid
+    f.parameters.push_back({std::string(effect.constant_name), std::string(effect.constant_unit),
+                            chosen.candidate.constant, 0.0});
+  }
+  f.equivalent = chosen.equivalent;
+  f.log_p = chosen.log_p;
+  f.significance = sigma_from_log_p(chosen.log_p);
+  f.delta_bic = chosen.gain - chosen.rank * std::log(rows);
+  f.held_out_gain = chosen.held_out;
+  return f;
+}
+
+Finding describe(const WalkTest& walk, double rows) {
+  Finding f;
+  f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
+  f.equation = "bias walks: variance grows with time";
+  f.excited = "whole recording";
+  f.experiment = "a longer recording";
+  const double unit = map_unit(walk.axis) / (walk.axis < 3 ? units::degree_per_hour : units::micro_g);
+  f.parameters.push_back({axis_letters[static_cast<std::size_t>(walk.axis)],
+                          walk.axis < 3 ? "deg/h/sqrt(h)" : "ug/sqrt(h)", walk.rate * unit, walk.sigma * unit});
+  f.log_p = log_normal_tail(std::sqrt(walk.gain));
+  f.significance = sigma_from_log_p(f.log_p);
+  f.delta_bic = walk.gain - std::log(rows);
+  f.stochastic = true;
+  return f;
+}
+
+// Densities, quanta and lines against what the simulation assumes. Densities are judged beyond 10 % and 5 sigma.
+void judge_noise(const NoiseCheck& noise, const AssumedNoise& assumed, double log_threshold,
+                 std::vector<Finding>& findings) {
+  if (noise.pieces < 20) {
+    return;
+  }
+  for (int triad = 0; triad < 2; ++triad) {
+    const bool gyro = triad == 0;
+    const double expected = gyro ? assumed.gyro_arw : assumed.accel_vrw;
+    const double unit = gyro ? units::degree_per_sqrt_hour : units::micro_g_per_sqrt_hz;
+    const double quantum = gyro ? assumed.gyro_quantum : assumed.accel_quantum;
+    Finding level, coarse;
+    level.effect = gyro ? "gyro_noise_level" : "accel_noise_level";
+    level.equation = "white noise of another density";
+    coarse.effect = "quantisation";
+    coarse.equation = "white noise of the integral of another size: quantum = sqrt(12) times";
+    for (int k = 0; k < 3; ++k) {
+      const auto axis = static_cast<std::size_t>(3 * triad + k);
+      const AxisNoise& n = noise.axes[axis];
+      const double z = (n.white_asd - expected) / n.white_sigma;
+      if (expected > 0.0 && std::abs(n.white_asd / expected - 1.0) > 0.1 && std::abs(z) > 5.0) {
+        level.parameters.push_back({axis_letters[axis], gyro ? "deg/sqrt(h)" : "ug/sqrt(Hz)", n.white_asd / unit,
+                                    n.white_sigma / unit});
+        level.log_p = std::min(level.log_p, log_normal_tail(z));
+      }
+      const double found = std::sqrt(12.0) * n.increment_sigma;
+      if (quantum > 0.0 && found > 2.0 * quantum) {
+        coarse.parameters.push_back({std::string(gyro ? "gyro_" : "accel_") + axis_letters[axis],
+                                     gyro ? "arcsec" : "m/s", gyro ? found / units::arcsecond : found, 0.0});
+        coarse.log_p = std::min(coarse.log_p, log_normal_tail(10.0));
+      }
+    }
+    for (Finding* f : {&level, &coarse}) {
+      if (!f->parameters.empty()) {
+        f->significance = sigma_from_log_p(f->log_p);
+        f->stochastic = true;
+        f->excited = "dwells";
+        findings.push_back(*f);
+      }
+    }
+  }
+  for (const VibrationLine& line : noise.lines) {
+    if (line.log_p < log_threshold) {
+      const bool gyro = line.axis < 3;
+      Finding f;
+      f.effect = "vibration_line";
+      f.equation = "a sin(2 pi f t)";
+      f.excited = "dwells";
+      f.stochastic = true;
+      f.log_p = line.log_p;
+      f.significance = sigma_from_log_p(line.log_p);
+      f.parameters = {{std::string(gyro ? "gyro_" : "accel_") + axis_letters[static_cast<std::size_t>(line.axis)],
+                       gyro ? "deg/h" : "ug", line.amplitude / (gyro ? units::degree_per_hour : units::micro_g), 0.0},
+                      {"frequency_hz", "Hz", line.frequency_hz, 0.0}};
+      findings.push_back(f);
+    }
+  }
+}
+
+Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted) {
+  Adequacy a;
+  a.nis = square / rows;
+  a.log_p_white = log_p_white;
+  a.largest_sigma = map.largest_sigma;
+  a.misfit = std::max(0.0, square - rows);
+  const bool map_good = log_corrected(log_normal_tail(map.largest_sigma), std::max(1, map.tests)) >
+                        std::log(share_map * alpha);
+  // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
+  const bool white = motion_fitted || log_p_white > std::log(share_white * alpha);
+  const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
+  const bool size_good = motion_fitted || log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) >
+                                              std::log(share_size * alpha);
+  a.accepted = map_good && white && size_good;
+  return a;
+}
+
+class Diagnoser {
+ public:
+  Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
+      : data_(data), options_(options), say_(say), log_names_(std::log(share_names * options.false_alarm_rate)) {}
+
+  DiagnosisOutcome run();
+
+ private:
+  bool calibrate_still();
+  void name();
+  void decide(const Naming& naming);
+  void say(const std::string& words) const {
+    if (say_) {
+      say_(words);
+    }
+  }
+
+  const ImuData& data_;
+  const DiagnosisOptions& options_;
+  const std::function<void(const std::string&)>& say_;
+  double log_names_;
+  Diagnosis d_;
+  std::string failure_;
+};
+
+// The 24 alone, with the base's noise not widened by what is left out.
+bool Diagnoser::calibrate_still() {
+  CalibrationOptions options = options_.calibration;
+  CalibrationOutcome outcome = calibrate(data_, options);
+  if (outcome.result && !outcome.result->moored && !options.noise.position_sigma &&
+      outcome.result->position_sigma > largest_still_sigma) {
+    options.noise.position_sigma = largest_still_sigma;
+    outcome = calibrate(data_, options);
+  }
+  if (!outcome.result) {
+    failure_ = outcome.failure.message;
+    return false;
+  }
+  d_.calibration = std::move(*outcome.result);
+  return true;
+}
+
+void Diagnoser::name() {
+  const RecordingContext context(data_);
+  PassInput input;
+  input.data = &data_;
+  input.parameters = d_.calibration.value;
+  input.C_nb = d_.calibration.C_nb_start;
+  input.noise = d_.calibration.noise;
+  input.prior.parameter_sigma = 2.0 * plausible_limit();
+  say("signatures");
+  Naming naming(context, input, log_names_);
+  naming.run(say_);
+  decide(naming);
+}
+
+void Diagnoser::decide(const Naming& naming) {
+  const double alpha = options_.false_alarm_rate;
+  const Map after = naming.map_after();
+  d_.located = naming.map_before().places;
+  d_.remaining = after.places;
+  d_.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha,
+                       d_.calibration.moored);
+  d_.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha,
+                      d_.calibration.moored);
+  std::vector<Finding> named;
+  for (const Chosen& c : naming.chosen()) {
+    named.push_back(describe(c, naming.rows()));
+  }
+  for (const WalkTest& w : naming.walks()) {
+    named.push_back(describe(w, naming.rows()));
+  }
+  std::stable_sort(named.begin(), named.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
+  d_.unexplained = !d_.after.accepted;
+  const bool explains = d_.after.accepted || d_.after.misfit < tolerable_share * d_.before.misfit;
+  (explains ? d_.findings : d_.rejected) = named;
+  judge_noise(d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
+  d_.value = naming.value();
+  d_.sigma = naming.covariance().diagonal().cwiseSqrt();
+
+  for (const Suspect& s : naming.prospects()) {
+    (s.expected_z < seen_z ? d_.undetectable : d_.detectable).push_back({s.effect, s.expected_z});
+  }
+  for (const Suspect& s : naming.suspects()) {
+    if (s.log_p < std::log(suspicion)) {
+      const Effect& effect = effect_called(s.effect);
+      Finding f;
+      f.effect = effect.id;
+      f.equation = effect.equation;
+      f.experiment = effect.experiment;
+      f.log_p = s.log_p;
+      f.significance = sigma_from_log_p(s.log_p);
+      d_.suspected.push_back(f);
+    }
+  }
+  d_.mismatch = !d_.findings.empty() || d_.unexplained || !d_.faults.empty();
+  if (!d_.faults.empty()) {
+    d_.verdict = DiagnosisVerdict::data_fault;
+  } else if (!d_.findings.empty()) {
+    d_.verdict = DiagnosisVerdict::named;
+  } else if (d_.unexplained) {
+    d_.verdict = DiagnosisVerdict::none_of_the_above;
+  } else if (!d_.suspected.empty()) {
+    d_.verdict = DiagnosisVerdict::not_enough_information;
+  }
+}
+
+DiagnosisOutcome Diagnoser::run() {
+  say("data");
+  d_.faults = find_data_faults(data_);
+  d_.noise = check_noise(data_, find_segments(data_));
+  say("calibration");
+  if (!calibrate_still()) {
+    return {std::nullopt, failure_};
+  }
+  name();
+  return {std::move(d_), {}};
+}
+
+}  // namespace
+
+DiagnosisOutcome diagnose(const ImuData& data, const DiagnosisOptions& options,
+                          const std::function<void(const std::string&)>& progress) {
+  if (data.size() < 2) {
+    return {std::nullopt, "the recording is empty"};
+  }
+  return Diagnoser(data, options, progress).run();
+}
+
+}  // namespace selfcal::diagnosis

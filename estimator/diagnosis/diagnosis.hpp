@@ -1,0 +1,83 @@
+// When simulation and recording differ: where, which physics was left out, the model with it, and the proof.
+//
+// Rows of a signature pass (signature_pass.hpp) make every question a linear regression with unit noise:
+// README.md derives the tests and the thresholds.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/data_faults.hpp"
+#include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/noise_check.hpp"
+#include "estimator/passes/calibration.hpp"
+
+namespace selfcal::diagnosis {
+
+struct DiagnosisOptions {
+  double false_alarm_rate = 0.01;      // of a whole recording, over all tests
+  AssumedNoise assumed;                // what the simulation takes for the sensors
+  CalibrationOptions calibration;
+};
+
+struct FindingParameter {
+  std::string name, unit;
+  double value = 0.0, sigma = 0.0;     // in the unit
+};
+
+struct Finding {
+  std::string effect;
+  std::string equation, excited;
+  std::vector<FindingParameter> parameters;
+  std::vector<std::string> equivalent; // effects that explain the recording as well
+  std::string experiment;              // what would tell them apart
+  double significance = 0.0;           // sigma, after correction for all that was tested
+  double log_p = 0.0;                  // the same, natural logarithm
+  double delta_bic = 0.0;              // fall of the BIC: positive speaks for it
+  double held_out_gain = 0.0;          // log-likelihood on dwells and rotations left out in turn
+  bool stochastic = false;             // a noise model, not a mean
+};
+
+struct Undetectable {
+  std::string effect;
+  double expected_z = 0.0;             // of its best coefficient at typical size
+};
+
+struct Adequacy {
+  double nis = 0.0;                    // per degree of freedom
+  double log_p_white = 0.0;
+  double largest_sigma = 0.0;          // of the map
+  double misfit = 0.0;                 // sum of squares beyond the degrees of freedom
+  bool accepted = false;
+};
+
+enum class DiagnosisVerdict { adequate, named, none_of_the_above, not_enough_information, data_fault };
+
+struct Diagnosis {
+  DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
+  bool mismatch = false;
+  bool unexplained = false;
+  std::vector<DataFault> faults;
+  std::vector<Finding> findings;       // best first
+  std::vector<Finding> rejected;       // fitted best, but what remains says no
+  std::vector<Finding> suspected;      // too weak to name
+  std::vector<Located> located, remaining;
+  std::vector<Undetectable> undetectable, detectable;
+  Adequacy before, after;
+  NoiseCheck noise;
+  CalibrationResult calibration;       // of the 24 alone
+  ParameterVector value;               // of the 24 with the findings fitted too, SI
+  ParameterVector sigma;
+};
+
+struct DiagnosisOutcome {
+  std::optional<Diagnosis> diagnosis;
+  std::string failure;
+};
+
+DiagnosisOutcome diagnose(const ImuData& data, const DiagnosisOptions& options,
+                          const std::function<void(const std::string&)>& progress = {});
+
+}  // namespace selfcal::diagnosis

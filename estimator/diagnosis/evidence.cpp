@@ -1,0 +1,172 @@
+#include "estimator/diagnosis/evidence.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::diagnosis {
+namespace {
+
+std::vector<int> joined(std::vector<int> a, const std::vector<int>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+}  // namespace
+
+Evidence::Evidence(const SignatureRows& r)
+    : information(r.columns.transpose() * r.columns),
+      score(r.columns.transpose() * r.residual),
+      square(r.residual.squaredNorm()),
+      rows(static_cast<double>(r.residual.size())) {}
+
+void Evidence::restore(const std::vector<int>& at, const Eigen::VectorXd& size) {
+  square += 2.0 * size.dot(score(at)) + size.dot(information(at, at) * size);
+  score += information(Eigen::all, at) * size;
+}
+
+// Woodbury: (I + Z C Z^T)^-1 = I - Z (C^-1 + Z^T Z)^-1 Z^T = I - Z C (I + J C)^-1 Z^T.
+void Evidence::absorb(const std::vector<int>& at, const Eigen::MatrixXd& covariance) {
+  const Eigen::MatrixXd J = information(at, at);
+  const auto n = J.rows();
+  const Eigen::MatrixXd middle = covariance * (Eigen::MatrixXd::Identity(n, n) + J * covariance).inverse();
+  const Eigen::MatrixXd Z = information(Eigen::all, at);
+  const Eigen::VectorXd b = score(at);
+  information -= Z * middle * Z.transpose();
+  score -= Z * (middle * b);
+  square -= b.dot(middle * b);
+}
+
+Fit Evidence::fit(const std::vector<int>& columns) const {
+  return fit_columns(information(columns, columns), score(columns));
+}
+
+GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std::vector<int>& others) {
+  Eigen::MatrixXd G = e.information(group, group);
+  Eigen::VectorXd b = e.score(group);
+  if (!others.empty()) {
+    const Eigen::MatrixXd A = e.information(others, others);
+    const Eigen::MatrixXd X = e.information(others, group);
+    const Eigen::VectorXd s = e.score(others);
+    Eigen::MatrixXd inverse = A;
+    inverse.diagonal().array() += 1e-6;   // sizes up to 1000 times the typical one
+    const Eigen::LDLT<Eigen::MatrixXd> solver(inverse);
+    G -= X.transpose() * solver.solve(X);
+    b -= X.transpose() * solver.solve(s);
+  }
+  GroupTest test;
+  const Fit fit = fit_columns(G, b);
+  test.gain = fit.gain;
+  test.rank = fit.rank;
+  if (fit.rank == 0) {
+    return test;
+  }
+  double best = 0.0;
+  for (Eigen::Index k = 0; k < b.size(); ++k) {
+    test.expected_z = std::max(test.expected_z, std::sqrt(std::max(G(k, k), 0.0)));
+    if (G(k, k) > 1e-5 && G(k, k) > 1e-9 * e.information(group[static_cast<std::size_t>(k)],
+                                                          group[static_cast<std::size_t>(k)])) {
+      best = std::max(best, b(k) * b(k) / G(k, k));
+    }
+  }
+  const double single = log_corrected(log_chi_squared_tail(best, 1.0), static_cast<double>(b.size()));
+  test.log_p = log_chi_squared_tail(fit.gain, fit.rank);
+  if (b.size() > 1) {
+    test.log_p = log_corrected(std::min(test.log_p, single), 2.0);
+  }
+  return test;
+}
+
+WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
+                   const std::vector<int>& others) {
+  WalkTest test;
+  test.axis = axis;
+  std::vector<double> time_h;
+  for (std::size_t k = 0; k < map.size(); ++k) {
+    const bool segment = map[k].kind == LocatedColumn::Kind::dwell || map[k].kind == LocatedColumn::Kind::rotation;
+    if (map[k].axis == axis && segment) {
+      test.columns.push_back(first_map_column + static_cast<int>(k));
+      time_h.push_back(0.5 * (map[k].start_s + map[k].end_s) / 3600.0);
+    }
+  }
+  Eigen::MatrixXd J = e.information(test.columns, test.columns);
+  Eigen::VectorXd b = e.score(test.columns);
+  if (!others.empty()) {
+    Eigen::MatrixXd A = e.information(others, others);
+    A.diagonal().array() += 1e-6;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+    const Eigen::MatrixXd X = e.information(others, test.columns);
+    J -= X.transpose() * solver.solve(X);
+    b -= X.transpose() * solver.solve(Eigen::VectorXd(e.score(others)));
+  }
+  const auto n = static_cast<Eigen::Index>(time_h.size());
+  Eigen::MatrixXd K(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      K(i, j) = std::min(time_h[static_cast<std::size_t>(i)], time_h[static_cast<std::size_t>(j)]);
+    }
+  }
+  const auto twice_log_likelihood = [&](double q) {
+    const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(n, n) + q * J * K;
+    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(M);
+    return q * b.dot(K * lu.solve(b)) - lu.matrixLU().diagonal().cwiseAbs().array().log().sum();
+  };
+  constexpr double steps_per_decade = 8.0;
+  double best_q = 0.0;
+  for (double l = -4.0; l <= 8.0; l += 1.0 / steps_per_decade) {
+    const double value = twice_log_likelihood(std::pow(10.0, l));
+    if (value > test.gain) {
+      test.gain = value;
+      best_q = std::pow(10.0, l);
+    }
+  }
+  test.rate = std::sqrt(best_q);
+  if (best_q > 0.0) {   // curvature in the logarithm of the rate
+    const double h = 0.1;
+    const double around = twice_log_likelihood(best_q * std::exp(2.0 * h)) +
+                          twice_log_likelihood(best_q * std::exp(-2.0 * h)) - 2.0 * test.gain;
+    test.sigma = test.rate / std::sqrt(std::max(-0.5 * around / (h * h), 1.0));
+  }
+  test.covariance = best_q * K;
+  return test;
+}
+
+double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual, const std::vector<int>& fold,
+                     const std::vector<int>& full, const std::vector<int>& reduced) {
+  const std::vector<int> all = joined(full, reduced);
+  const int folds = fold.empty() ? 0 : 1 + *std::max_element(fold.begin(), fold.end());
+  const Eigen::MatrixXd Z = columns(Eigen::all, all);
+  const auto m = Z.cols();
+  std::vector<Eigen::MatrixXd> G(static_cast<std::size_t>(folds), Eigen::MatrixXd::Zero(m, m));
+  std::vector<Eigen::VectorXd> b(static_cast<std::size_t>(folds), Eigen::VectorXd::Zero(m));
+  Eigen::MatrixXd G_all = Eigen::MatrixXd::Zero(m, m);
+  Eigen::VectorXd b_all = Eigen::VectorXd::Zero(m);
+  for (Eigen::Index r = 0; r < residual.size(); ++r) {
+    const auto f = static_cast<std::size_t>(fold[static_cast<std::size_t>(r)]);
+    G[f].noalias() += Z.row(r).transpose() * Z.row(r);
+    b[f] += Z.row(r).transpose() * residual(r);
+  }
+  for (int f = 0; f < folds; ++f) {
+    G_all += G[static_cast<std::size_t>(f)];
+    b_all += b[static_cast<std::size_t>(f)];
+  }
+  const auto fall = [&](Eigen::Index first, Eigen::Index count, std::size_t f) {
+    if (count == 0) {
+      return 0.0;
+    }
+    const Eigen::MatrixXd here = G[f].block(first, first, count, count);
+    const Eigen::VectorXd score = b[f].segment(first, count);
+    const Fit rest = fit_columns(G_all.block(first, first, count, count) - here,
+                                 b_all.segment(first, count) - score);
+    return 2.0 * rest.value.dot(score) - rest.value.dot(here * rest.value);
+  };
+  double gain = 0.0;
+  const auto n_full = static_cast<Eigen::Index>(full.size());
+  for (std::size_t f = 0; f < G.size(); ++f) {
+    gain += 0.5 * (fall(0, n_full, f) - fall(n_full, m - n_full, f));
+  }
+  return gain;
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,54 @@
+// Tests on the rows of a signature pass: which columns explain the residuals, one group at a time, given others.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/statistics.hpp"
+
+namespace selfcal::diagnosis {
+
+// Normal equations of residual = columns * size + unit noise.
+struct Evidence {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  double square = 0.0;         // of the residuals
+  double rows = 0.0;
+
+  explicit Evidence(const SignatureRows& rows);
+  // Adds back what a correction had already taken out: columns `at`, sizes in typical sizes.
+  void restore(const std::vector<int>& at, const Eigen::VectorXd& size);
+  // Columns `at` become random, ~ N(0, covariance), and are integrated out.
+  void absorb(const std::vector<int>& at, const Eigen::MatrixXd& covariance);
+
+  Fit fit(const std::vector<int>& columns) const;
+};
+
+struct GroupTest {
+  double gain = 0.0;           // fall of the residuals' square
+  int rank = 0;
+  double log_p = 0.0;          // of the group: whole group and best single column, corrected for looking at both
+  double expected_z = 0.0;     // of its best single coefficient at typical size
+};
+// `group` given that `others` are fitted too.
+GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, const std::vector<int>& others);
+
+// Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
+struct WalkTest {
+  int axis = 0;                // 0..2 gyro, 3..5 accelerometer
+  double gain = 0.0;           // twice the log-likelihood gained
+  double rate = 0.0;           // map units per sqrt(h)
+  double sigma = 0.0;          // of the rate, from the curvature
+  std::vector<int> columns;
+  Eigen::MatrixXd covariance;  // of the columns at that rate
+};
+WalkTest test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
+                   const std::vector<int>& others);
+
+// Cross-validated gain in log-likelihood: every fold's rows predicted by a fit to the rest, with `full` against
+// `reduced` columns. `fold` gives each row's number.
+double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual, const std::vector<int>& fold,
+                     const std::vector<int>& full, const std::vector<int>& reduced);
+
+}  // namespace selfcal::diagnosis

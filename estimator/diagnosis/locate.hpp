@@ -1,0 +1,43 @@
+// Where the misfit is: bias of one sensor axis in one dwell, one rotation, after turns, or in one part of the time.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/evidence.hpp"
+
+namespace selfcal::diagnosis {
+
+struct Located {
+  std::string where;           // dwell, rotation, after_turn, time, frequency
+  int position = -1;           // number from 1 of the dwell or rotation; -1: none
+  std::string axis;            // gyro_x ... accel_z, or north, up, east
+  double start_s = 0.0, end_s = 0.0;   // since the start; after_turn: since the turn
+  double significance = 0.0;   // sigma, single test
+  double size = 0.0;           // bias: deg/h or ug; frequency: amplitude, um
+  double frequency_hz = 0.0;
+  std::string words;
+};
+
+struct Map {
+  std::vector<Located> places;     // largest first, those above 3 sigma (at most 12)
+  double largest_sigma = 0.0;
+  int tests = 0;
+};
+
+// Tests each place alone, given that `fitted` columns are fitted.
+Map locate(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column,
+           const std::vector<int>& fitted);
+
+// A line in the innovations of one axis of n: sum of both quadratures' squares over the mean.
+struct InnovationLine {
+  int axis = 0;
+  double frequency_hz = 0.0;
+  double log_p = 0.0;          // corrected for the frequencies looked at
+};
+std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double interval_s);
+
+// Portmanteau test on the normalised innovations, lags 1 to 20 of the three axes: log p.
+double log_p_white(const Eigen::VectorXd& residual);
+
+}  // namespace selfcal::diagnosis

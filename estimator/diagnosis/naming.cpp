@@ -1,0 +1,407 @@
+#include "estimator/diagnosis/naming.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/locate.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr std::size_t most_effects = 6;
+constexpr int most_relinearisations = 4;
+constexpr double converged_sigma = 0.1;
+// Effects whose odds against the best are better than 1:100 stay in its class.
+const double class_log_odds = std::log(100.0);
+const double line_log_p = std::log(1e-4);
+
+std::vector<Candidate> candidates_for(const RecordingContext& context, const std::vector<InnovationLine>& lines) {
+  std::vector<Candidate> all;
+  for (const Effect& effect : catalogue()) {
+    if (effect.needs_temperature && !context.has_temperature()) {
+      continue;
+    }
+    for (const double constant : effect.constants) {
+      all.push_back({&effect, constant, 0, 0});
+    }
+    if (effect.id == "base_sway") {
+      std::vector<double> known;
+      for (const InnovationLine& line : lines) {
+        const bool near = std::any_of(known.begin(), known.end(),
+                                      [&](double f) { return std::abs(f - line.frequency_hz) < 1e-3; });
+        if (line.log_p < line_log_p && !near) {
+          known.push_back(line.frequency_hz);
+          all.push_back({&effect, line.frequency_hz, 0, 0});
+        }
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+Naming::Naming(const RecordingContext& context, PassInput input, double log_threshold)
+    : context_(context),
+      input_(std::move(input)),
+      log_threshold_(log_threshold),
+      pass_(context, candidates_for(context, {}), true),
+      rows_(pass_.run(input_)),
+      evidence_(rows_) {
+  lines_before_ = innovation_lines(rows_, input_.interval_s);
+  const bool lines = std::any_of(lines_before_.begin(), lines_before_.end(),
+                                 [](const InnovationLine& l) { return l.log_p < line_log_p; });
+  if (lines) {
+    pass_ = SignaturePass(context, candidates_for(context, lines_before_), true);
+    rows_ = pass_.run(input_);
+    evidence_ = Evidence(rows_);
+  }
+  map_before_ = locate(evidence_, pass_.map(), pass_.first_map_column(), {});
+  square_before_ = evidence_.square;
+  white_before_ = diagnosis::log_p_white(rows_.residual);
+  for (const Effect& effect : catalogue()) {
+    Suspect prospect{effect.id, 0.0, 0.0};
+    for (const Candidate& c : pass_.candidates()) {
+      if (c.effect == &effect) {
+        const GroupTest test = test_group(evidence_, columns_of(c), {});
+        prospect.expected_z = std::max(prospect.expected_z, test.expected_z);
+      }
+    }
+    const auto same = std::find_if(prospects_.begin(), prospects_.end(),
+                                   [&](const Suspect& s) { return s.effect == effect.id; });
+    if (same == prospects_.end()) {
+      prospects_.push_back(prospect);
+    } else {
+      same->expected_z = std::max(same->expected_z, prospect.expected_z);
+    }
+  }
+}
+
+std::vector<int> Naming::columns_of(const Candidate& c) const {
+  std::vector<int> columns;
+  for (int k = 0; k < c.count; ++k) {
+    columns.push_back(c.first + k);
+  }
+  return columns;
+}
+
+std::vector<int> Naming::chosen_columns(std::size_t without) const {
+  std::vector<int> columns;
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    if (i != without) {
+      const std::vector<int> own = columns_of(chosen_[i].candidate);
+      columns.insert(columns.end(), own.begin(), own.end());
+    }
+  }
+  return columns;
+}
+
+std::size_t Naming::variants_of(const std::string& effect) const {
+  return static_cast<std::size_t>(std::count_if(pass_.candidates().begin(), pass_.candidates().end(),
+                                                [&](const Candidate& c) { return c.effect->id == effect; }));
+}
+
+double Naming::corrected(double log_p, const std::string& effect) const {
+  std::set<std::string> ids = {"gyro_random_walk", "accel_random_walk"};
+  for (const Candidate& c : pass_.candidates()) {
+    ids.insert(c.effect->id);
+  }
+  return log_corrected(log_p, static_cast<double>(ids.size() * std::max<std::size_t>(1, variants_of(effect))));
+}
+
+void Naming::refit() {
+  const Fit fit = evidence_.fit(chosen_columns());
+  Eigen::Index at = 0;
+  for (Chosen& c : chosen_) {
+    c.size = fit.value.segment(at, c.candidate.count);
+    c.covariance = fit.covariance.block(at, at, c.candidate.count, c.candidate.count);
+    at += c.candidate.count;
+  }
+}
+
+// Takes the fitted effects out of the increments, lets the 24 settle again, and carries the signatures about the
+// new trajectory; until the sizes stand still.
+void Naming::relinearise() {
+  refit();
+  for (int round = 0; round < most_relinearisations; ++round) {
+    Correction correction;
+    std::vector<double> sizes;
+    applied_columns_.clear();
+    int first = 0;
+    for (const Chosen& c : chosen_) {
+      if (c.candidate.effect->sensor != nullptr) {
+        Candidate own = c.candidate;
+        own.first = first;
+        first += own.count;
+        correction.effects.push_back(own);
+        sizes.insert(sizes.end(), c.size.begin(), c.size.end());
+        const std::vector<int> columns = columns_of(c.candidate);
+        applied_columns_.insert(applied_columns_.end(), columns.begin(), columns.end());
+      }
+    }
+    correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
+    applied_ = correction.size;
+    const ImuData& original = context_.data();
+    if (!sizes.empty()) {
+      theta_.assign(original.delta_theta.begin(), original.delta_theta.end());
+      velocity_.assign(original.delta_v.begin(), original.delta_v.end());
+      PassInput geometry = input_;
+      geometry.data = &original;
+      subtract_effects(context_, geometry, correction, theta_, velocity_);
+      corrected_view_ = original;
+      corrected_view_.delta_theta = theta_;
+      corrected_view_.delta_v = velocity_;
+      input_.data = &corrected_view_;
+    } else {
+      input_.data = &original;
+    }
+    for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
+      input_.sign = sign;
+      const PassOutput out = run_pass(input_);
+      input_.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
+      input_.C_nb = out.C_nb;
+    }
+    input_.sign = 1.0;
+    rows_ = pass_.run(input_);
+    evidence_ = Evidence(rows_);
+    evidence_.restore(applied_columns_, applied_);
+    for (const WalkTest& walk : walks_) {
+      evidence_.absorb(walk.columns, walk.covariance);
+    }
+    const std::vector<Chosen> before = chosen_;
+    refit();
+    double move = 0.0;
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      const Eigen::VectorXd sigma = chosen_[i].covariance.diagonal().cwiseSqrt();
+      move = std::max(move, (chosen_[i].size - before[i].size).cwiseAbs().cwiseQuotient(sigma).maxCoeff());
+    }
+    if (sizes.empty() || move < converged_sigma) {
+      break;
+    }
+  }
+}
+
+bool Naming::add_best() {
+  const std::vector<int> others = chosen_columns();
+  double best = 0.0;
+  const Candidate* winner = nullptr;
+  for (const Candidate& c : pass_.candidates()) {
+    const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
+      return x.candidate.effect->id == c.effect->id && c.effect->id != "base_sway";
+    });
+    const bool same = std::any_of(chosen_.begin(), chosen_.end(),
+                                  [&](const Chosen& x) { return x.candidate.first == c.first; });
+    if (taken || same) {
+      continue;
+    }
+    const double log_p = corrected(test_group(evidence_, columns_of(c), others).log_p, c.effect->id);
+    if (log_p < best) {
+      best = log_p;
+      winner = &c;
+    }
+  }
+  // A walk has one coefficient, at the edge of its range (half a chi-squared), on one of six axes.
+  const WalkTest* walker = nullptr;
+  std::vector<WalkTest> tests;
+  for (int axis = 0; axis < 6; ++axis) {
+    tests.push_back(test_walk(evidence_, pass_.map(), pass_.first_map_column(), axis, others));
+  }
+  for (const WalkTest& test : tests) {
+    const double log_p = corrected(log_corrected(log_chi_squared_tail(test.gain, 1.0), 3.0), "gyro_random_walk");
+    const bool taken = std::any_of(walks_.begin(), walks_.end(),
+                                   [&](const WalkTest& w) { return w.axis == test.axis; });
+    if (!taken && log_p < best) {
+      best = log_p;
+      walker = &test;
+    }
+  }
+  if (best > log_threshold_) {
+    return false;
+  }
+  if (walker != nullptr) {
+    walks_.push_back(*walker);
+    evidence_.absorb(walker->columns, walker->covariance);
+    refit();
+  } else {
+    chosen_.push_back({*winner, {}, {}, 0.0, 0.0, 0, 0.0, {}});
+    relinearise();
+  }
+  return true;
+}
+
+bool Naming::drop_weak() {
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const GroupTest test = test_group(evidence_, columns_of(chosen_[i].candidate), chosen_columns(i));
+    if (corrected(test.log_p, chosen_[i].candidate.effect->id) > log_threshold_) {
+      chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(i));
+      relinearise();
+      return true;
+    }
+  }
+  return false;
+}
+
+// An early choice may have been the least bad name: each is held against every other candidate in its place.
+bool Naming::exchange() {
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const std::vector<int> others = chosen_columns(i);
+    const Candidate own = chosen_[i].candidate;
+    double best = test_group(evidence_, columns_of(own), others).log_p - 1.0;
+    const Candidate* winner = nullptr;
+    for (const Candidate& c : pass_.candidates()) {
+      const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
+        return x.candidate.effect->id == c.effect->id && x.candidate.first != own.first;
+      });
+      if (taken || c.first == own.first) {
+        continue;
+      }
+      const double log_p = test_group(evidence_, columns_of(c), others).log_p;
+      if (log_p < best) {
+        best = log_p;
+        winner = &c;
+      }
+    }
+    if (winner != nullptr) {
+      chosen_[i].candidate = *winner;
+      relinearise();
+      return true;
+    }
+  }
+  return false;
+}
+
+void Naming::judge() {
+  std::vector<int> fold;
+  for (const double t : rows_.time_s) {
+    fold.push_back(static_cast<int>(context_.segment_at(t)));
+  }
+  Eigen::VectorXd residual = rows_.residual;
+  if (!applied_columns_.empty()) {
+    residual += rows_.columns(Eigen::all, applied_columns_) * applied_;
+  }
+  const std::vector<int> all = chosen_columns();
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    Chosen& c = chosen_[i];
+    const std::vector<int> others = chosen_columns(i);
+    const GroupTest own = test_group(evidence_, columns_of(c.candidate), others);
+    c.gain = own.gain;
+    c.rank = own.rank;
+    c.log_p = corrected(own.log_p, c.candidate.effect->id);
+    c.held_out = held_out_gain(rows_.columns, residual, fold, all, others);
+    c.equivalent.clear();
+    for (const Candidate& rival : pass_.candidates()) {
+      const std::string& id = rival.effect->id;
+      const bool listed = id == c.candidate.effect->id ||
+                          std::find(c.equivalent.begin(), c.equivalent.end(), id) != c.equivalent.end();
+      const bool chosen = std::any_of(chosen_.begin(), chosen_.end(),
+                                      [&](const Chosen& x) { return x.candidate.effect->id == id; });
+      if (listed || chosen) {
+        continue;
+      }
+      const GroupTest test = test_group(evidence_, columns_of(rival), others);
+      // As good a likelihood, or one that only its further coefficients cost: an effect that contains the other.
+      if (test.log_p < own.log_p + class_log_odds || (test.gain > own.gain - 2.0 && test.log_p < 0.8 * own.log_p)) {
+        c.equivalent.push_back(id);
+      }
+    }
+  }
+  std::stable_sort(chosen_.begin(), chosen_.end(),
+                   [](const Chosen& a, const Chosen& b) { return a.log_p < b.log_p; });
+}
+
+void Naming::run(const std::function<void(const std::string&)>& progress) {
+  while (chosen_.size() + walks_.size() < most_effects && add_best()) {
+    if (progress) {
+      progress(std::to_string(chosen_.size() + walks_.size()) + " effects fitted");
+    }
+    drop_weak();
+  }
+  for (int round = 0; round < 3 && exchange(); ++round) {
+    while (drop_weak()) {
+    }
+  }
+  while (chosen_.size() + walks_.size() < most_effects && add_best()) {
+  }
+  judge();
+}
+
+std::vector<Suspect> Naming::suspects() const {
+  std::vector<Suspect> all;
+  const std::vector<int> others = chosen_columns();
+  for (const Candidate& c : pass_.candidates()) {
+    const bool chosen = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
+      return x.candidate.effect->id == c.effect->id;
+    });
+    if (chosen) {
+      continue;
+    }
+    const GroupTest test = test_group(evidence_, columns_of(c), others);
+    const double log_p = corrected(test.log_p, c.effect->id);
+    const auto same = std::find_if(all.begin(), all.end(), [&](const Suspect& s) { return s.effect == c.effect->id; });
+    if (same == all.end()) {
+      all.push_back({c.effect->id, log_p, test.expected_z});
+    } else {
+      same->log_p = std::min(same->log_p, log_p);
+      same->expected_z = std::max(same->expected_z, test.expected_z);
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Suspect& a, const Suspect& b) { return a.log_p < b.log_p; });
+  return all;
+}
+
+Map Naming::map_after() const {
+  return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns());
+}
+
+double Naming::square_after() const {
+  return evidence_.square - evidence_.fit(chosen_columns()).gain;
+}
+
+Eigen::VectorXd Naming::final_residual() const {
+  Eigen::VectorXd residual = rows_.residual;
+  if (!applied_columns_.empty()) {
+    residual += rows_.columns(Eigen::all, applied_columns_) * applied_;
+  }
+  const std::vector<int> columns = chosen_columns();
+  if (!columns.empty()) {
+    residual -= rows_.columns(Eigen::all, columns) * evidence_.fit(columns).value;
+  }
+  for (const WalkTest& walk : walks_) {   // the walk's own estimate
+    const Eigen::MatrixXd Z = rows_.columns(Eigen::all, walk.columns);
+    const Eigen::MatrixXd J = Z.transpose() * Z;
+    const auto n = J.rows();
+    residual -= Z * (walk.covariance * (Eigen::MatrixXd::Identity(n, n) + J * walk.covariance).inverse() *
+                     (Z.transpose() * residual));
+  }
+  return residual;
+}
+
+double Naming::log_p_white_after() const { return diagnosis::log_p_white(final_residual()); }
+
+// Truth = estimate + shift * (size - what the correction already took out).
+ParameterVector Naming::value() const {
+  const PassOutput& pass = rows_.pass;
+  ParameterVector value = input_.parameters + pass.mean.segment<sensor_parameter_count>(pass.layout.parameters());
+  for (const Chosen& c : chosen_) {
+    value += rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+  }
+  if (!applied_columns_.empty()) {
+    value -= rows_.shift(Eigen::all, applied_columns_) * applied_;
+  }
+  return value;
+}
+
+ParameterMatrix Naming::covariance() const {
+  const int at = rows_.pass.layout.parameters();
+  ParameterMatrix P = rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
+  const std::vector<int> columns = chosen_columns();
+  if (!columns.empty()) {
+    const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns);
+    P += S * evidence_.fit(columns).covariance * S.transpose();
+  }
+  return P;
+}
+
+}  // namespace selfcal::diagnosis

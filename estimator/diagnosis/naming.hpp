@@ -1,0 +1,87 @@
+// Forward selection over the catalogue, with a refit about the corrected recording after every step.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/locate.hpp"
+
+namespace selfcal::diagnosis {
+
+struct Chosen {
+  Candidate candidate;                 // columns as in the naming's candidates
+  Eigen::VectorXd size;                // fitted, in typical sizes
+  Eigen::MatrixXd covariance;
+  double log_p = 0.0;                  // given the others, corrected for variants and effects
+  double gain = 0.0;
+  int rank = 0;
+  double held_out = 0.0;
+  std::vector<std::string> equivalent;
+};
+
+struct Suspect {
+  std::string effect;
+  double log_p = 0.0;
+  double expected_z = 0.0;
+};
+
+class Naming {
+ public:
+  // `input`: forward pass about the calibrated recording. `log_threshold`: of corrected p-values.
+  Naming(const RecordingContext& context, PassInput input, double log_threshold);
+
+  void run(const std::function<void(const std::string&)>& progress);
+
+  const std::vector<Chosen>& chosen() const { return chosen_; }
+  const std::vector<WalkTest>& walks() const { return walks_; }
+  // Best variant of every effect not chosen, given what is.
+  std::vector<Suspect> suspects() const;
+  // Every effect of the catalogue with the z that a typical size would give, nothing else fitted.
+  const std::vector<Suspect>& prospects() const { return prospects_; }
+
+  const Map& map_before() const { return map_before_; }
+  Map map_after() const;
+  const std::vector<InnovationLine>& lines_before() const { return lines_before_; }
+  double square_before() const { return square_before_; }
+  double square_after() const;
+  double rows() const { return evidence_.rows; }
+  double log_p_white_before() const { return white_before_; }
+  double log_p_white_after() const;
+  // The 24 with everything fitted.
+  ParameterVector value() const;
+  ParameterMatrix covariance() const;
+
+ private:
+  std::vector<int> columns_of(const Candidate& candidate) const;
+  std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
+  void refit();
+  void relinearise();
+  bool add_best();
+  bool drop_weak();
+  bool exchange();
+  void judge();
+  std::size_t variants_of(const std::string& effect) const;
+  double corrected(double log_p, const std::string& effect) const;
+  Eigen::VectorXd final_residual() const;
+
+  const RecordingContext& context_;
+  PassInput input_;
+  ImuData corrected_view_;
+  AngleVelocity theta_, velocity_;
+  double log_threshold_;
+  SignaturePass pass_;
+  SignatureRows rows_;
+  Evidence evidence_;                  // with what the correction took out added back, walks integrated out
+  std::vector<Chosen> chosen_;
+  std::vector<WalkTest> walks_;
+  std::vector<Suspect> prospects_;
+  Map map_before_;
+  std::vector<InnovationLine> lines_before_;
+  double square_before_ = 0.0, white_before_ = 0.0;
+  Eigen::VectorXd applied_;            // sizes of chosen_ that the correction holds
+  std::vector<int> applied_columns_;
+};
+
+}  // namespace selfcal::diagnosis

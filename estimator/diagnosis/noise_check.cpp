@@ -1,0 +1,154 @@
+#include "estimator/diagnosis/noise_check.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+#include "estimator/diagnosis/statistics.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr Eigen::Index piece = 2048;         // samples
+constexpr double margin_s = 5.0;
+constexpr double lowest_hz = 0.25;           // slower: drifts of all kinds
+constexpr int most_pieces_per_dwell = 8;
+
+using Spectrum = Eigen::ArrayXd;
+
+struct DwellSpectra {
+  std::vector<Spectrum> dwells;              // mean of each
+  std::vector<int> pieces;
+};
+
+DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis) {
+  DwellSpectra result;
+  const double dt = 1.0 / data.sample_rate_hz;
+  Eigen::VectorXd window(piece);
+  for (Eigen::Index i = 0; i < piece; ++i) {
+    window(i) = 1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / piece);
+  }
+  const double scale = dt / window.squaredNorm();
+  Eigen::FFT<double> fft;
+  Eigen::VectorXd x(piece);
+  Eigen::VectorXcd transform;
+  const auto margin = static_cast<std::size_t>(margin_s * data.sample_rate_hz);
+  for (const Segment& s : segments) {
+    if (s.rotation) {
+      continue;
+    }
+    Spectrum sum = Spectrum::Zero(piece / 2);
+    int count = 0;
+    for (std::size_t first = s.first + margin;
+         first + static_cast<std::size_t>(piece) + margin <= s.last && count < most_pieces_per_dwell;
+         first += static_cast<std::size_t>(piece)) {
+      for (Eigen::Index i = 0; i < piece; ++i) {
+        const std::size_t at = first + static_cast<std::size_t>(i);
+        x(i) = (axis < 3 ? data.delta_theta[at][axis] : data.delta_v[at][axis - 3]) / dt;
+      }
+      x.array() -= x.mean();
+      x = x.cwiseProduct(window);
+      fft.fwd(transform, x);
+      sum += transform.head(piece / 2).array().abs2() * scale;
+      ++count;
+    }
+    if (count > 0) {
+      result.dwells.emplace_back(sum / count);
+      result.pieces.push_back(count);
+    }
+  }
+  return result;
+}
+
+// density = N^2 + Q^2 4 sin^2(pi f D)/D, weighted by the model itself; bins far above it are left out.
+AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
+  const auto first = static_cast<Eigen::Index>(std::ceil(lowest_hz * piece * dt));
+  Spectrum shape(density.size());
+  for (Eigen::Index b = 0; b < density.size(); ++b) {
+    const double sine = std::sin(std::numbers::pi * static_cast<double>(b) / piece);
+    shape(b) = 4.0 * sine * sine / dt;
+  }
+  double white = density.segment(first, 20).mean();
+  double angle = 0.0;
+  Eigen::Matrix2d normal;
+  for (int round = 0; round < 30; ++round) {
+    normal.setZero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    for (Eigen::Index b = first; b < density.size(); ++b) {
+      const double model = white + angle * shape(b);
+      if (round > 4 && density(b) > 2.0 * model) {
+        continue;
+      }
+      const Eigen::Vector2d row(1.0 / model, shape(b) / model);
+      normal += row * row.transpose();
+      right += row * density(b) / model;
+    }
+    const Eigen::Vector2d fit = normal.inverse() * right;
+    angle = std::max(0.0, fit(1));
+    white = std::max(angle > 0.0 ? fit(0) : right(0) / normal(0, 0), 1e-3 * white);
+  }
+  AxisNoise noise;
+  noise.white_asd = std::sqrt(white);
+  // A mean of `pieces` periodograms scatters by 1/sqrt(pieces); Hann correlates neighbouring bins: 1.5 times that.
+  noise.white_sigma = 0.5 / noise.white_asd * std::sqrt(1.5 * normal.inverse()(0, 0) / pieces);
+  noise.increment_sigma = std::sqrt(angle);
+  return noise;
+}
+
+void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<VibrationLine>& lines) {
+  const std::size_t dwells = s.dwells.size();
+  const auto bins = s.dwells.front().size();
+  const auto first = static_cast<Eigen::Index>(std::ceil(2.0 * lowest_hz * piece / rate_hz));
+  Spectrum middle(bins);
+  std::vector<double> values(dwells);
+  for (Eigen::Index b = 0; b < bins; ++b) {
+    for (std::size_t d = 0; d < dwells; ++d) {
+      values[d] = s.dwells[d](b);
+    }
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(dwells / 2), values.end());
+    middle(b) = values[dwells / 2];
+  }
+  // Spread of the median: 1.25 sigma/sqrt(dwells), sigma = 1/sqrt(pieces) of the mean; its tail taken as normal, and
+  // so the limit below as 9 of them. The background is the median of the neighbourhood.
+  const double spread = 1.25 / std::sqrt(static_cast<double>(dwells) * s.pieces.front());
+  constexpr Eigen::Index half = 20;
+  for (Eigen::Index b = std::max(first, half); b + half < bins; ++b) {
+    std::vector<double> around(middle.data() + b - half, middle.data() + b + half + 1);
+    std::nth_element(around.begin(), around.begin() + half, around.end());
+    const double background = around[half];
+    const double excess = middle(b) / background - 1.0;
+    const bool peak = middle(b) >= middle(b - 1) && middle(b) > middle(b + 1);
+    if (peak && excess > 9.0 * spread && excess > 0.8) {
+      const double z = excess / spread;
+      // A sinusoid of amplitude a gives a^2 T/6 at the middle of Hann's bin (gain 2/3 of a T/4).
+      const double amplitude = std::sqrt(6.0 * (middle(b) - background) * rate_hz / piece);
+      lines.push_back({axis, static_cast<double>(b) * rate_hz / piece, amplitude,
+                       log_corrected(log_chi_squared_tail(z * z / 2.0, 1.0), 6.0 * static_cast<double>(bins))});
+    }
+  }
+}
+
+}  // namespace
+
+NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments) {
+  NoiseCheck check;
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    const DwellSpectra s = spectra(data, segments, axis);
+    Spectrum mean = Spectrum::Zero(piece / 2);
+    check.pieces = 0;
+    for (std::size_t d = 0; d < s.dwells.size(); ++d) {
+      mean += s.dwells[d] * s.pieces[d];
+      check.pieces += s.pieces[d];
+    }
+    if (check.pieces < 20) {
+      return check;
+    }
+    check.axes[axis] = fit_noise(mean / check.pieces, check.pieces, 1.0 / data.sample_rate_hz);
+    find_lines(s, static_cast<int>(axis), data.sample_rate_hz, check.lines);
+  }
+  return check;
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,44 @@
+// The stochastic part: noise densities, quantisation and lines of the dwells against what the simulation assumes.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "estimator/models/imu_data.hpp"
+#include "estimator/models/segments.hpp"
+
+namespace selfcal::diagnosis {
+
+struct AssumedNoise {
+  double gyro_arw = 0.0;        // rad/s/sqrt(Hz)
+  double accel_vrw = 0.0;       // m/s^2/sqrt(Hz)
+  double gyro_quantum = 0.0;    // rad
+  double accel_quantum = 0.0;   // m/s
+};
+
+struct AxisNoise {
+  double white_asd = 0.0;       // as AssumedNoise
+  double white_sigma = 0.0;     // of the estimate
+  double increment_sigma = 0.0; // white noise of the integral: quantum/sqrt(12) where nothing else, rad or m/s
+};
+
+struct VibrationLine {
+  int axis = 0;                 // 0..2 gyro, 3..5 accelerometer
+  double frequency_hz = 0.0;
+  double amplitude = 0.0;       // rad/s or m/s^2
+  double log_p = 0.0;           // corrected for frequencies and axes
+};
+
+struct NoiseCheck {
+  std::array<AxisNoise, 6> axes;
+  std::vector<VibrationLine> lines;
+  int pieces = 0;               // of spectra averaged; below 20 nothing is judged
+};
+
+// Periodograms of pieces of the dwells (Hann). White rate plus white angle are fitted where lines are not; a line must
+// stand out in the median over the dwells, so that the beat of a coarse quantum with a steady rate, which moves with
+// the attitude, is none.
+NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments);
+
+}  // namespace selfcal::diagnosis

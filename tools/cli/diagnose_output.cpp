@@ -1,0 +1,206 @@
+#include "tools/cli/diagnose_output.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimator/geometry/sensor_parameters.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using diagnosis::Adequacy;
+using diagnosis::Finding;
+using diagnosis::Located;
+using nlohmann::ordered_json;
+
+ordered_json to_json(const Located& l) {
+  ordered_json j;
+  j["where"] = l.where;
+  if (l.position > 0) {
+    j["position"] = l.position;
+  }
+  j["axis"] = l.axis;
+  j["significance"] = l.significance;
+  j["start_s"] = l.start_s;
+  j["end_s"] = l.end_s;
+  j["bias"] = l.size;
+  j["unit"] = l.axis.starts_with("gyro") ? "deg/h" : "ug";
+  j["words"] = l.words;
+  return j;
+}
+
+ordered_json to_json(const Finding& f) {
+  ordered_json j;
+  j["effect"] = f.effect;
+  j["equation"] = f.equation;
+  j["where"] = f.excited;
+  j["parameters"] = ordered_json::array();
+  for (const auto& p : f.parameters) {
+    j["parameters"].push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"sigma", p.sigma}});
+  }
+  j["equivalent"] = f.equivalent;
+  j["experiment"] = f.experiment;
+  j["significance"] = f.significance;
+  j["stochastic"] = f.stochastic;
+  j["evidence"] = {{"delta_bic", f.delta_bic},
+                   {"p_value", std::exp(f.log_p)},
+                   {"log10_p", f.log_p / std::log(10.0)},
+                   {"held_out_gain", f.held_out_gain}};
+  return j;
+}
+
+ordered_json to_json(const Adequacy& a) {
+  return {{"accepted", a.accepted},
+          {"nis", a.nis},
+          {"whiteness_log10_p", a.log_p_white / std::log(10.0)},
+          {"largest_located_sigma", a.largest_sigma},
+          {"misfit", a.misfit}};
+}
+
+template <typename T>
+ordered_json list(const std::vector<T>& all) {
+  ordered_json j = ordered_json::array();
+  for (const T& one : all) {
+    j.push_back(to_json(one));
+  }
+  return j;
+}
+
+std::string text_of(const Finding& f) {
+  std::string text = fmt::format("  {}  {:.1f} sigma, delta BIC {:.0f}, held-out gain {:.1f}\n    {}\n", f.effect,
+                                 f.significance, f.delta_bic, f.held_out_gain, f.equation);
+  for (const auto& p : f.parameters) {
+    text += fmt::format("    {:12} {:12.5g} +- {:.2g} {}\n", p.name, p.value, p.sigma, p.unit);
+  }
+  if (!f.equivalent.empty()) {
+    text += fmt::format("    cannot be told here from: {}; to split them: {}\n", fmt::join(f.equivalent, ", "),
+                        f.experiment);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
+  switch (verdict) {
+    case diagnosis::DiagnosisVerdict::adequate: return "adequate";
+    case diagnosis::DiagnosisVerdict::named: return "named";
+    case diagnosis::DiagnosisVerdict::none_of_the_above: return "none of the above";
+    case diagnosis::DiagnosisVerdict::not_enough_information: return "not enough information";
+    case diagnosis::DiagnosisVerdict::data_fault: return "data fault";
+  }
+  return {};
+}
+
+ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate) {
+  ordered_json j;
+  j["mismatch"] = d.mismatch;
+  j["verdict"] = verdict_name(d.verdict);
+  j["false_alarm_rate"] = false_alarm_rate;
+  j["adequacy"] = {{"before", to_json(d.before)}, {"after", to_json(d.after)}};
+  j["located"] = list(d.located);
+  j["findings"] = list(d.findings);
+  j["undetectable_here"] = ordered_json::array();
+  j["expected_z"] = ordered_json::object();
+  for (const auto& u : d.undetectable) {
+    j["undetectable_here"].push_back(u.effect);
+    j["expected_z"][u.effect] = u.expected_z;
+  }
+  for (const auto& u : d.detectable) {
+    j["expected_z"][u.effect] = u.expected_z;
+  }
+  j["unexplained"] = d.unexplained;
+  j["rejected"] = list(d.rejected);
+  j["suspected"] = list(d.suspected);
+  j["remaining"] = list(d.remaining);
+  j["data_faults"] = ordered_json::array();
+  for (const auto& f : d.faults) {
+    j["data_faults"].push_back(
+        {{"id", f.id}, {"words", f.words}, {"first_sample", f.first_sample}, {"count", f.count}});
+  }
+  j["base"] = d.calibration.moored ? "moored" : "still";
+  j["parameters"] = ordered_json::array();
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+    j["parameters"].push_back({{"name", p.name},
+                               {"unit", p.unit},
+                               {"value", d.value(k) / p.si_per_unit},
+                               {"sigma", d.sigma(k) / p.si_per_unit},
+                               {"value_without", d.calibration.value(k) / p.si_per_unit},
+                               {"sigma_without", d.calibration.sigma(k) / p.si_per_unit}});
+  }
+  return j;
+}
+
+std::string diagnosis_text(const diagnosis::Diagnosis& d) {
+  std::string text = fmt::format("verdict: {}\n", verdict_name(d.verdict));
+  for (const auto& f : d.faults) {
+    text += fmt::format("data fault: {}: {} (first: sample {})\n", f.id, f.words, f.first_sample);
+  }
+  text += fmt::format("before: NIS {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n", d.before.nis,
+                      d.before.largest_sigma, d.before.log_p_white / std::log(10.0));
+  text += fmt::format("after:  NIS {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n", d.after.nis,
+                      d.after.largest_sigma, d.after.log_p_white / std::log(10.0));
+  if (!d.located.empty() && !d.before.accepted) {
+    text += "where:\n";
+    for (std::size_t k = 0; k < std::min<std::size_t>(5, d.located.size()); ++k) {
+      text += fmt::format("  {:.1f} sigma  {}\n", d.located[k].significance, d.located[k].words);
+    }
+  }
+  if (!d.findings.empty()) {
+    text += "left out:\n";
+    for (const Finding& f : d.findings) {
+      text += text_of(f);
+    }
+    double largest = 0.0;
+    int at = 0;
+    for (int k = 0; k < sensor_parameter_count; ++k) {
+      const double moved = std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k);
+      if (moved > largest) {
+        largest = moved;
+        at = k;
+      }
+    }
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(at)];
+    text += fmt::format("largest error of the 24 by the omission: {} by {:.3g} {} ({:.1f} sigma)\n", p.name,
+                        (d.calibration.value(at) - d.value(at)) / p.si_per_unit, p.unit, largest);
+  }
+  if (d.unexplained) {
+    text += "not explained by anything in the catalogue; what remains:\n";
+    for (std::size_t k = 0; k < std::min<std::size_t>(5, d.remaining.size()); ++k) {
+      text += fmt::format("  {:.1f} sigma  {}\n", d.remaining[k].significance, d.remaining[k].words);
+    }
+    for (const Finding& f : d.rejected) {
+      text += fmt::format("  the best fitting name, rejected by what remains: {} ({:.1f} sigma)\n", f.effect,
+                          f.significance);
+    }
+  }
+  for (const Finding& f : d.suspected) {
+    text += fmt::format("too weak to name: {} ({:.1f} sigma corrected); it would show with: {}\n", f.effect,
+                        f.significance, f.experiment);
+  }
+  if (!d.undetectable.empty()) {
+    text += "not detectable here at typical size:";
+    for (const auto& u : d.undetectable) {
+      text += fmt::format(" {} ({:.1f} sigma)", u.effect, u.expected_z);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string physics_text(const diagnosis::Diagnosis& d) {
+  std::string text = "# Physics that a diagnosis found left out; sim_ins and selfcal simulate load it.\n";
+  for (const Finding& f : d.findings) {
+    text += fmt::format("\n[[effect]]\nid = \"{}\"\n", f.effect);
+    for (const auto& p : f.parameters) {
+      const bool constant = p.name == "tau" && p.unit == "s";
+      text += fmt::format("{} = {:.8g}   # {} +- {:.2g}\n", constant ? "tau_s" : p.name, p.value, p.unit, p.sigma);
+    }
+  }
+  return text;
+}
+
+}  // namespace selfcal::cli
