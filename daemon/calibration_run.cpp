@@ -147,7 +147,9 @@ void CalibrationRun::perform(Action action) {
   if (action == Action::recover_link && progress_.link_up) {
     progress_.link_up = false;
     lost_at_ = context_.timers.now();
-    warn(fmt::format("link lost while {}: {}", words(record_.state), link_trouble_));
+    const std::string text = fmt::format("link lost while {}: {}", words(record_.state), link_trouble_);
+    // Before the first answer there is no link to lose: that nobody answers is the run's reason, if it stays so.
+    record_.serial.empty() ? remember("link", text) : warn(text);
   }
   task_ = run_step(action);
   task_.start();
@@ -204,7 +206,8 @@ void CalibrationRun::conclude() {
   context_.estimators.cancel();
   finish_recording();
   if (record_.state == State::refused) {
-    record_.reason = fmt::format("not written: {}", fmt::join(objections_, "; "));
+    record_.reason = fmt::format("not written: {}", objections_.front());
+    if (objections_.size() > 1) record_.reason += fmt::format("; and {} more objections", objections_.size() - 1);
   }
   if (!storage_lost_) {
     if (auto stored = context_.store.update_run(record_); !stored) {
