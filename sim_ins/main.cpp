@@ -18,7 +18,7 @@ namespace {
 volatile int stop_requested = 0;
 
 struct Arguments {
-  std::string config, key, flash, truth, physics;
+  std::string config, key, flash, truth, physics, scenario;
   std::uint64_t seed = 1;
   std::vector<std::string> faults;
   std::uint32_t arbitration_rate = 1'000'000, data_rate = 5'000'000;
@@ -99,6 +99,7 @@ void configure(CLI::App& app, Arguments& a) {
   app.add_option("--flash", a.flash, "file that holds the FLASH; without it nothing outlives the process");
   app.add_option("--truth", a.truth, "write the true sensor errors to this JSON file");
   app.add_option("--physics", a.physics, "concealed physics, TOML");
+  app.add_option("--scenario", a.scenario, "faults by time, TOML (see sim_ins/README.md)");
   app.add_option("--speed", node.speed, "INS seconds per second")->check(CLI::Range(0.01, 1e5))->capture_default_str();
   app.add_flag("--fd", node.fd, "CAN FD with bit rate switch");
   app.add_option("--bit-rate", a.arbitration_rate, "bit/s")->capture_default_str();
@@ -138,6 +139,14 @@ Expected<int> run(Arguments& a) {
     if (const auto taken = take_fault(fault, a.node, faults); !taken) {
       return tl::unexpected(taken.error());
     }
+  }
+  if (!a.scenario.empty()) {
+    auto scenario = read_scenario(a.scenario);
+    if (!scenario) {
+      return tl::unexpected(scenario.error());
+    }
+    a.node.scenario = *scenario;
+    faults.scenario = std::move(*scenario);
   }
   auto flash = FlashMemory::open(a.flash, flash_bytes);
   if (!flash) {

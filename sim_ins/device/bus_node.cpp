@@ -69,7 +69,14 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       server_(transport_options(options), uds::ServerTimings{}, diagnostics_),
       socket_(std::move(socket)),
       bus_(options.rates),
-      random_(options.seed, fault_stream) {}
+      random_(options.seed, fault_stream),
+      faulty_(options.scenario) {
+  for (const Fault& fault : options.scenario.faults) {
+    if (fault.kind == FaultKind::reset) {
+      options_.reset_at_s = fault.at_s;
+    }
+  }
+}
 
 Time BusNode::ins_time() const {
   return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_));
@@ -114,7 +121,7 @@ void BusNode::receive(Time now) {
       }
       bus_.transmit(received.frame, ins_time());
       tester_heard_ = now;
-      if (instrument_.ready()) {   // nobody listens while the INS starts
+      if (instrument_.ready() && !acts(FaultKind::bus_off)) {   // nobody listens while the INS starts
         server_.on_frame(received.frame, now);
       }
     }
@@ -127,6 +134,11 @@ void BusNode::advance_clock(Time now) {
   const bool testers_turn = transaction() && !more_to_send_ && now - tester_heard_ < patience;
   if (!testers_turn) {
     now_s_ += std::min(options_.speed * real_step, transaction() ? longest_step_in_upload_s : longest_step_s);
+  }
+  if (const Fault* refusal = options_.scenario.active(FaultKind::nrc, now_s_)) {
+    diagnostics_.answer_all_with(static_cast<uds::Nrc>(static_cast<std::uint8_t>(refusal->value)));
+  } else {
+    diagnostics_.answer_all_with(options_.diagnostics.answer_all_with);
   }
   diagnostics_.set_instrument_time(now_s_);
   instrument_.advance(now_s_);
@@ -144,6 +156,12 @@ void BusNode::queue_status() {
   next_status_s_ = now_s_ + std::max(status_interval_s, least_real_interval_s * options_.speed);
   ins::Status status = instrument_.status();
   status.unlocked = diagnostics_.unlocked();
+  if (acts(FaultKind::late_status)) {
+    return;
+  }
+  if (acts(FaultKind::wrong_status)) {
+    status.state = ins::State::idle;
+  }
   status_frames_ = {ins::encode_state_frame(status, alive_, options_.status_id),
                     ins::encode_gimbal_frame(status, alive_, options_.status_id + 1)};
   for (can::CanFrame& frame : status_frames_) {
@@ -154,6 +172,13 @@ void BusNode::queue_status() {
 
 // Frames as the faulty bus passes them on. False where the kernel's queue is full or the link is gone.
 bool BusNode::put_on_bus(std::span<const can::CanFrame> frames) {
+  if (!options_.scenario.faults.empty()) {
+    spoilt_.clear();
+    for (const can::CanFrame& frame : frames) {
+      faulty_.pass(frame, now_s_, spoilt_);
+    }
+    return send_all(spoilt_);
+  }
   std::array<can::CanFrame, 2 * frames_per_call> passed;
   std::size_t count = 0;
   const FrameFaults& faults = options_.frame_faults;
@@ -172,20 +197,42 @@ bool BusNode::put_on_bus(std::span<const can::CanFrame> frames) {
       ++count;
     }
   }
+  return send_all(std::span(passed).first(count));
+}
+
+bool BusNode::send_all(std::span<const can::CanFrame> frames) {
   std::size_t done = 0;
-  while (socket_ && done < count) {
-    const auto sent = socket_->send(std::span(passed).subspan(done, count - done));
+  while (socket_ && done < frames.size()) {
+    const auto sent = socket_->send(frames.subspan(done));
     if (!sent) {
       lose_link(sent.error());
       return false;
     }
     done += *sent;
-    if (done < count) {   // the queue is full: wait for the kernel, the INS's clock stands meanwhile
+    if (done < frames.size()) {   // the queue is full: wait for the kernel, the INS's clock stands meanwhile
       pollfd waiting{socket_->fd(), POLLOUT, 0};
       ::poll(&waiting, 1, 1);
     }
   }
   return socket_.has_value();
+}
+
+// Somebody else who asks for the serial number; the INS cannot tell the two apart.
+void BusNode::hear_second_tester(Time now) {
+  const Fault* intruder = options_.scenario.active(FaultKind::second_tester, now_s_);
+  if (intruder == nullptr || intruder->value <= 0.0 || now_s_ < next_intrusion_s_ || !socket_) {
+    return;
+  }
+  next_intrusion_s_ = now_s_ + 1.0 / intruder->value;
+  can::CanFrame request;
+  request.id = options_.request_id;
+  request.extended = options_.extended_ids;
+  request.size = 8;
+  request.data = {0x03, 0x22, 0xF1, 0x8C};
+  bus_.transmit(request, ins_time());
+  if (send_all({&request, 1}) && instrument_.ready()) {
+    server_.on_frame(request, now);
+  }
 }
 
 // What the bus can carry up to now: a frame starts when the one before has ended.
@@ -195,6 +242,16 @@ void BusNode::transmit(Time now) {
     return;
   }
   const Time until = ins_time();
+  if (!options_.scenario.faults.empty()) {
+    spoilt_.clear();
+    faulty_.flush(now_s_, spoilt_);
+    for (const can::CanFrame& frame : spoilt_) {
+      bus_.transmit(frame, until);
+    }
+    if (!send_all(spoilt_)) {
+      return;
+    }
+  }
   for (const can::CanFrame& frame : status_frames_) {
     bus_.transmit(frame, until);
   }
@@ -258,6 +315,7 @@ void BusNode::run(const volatile int& stop) {
     server_.run_session_timer(diagnostics_.session_timer_wanted(), now);
     server_.on_time(now);
     advance_clock(now);
+    hear_second_tester(now);
     queue_status();
     transmit(now);
     tell_progress();

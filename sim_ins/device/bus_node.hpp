@@ -12,6 +12,7 @@
 #include "protocol/uds/server.hpp"
 #include "sim_ins/device/diagnostics.hpp"
 #include "sim_ins/device/instrument.hpp"
+#include "sim_ins/device/scenario.hpp"
 #include "sim_ins/random.hpp"
 
 namespace selfcal::sim {
@@ -34,6 +35,7 @@ struct NodeOptions {
   can::BitRates rates;
   double speed = 1.0;                    // INS seconds per second
   FrameFaults frame_faults;
+  Scenario scenario;                     // faults of the bus, of status and answers, by time
   std::optional<double> reset_at_s;      // INS time of one spontaneous reset
   std::uint64_t seed = 1;
   DiagnosticOptions diagnostics;
@@ -56,6 +58,9 @@ class BusNode {
   void advance_clock(Time now);
   void transmit(Time now);
   bool put_on_bus(std::span<const can::CanFrame> frames);
+  bool send_all(std::span<const can::CanFrame> frames);
+  bool acts(FaultKind kind) const { return options_.scenario.active(kind, now_s_) != nullptr; }
+  void hear_second_tester(Time now);
   void queue_status();
   void tell_progress();
   bool transaction() const { return diagnostics_.uploading(); }
@@ -69,6 +74,9 @@ class BusNode {
   std::optional<can::Socket> socket_;
   can::BusClock bus_;
   Random random_;
+  FaultyBus faulty_;
+  std::vector<can::CanFrame> spoilt_;   // kept for its storage
+  double next_intrusion_s_ = 0.0;
 
   double now_s_ = 0.0;              // INS time
   Time real_before_{0};

@@ -27,6 +27,7 @@ class Diagnostics : public uds::RequestHandler {
   void session_expired(Time now) override;
 
   void power_on(Time now);                            // default session, locked
+  void answer_all_with(std::optional<uds::Nrc> nrc) { options_.answer_all_with = nrc; }
   void set_instrument_time(double now_s) { now_s_ = now_s; }
   bool unlocked() const { return unlocked_; }
   bool session_timer_wanted() const { return session_ != uds::Session::standard; }

@@ -57,7 +57,7 @@ Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config
                                                          const InstrumentFaults& faults) {
   std::unique_ptr<Instrument> instrument(new Instrument(config, seed, physics, std::move(flash), faults));
   // Proves configuration and physics before anybody relies on them.
-  if (auto imu = instrument->make_imu({{GimbalPosition{}}, {1.0}, 5.0}); !imu) {
+  if (auto imu = instrument->make_imu({{GimbalPosition{}}, {1.0}, 5.0}, {}); !imu) {
     return tl::unexpected(imu.error());
   }
   ins::Coefficients factory;
@@ -66,9 +66,11 @@ Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config
   return instrument;
 }
 
-Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& schedule) const {
+Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& schedule,
+                                                             const Scenario& scenario) const {
   Random random(seed_, gimbal_stream);
-  auto imu = ImuSimulator::create(config_, plan_gimbal(config_.gimbal, schedule, random), seed_, physics_);
+  const GimbalMotion planned = plan_gimbal(config_.gimbal, schedule, random);
+  auto imu = ImuSimulator::create(config_, spoil_gimbal(scenario, planned), seed_, physics_);
   if (!imu) {
     return tl::unexpected(imu.error());
   }
@@ -108,7 +110,7 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
     return fail(ErrorKind::device, "no schedule");
   }
   const Schedule schedule = as_schedule(*schedule_);
-  auto imu = make_imu(schedule);
+  auto imu = make_imu(schedule, faults_wanted_.scenario);
   if (!imu) {
     return tl::unexpected(imu.error());
   }
@@ -124,6 +126,7 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   }
   page_ = {};
   stopped_at_s_.reset();
+  gimbal_noticed_s_ = gimbal_failure_time(faults_wanted_.scenario, schedule);
   faults_ = 0;
   state_ = ins::State::rotating;
   return {};
@@ -160,6 +163,9 @@ void Instrument::flush_page(bool last) {
 }
 
 void Instrument::apply_faults(ImuSample& sample, double t) {
+  if (spoil_sample(faults_wanted_.scenario, t, last_sample_, sample)) {
+    page_.flags |= flash::page_flag::sensor_saturated;
+  }
   if (faults_wanted_.frozen_after_s && t > *faults_wanted_.frozen_after_s) {
     sample.delta_theta = last_sample_.delta_theta;
     sample.delta_v = last_sample_.delta_v;
@@ -184,7 +190,7 @@ void Instrument::take_sample() {
     flush_page(samples_ == samples_wanted_);
   }
   const auto& stuck = faults_wanted_.stuck_after_s;
-  if (stuck && t > *stuck + stuck_noticed_after_s) {
+  if ((stuck && t > *stuck + stuck_noticed_after_s) || (gimbal_noticed_s_ && t > *gimbal_noticed_s_)) {
     faults_ |= ins::fault::gimbal;
     finish_rotation(ins::State::failed);
   } else if (samples_ == samples_wanted_) {
@@ -210,7 +216,7 @@ Expected<void> Instrument::start_navigation_check(const ins::NavigationCheckRequ
     return fail(ErrorKind::device, fmt::format("state {}", ins::name(state_)));
   }
   const Schedule still{{GimbalPosition{}}, {static_cast<double>(request.duration_s)}, 5.0};
-  auto imu = make_imu(still);
+  auto imu = make_imu(still, {});
   if (!imu) {
     return tl::unexpected(imu.error());
   }

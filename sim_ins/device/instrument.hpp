@@ -12,6 +12,7 @@
 #include "protocol/ins_interface/status.hpp"
 #include "sim_ins/config.hpp"
 #include "sim_ins/device/navigation.hpp"
+#include "sim_ins/device/scenario.hpp"
 #include "sim_ins/device/stores.hpp"
 #include "sim_ins/imu_simulator.hpp"
 #include "sim_ins/physics.hpp"
@@ -23,6 +24,7 @@ struct InstrumentFaults {
   std::optional<double> stuck_after_s;        // the gimbal stands still from then on; the INS notices and fails
   std::optional<double> frozen_after_s;       // the IMU repeats its last increments
   std::optional<double> saturated_after_s;    // the accelerometers read full scale
+  Scenario scenario;                          // gimbal and sensor faults of it
   std::optional<std::uint32_t> spoilt_page;   // its first upload comes with a flipped bit
 };
 
@@ -71,7 +73,8 @@ class Instrument {
   void flush_page(bool last);
   void finish_rotation(ins::State state);
   void navigate_until(double now_s);
-  [[nodiscard]] Expected<std::unique_ptr<ImuSimulator>> make_imu(const Schedule& schedule) const;
+  [[nodiscard]] Expected<std::unique_ptr<ImuSimulator>> make_imu(const Schedule& schedule,
+                                                                 const Scenario& scenario) const;
 
   SimConfig config_;
   std::uint64_t seed_;
@@ -95,6 +98,7 @@ class Instrument {
   flash::Page page_;
   ImuSample last_sample_;
   std::optional<double> stopped_at_s_;
+  std::optional<double> gimbal_noticed_s_;   // when the INS notices that the gimbal goes wrong, in the rotation
 
   std::unique_ptr<FreeInertialNavigation> navigation_;
   ins::NavigationCheckRecord check_;
