@@ -2,28 +2,12 @@
 
 #include <fmt/format.h>
 
+#include "protocol/toml_file/utf8.hpp"
+
 namespace selfcal {
 namespace {
 
 constexpr std::size_t longest = 256;
-
-// Length of the UTF-8 sequence at the front (RFC 3629), 0 where it is malformed.
-std::size_t utf8_sequence(std::string_view text) {
-  const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
-  const unsigned char first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xC2 && first <= 0xDF ? 2 : first >= 0xE0 && first <= 0xEF ? 3
-                             : first >= 0xF0 && first <= 0xF4 ? 4 : 0;
-  if (length == 0 || length > text.size()) return 0;
-  for (std::size_t k = 1; k < length; ++k) {
-    if ((byte(k) & 0xC0) != 0x80) return 0;
-  }
-  const unsigned char second = byte(1);
-  const bool overlong = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90);
-  const bool surrogate = first == 0xED && second > 0x9F;
-  const bool beyond = first == 0xF4 && second > 0x8F;
-  return overlong || surrogate || beyond ? 0 : length;
-}
 
 }  // namespace
 
@@ -31,16 +15,14 @@ std::optional<std::string> text_fault(std::string_view text) {
   if (text.size() > longest) {
     return fmt::format("{} bytes, at most {} allowed", text.size(), longest);
   }
-  for (std::size_t k = 0; k < text.size();) {
+  for (std::size_t k = 0; k < text.size(); ++k) {
     const auto byte = static_cast<unsigned char>(text[k]);
     if (byte < 0x20 || byte == 0x7F) {
       return fmt::format("control character 0x{:02X} at byte {}", byte, k);
     }
-    const std::size_t length = utf8_sequence(text.substr(k));
-    if (length == 0) {
-      return fmt::format("byte 0x{:02X} at {} is not UTF-8", byte, k);
-    }
-    k += length;
+  }
+  if (const auto place = first_malformed_utf8(text)) {
+    return fmt::format("byte 0x{:02X} at {} is not UTF-8", static_cast<unsigned char>(text[*place]), *place);
   }
   return std::nullopt;
 }

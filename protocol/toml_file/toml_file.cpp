@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "protocol/toml_file/utf8.hpp"
+
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
@@ -18,20 +20,26 @@ struct TomlFile::Document {
 
 namespace {
 
+// Error messages are one line; toml++ quotes what it met, line ends and all.
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  std::replace_if(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  return line;
+}
+
 std::string written(const toml::node& node) {
   std::ostringstream out;
   node.visit([&](const auto& value) { out << value; });
-  std::string text = out.str();
-  std::replace(text.begin(), text.end(), '\n', ' ');
+  const std::string text = one_line(out.str());
   constexpr std::size_t longest = 60;
   return text.size() > longest ? text.substr(0, longest) + "..." : text;
 }
 
 Error error_of(const std::string& name, const toml::node* node, std::string_view key, std::string_view what) {
   if (node == nullptr) {
-    return {ErrorKind::bad_input, fmt::format("{}: {}: {}", name, key, what)};
+    return {ErrorKind::bad_input, fmt::format("{}: {}: {}", name, one_line(key), what)};
   }
-  return {ErrorKind::bad_input, fmt::format("{}:{}: {}: {}", name, node->source().begin.line, key, what)};
+  return {ErrorKind::bad_input, fmt::format("{}:{}: {}: {}", name, node->source().begin.line, one_line(key), what)};
 }
 
 Expected<double> number_of(const std::string& name, const toml::node& node, std::string_view key) {
@@ -45,6 +53,52 @@ Expected<double> number_of(const std::string& name, const toml::node& node, std:
   return value;
 }
 
+// Behind the string or comment that begins at `at`; the end of the text where it is not closed.
+std::size_t past_string_or_comment(std::string_view text, std::size_t at) {
+  const char quote = text[at];
+  if (quote == '#') {
+    return std::min(text.find('\n', at), text.size());
+  }
+  const std::string_view rest = text.substr(at);
+  const bool many_lines = rest.size() > 2 && rest[1] == quote && rest[2] == quote;
+  const std::size_t quotes = many_lines ? 3 : 1;
+  const std::string closing(quotes, quote);
+  for (std::size_t k = at + quotes; k < text.size(); ++k) {
+    if (text[k] == '\\' && quote == '"') {
+      ++k;
+    } else if (text.substr(k, quotes) == closing) {
+      return k + quotes;
+    } else if (text[k] == '\n' && !many_lines) {
+      return k;
+    }
+  }
+  return text.size();
+}
+
+// A quote in the midst of a number or a name opens nothing.
+bool opens_string(std::string_view text, std::size_t at) {
+  constexpr std::string_view before = " \t\r\n=[{,.";
+  return (text[at] == '"' || text[at] == '\'') && (at == 0 || before.find(text[at - 1]) != std::string_view::npos);
+}
+
+// The first byte that is not UTF-8, or not ASCII where TOML wants ASCII. It must not reach toml++ 3.3, whose
+// tables of Unicode white space take some of it for impossible (undefined behaviour, found by fuzzing).
+std::optional<std::size_t> first_unreadable(std::string_view text) {
+  if (const auto malformed = first_malformed_utf8(text)) {
+    return malformed;
+  }
+  for (std::size_t k = 0; k < text.size();) {
+    if (text[k] == '#' || opens_string(text, k)) {
+      k = past_string_or_comment(text, k);
+    } else if (static_cast<unsigned char>(text[k]) >= 0x80) {
+      return k;
+    } else {
+      ++k;
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 TomlFile::TomlFile(std::unique_ptr<Document> document) : document_(std::move(document)) {}
@@ -53,11 +107,17 @@ TomlFile& TomlFile::operator=(TomlFile&&) noexcept = default;
 TomlFile::~TomlFile() = default;
 
 Expected<TomlFile> TomlFile::parse(std::string_view text, std::string name) {
+  if (const auto place = first_unreadable(text)) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*place), '\n');
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}:{}: byte 0x{:02X} is not UTF-8, or outside a string and a comment", name, line,
+                            static_cast<unsigned char>(text[*place])));
+  }
   toml::parse_result parsed = toml::parse(text, std::string_view{name});
   if (!parsed) {
     const toml::parse_error& error = parsed.error();
     return fail(ErrorKind::bad_input,
-                fmt::format("{}:{}: {}", name, error.source().begin.line, error.description()));
+                fmt::format("{}:{}: {}", name, error.source().begin.line, one_line(error.description())));
   }
   return TomlFile(std::make_unique<Document>(Document{std::move(name), std::move(parsed).table()}));
 }
