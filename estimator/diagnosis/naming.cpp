@@ -183,6 +183,48 @@ void Naming::relinearise() {
   }
 }
 
+// Takes the constant to the top of the likelihood: a parabola through the gain over its logarithm, on a grid that
+// closes in.
+void Naming::refine_constant(Chosen& chosen) {
+  if (std::isnan(chosen.candidate.constant) || chosen.candidate.effect->sensor == nullptr) {
+    return;
+  }
+  constexpr int steps = 3;   // to either side
+  for (const double step : {0.2, 0.04}) {
+    std::vector<Candidate> grid;
+    for (int k = -steps; k <= steps; ++k) {
+      grid.push_back({chosen.candidate.effect, chosen.candidate.constant * std::exp(k * step), 0, 0});
+    }
+    const std::size_t own = grid.size();
+    for (const Chosen& c : chosen_) {
+      if (&c != &chosen) {
+        grid.push_back(c.candidate);
+      }
+    }
+    SignaturePass pass(context_, grid, false);
+    const SignatureRows rows = pass.run(input_);
+    Evidence evidence(rows);
+    std::vector<int> others;
+    for (std::size_t i = own; i < grid.size(); ++i) {
+      const std::vector<int> columns = columns_of(pass.candidates()[i]);
+      others.insert(others.end(), columns.begin(), columns.end());
+    }
+    std::vector<double> gain;
+    for (std::size_t i = 0; i < own; ++i) {
+      gain.push_back(test_group(evidence, columns_of(pass.candidates()[i]), others).gain);
+    }
+    const auto top = std::max_element(gain.begin(), gain.end()) - gain.begin();
+    const auto middle = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(top, 1, 2 * steps - 1));
+    const double curvature = gain[middle - 1] - 2.0 * gain[middle] + gain[middle + 1];
+    const double slope = 0.5 * (gain[middle + 1] - gain[middle - 1]);
+    const double offset = curvature < 0.0 ? std::clamp(-slope / curvature, -1.0, 1.0) : 0.0;
+    chosen.candidate.constant = grid[middle].constant * std::exp(offset * step);
+    // gain = -2 log likelihood: sigma^2 = -2 / (second derivative).
+    chosen.constant_sigma = curvature < 0.0 ? chosen.candidate.constant * step * std::sqrt(-2.0 / curvature) : 0.0;
+  }
+  pass_.set_constant(chosen.candidate.first, chosen.candidate.constant);
+}
+
 bool Naming::add_best() {
   const std::vector<int> others = chosen_columns();
   double best = 0.0;
@@ -202,6 +244,7 @@ bool Naming::add_best() {
       winner = &c;
     }
   }
+  const double best_equation = best;
   // A walk has one coefficient, at the edge of its range (half a chi-squared), on one of six axes.
   const WalkTest* walker = nullptr;
   std::vector<WalkTest> tests;
@@ -220,12 +263,25 @@ bool Naming::add_best() {
   if (best > log_threshold_) {
     return false;
   }
+  // A walk can follow any slow curve. It is taken where it beats every equation by far; an equation whose constant is
+  // still on its grid gets the benefit.
+  constexpr double equation_share = 0.85;
+  if (walker != nullptr && winner != nullptr && best_equation < equation_share * best) {
+    walker = nullptr;
+  }
   if (walker != nullptr) {
     walks_.push_back(*walker);
     evidence_.absorb(walker->columns, walker->covariance);
     refit();
   } else {
-    chosen_.push_back({*winner, {}, {}, 0.0, 0.0, 0, 0.0, {}});
+    chosen_.emplace_back();
+    chosen_.back().candidate = *winner;
+    refine_constant(chosen_.back());
+    rows_ = pass_.run(input_);
+    evidence_ = Evidence(rows_);
+    if (!applied_columns_.empty()) {
+      evidence_.restore(applied_columns_, applied_);
+    }
     relinearise();
   }
   return true;

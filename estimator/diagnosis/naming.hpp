@@ -12,6 +12,7 @@ namespace selfcal::diagnosis {
 
 struct Chosen {
   Candidate candidate;                 // columns as in the naming's candidates
+  double constant_sigma = 0.0;         // of the candidate's constant, from the curvature of the likelihood
   Eigen::VectorXd size;                // fitted, in typical sizes
   Eigen::MatrixXd covariance;
   double log_p = 0.0;                  // given the others, corrected for variants and effects
@@ -58,6 +59,7 @@ class Naming {
   std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
   void refit();
   void relinearise();
+  void refine_constant(Chosen& chosen);
   bool add_best();
   bool drop_weak();
   bool exchange();

@@ -227,6 +227,12 @@ SignaturePass::SignaturePass(const RecordingContext& context, std::vector<Candid
   }
 }
 
+void SignaturePass::set_constant(int first, double constant) {
+  for (Candidate& candidate : candidates_) {
+    candidate.constant = candidate.first == first ? constant : candidate.constant;
+  }
+}
+
 SignatureRows SignaturePass::run(const PassInput& input) {
   SignatureRows rows;
   BlockSignatures signatures(*context_, candidates_, map_, effect_columns_);

@@ -53,6 +53,8 @@ class SignaturePass {
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
   const std::vector<LocatedColumn>& map() const { return map_; }
+  // Another value of the constant of the candidate whose columns begin at `first`.
+  void set_constant(int first, double constant);
   int first_map_column() const { return effect_columns_; }
   int count() const { return effect_columns_ + static_cast<int>(map_.size()); }
 
