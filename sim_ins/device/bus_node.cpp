@@ -19,7 +19,7 @@ constexpr double status_interval_s = 0.2;              // INS time, but
 constexpr double least_real_interval_s = 0.005;        // never more often than this in real time
 // Largest steps of the INS's clock in one turn of the loop. During an upload small ones, so that frames go out as a
 // real bus would carry them, however fast the clock is asked to run.
-constexpr double longest_step_s = 0.25;
+constexpr double longest_step_s = 2.0;
 constexpr double longest_step_in_upload_s = 0.02;
 // During an upload, while it is the tester's turn, the clock stands: a tester in compressed time is not charged its
 // own run time a hundredfold. But not for longer than this, should it have gone.
