@@ -126,7 +126,39 @@ CommandRun configure_history(CLI::App& app) {
   return online(options, history);
 }
 
+// Sound, or what is wrong with it (status 1).
+Expected<int> check_database(ManagerClient& manager, const Options& options) {
+  const auto complaint = manager.check_database();
+  if (!complaint) return tl::unexpected(complaint.error());
+  if (options.json) {
+    fmt::print("{}\n", nlohmann::json{{"sound", complaint->empty()}, {"complaint", *complaint}}.dump());
+  } else {
+    fmt::print("{}\n", complaint->empty() ? "the database is sound" : *complaint);
+  }
+  return complaint->empty() ? 0 : 1;
+}
+
+Expected<int> backup_database(ManagerClient& manager, const Options& options) {
+  const auto path = manager.backup_database(options.name);
+  if (!path) return tl::unexpected(path.error());
+  fmt::print("{}\n", options.json ? nlohmann::json{{"path", *path}}.dump() : *path);
+  return 0;
+}
+
+CommandRun configure_database(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.require_subcommand(1);
+  auto* check = app.add_subcommand("check", "integrity, and rows that belong to no run");
+  auto* backup = app.add_subcommand("backup", "copy the database while the daemon uses it");
+  backup->add_option("NAME", options->name, "name of the copy, in the state directory's folder backups")->required();
+  app.add_flag("--json", options->json, "as JSON");
+  const CommandRun run_check = online(options, check_database);
+  const CommandRun run_backup = online(options, backup_database);
+  return [=] { return check->parsed() ? run_check() : run_backup(); };
+}
+
 const CommandRegistration registrations[] = {
+    {{"db", "check or back up the daemon's database", configure_database}},
     {{"status", "what each INS is doing", configure_status}},
     {{"abort", "stop a run safely", configure_abort}},
     {{"show", "the story and the result of a run", configure_show}},
