@@ -56,7 +56,9 @@ void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
     zeros.words = number("%.0f samples have zero velocity increments", static_cast<double>(zeros.count));
     faults.push_back(zeros);
   }
-  if (excess > 5.0 * std::sqrt(2.0 * chance + 1.0)) {   // difference of two counts, 5 sigma
+  // Difference of two counts, 5 sigma; on a moving base neighbours are alike a little more often than that.
+  constexpr double moving_excess = 40.0;
+  if (excess > std::max(moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0))) {
     repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
                            static_cast<double>(repeats.count), chance);
     faults.push_back(repeats);

@@ -284,10 +284,14 @@ void Diagnoser::decide(const Naming& naming) {
       d_.suspected.push_back(f);
     }
   }
-  d_.mismatch = !d_.findings.empty() || d_.unexplained || !d_.faults.empty();
+  // A moored base moves, and the calibration models it: sway that is found once more is no mismatch.
+  const bool only_motion = d_.calibration.moored &&
+                           std::all_of(d_.findings.begin(), d_.findings.end(),
+                                       [](const Finding& f) { return f.effect == "base_sway"; });
+  d_.mismatch = (!d_.findings.empty() && !only_motion) || d_.unexplained || !d_.faults.empty();
   if (!d_.faults.empty()) {
     d_.verdict = DiagnosisVerdict::data_fault;
-  } else if (!d_.findings.empty()) {
+  } else if (!d_.findings.empty() && !only_motion) {
     d_.verdict = DiagnosisVerdict::named;
   } else if (d_.unexplained) {
     d_.verdict = DiagnosisVerdict::none_of_the_above;
