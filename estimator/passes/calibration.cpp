@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
-#include "estimator/models/motion_fit.hpp"
 #include "estimator/models/segments.hpp"
 #include "estimator/models/sensor_noise.hpp"
 #include "estimator/navigation/coarse_alignment.hpp"
 #include "estimator/passes/consistency.hpp"
+#include "estimator/passes/motion_fit.hpp"
 #include "estimator/passes/pass.hpp"
 
 namespace selfcal {

@@ -1,4 +1,4 @@
-#include "estimator/models/motion_fit.hpp"
+#include "estimator/passes/motion_fit.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
