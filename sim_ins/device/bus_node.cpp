@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +21,7 @@ constexpr double least_real_interval_s = 0.005;        // never more often than 
 // Largest steps of the INS's clock in one turn of the loop. During an upload small ones, so that frames go out as a
 // real bus would carry them, however fast the clock is asked to run.
 constexpr double longest_step_s = 2.0;
-constexpr double longest_step_in_upload_s = 0.02;
+constexpr double longest_step_in_upload_s = 0.025;
 // During an upload, while it is the tester's turn, the clock stands: a tester in compressed time is not charged its
 // own run time a hundredfold. But not for longer than this, should it have gone.
 constexpr Time patience = 200ms;
@@ -131,6 +132,7 @@ void BusNode::receive(Time now) {
 void BusNode::advance_clock(Time now) {
   const double real_step = seconds(now - real_before_);
   real_before_ = now;
+  step_began_ = ins_time();
   const bool testers_turn = transaction() && !more_to_send_ && now - tester_heard_ < patience;
   if (!testers_turn) {
     now_s_ += std::min(options_.speed * real_step, transaction() ? longest_step_in_upload_s : longest_step_s);
@@ -265,8 +267,8 @@ void BusNode::transmit(Time now) {
     const std::size_t offered = server_.pending(frames, now);
     std::size_t fits = 0;
     while (fits < offered && bus_.free_at() <= until) {
-      // Offered since the bus was free, or since this turn's step began.
-      bus_.transmit(frames[fits], std::max(bus_.free_at(), until - 1ms));
+      // Waiting since the bus was free, or since the clock's last step began.
+      bus_.transmit(frames[fits], std::max(bus_.free_at(), step_began_));
       ++fits;
     }
     if (fits > 0 && !put_on_bus(std::span(frames).first(fits))) {
@@ -327,6 +329,9 @@ void BusNode::run(const volatile int& stop) {
       reset(now);
     }
     pollfd waiting{socket_ ? socket_->fd() : -1, POLLIN, 0};
+    if (more_to_send_) {
+      ::sched_yield();   // on one processor the tester takes what it was sent, instead of the queue filling up
+    }
     ::poll(&waiting, 1, more_to_send_ ? 0 : 1);
   }
 }

@@ -79,6 +79,7 @@ class BusNode {
   double next_intrusion_s_ = 0.0;
 
   double now_s_ = 0.0;              // INS time
+  Time step_began_{0};              // INS time before its last step
   Time real_before_{0};
   Time tester_heard_{0};            // real time of its last frame
   Time retry_at_{0};
