@@ -11,12 +11,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "bench"))
 import bench  # noqa: E402
 import witness  # noqa: E402
 
-# Where numbers do not matter: four positions, 40 s of the INS's clock at 50 Hz.
+# Where numbers do not matter: four positions, 75 s of the INS's clock at 50 Hz; the
+# estimator refuses less than 60 s.
 SHORT_SCHEDULE = """positions = [[0, 0], [90, 0], [90, 90], [0, 90]]
-dwell_s = 6.0
+dwell_s = 15.0
 rotation_s = 5.0
 """
-SHORT_S = 4 * 6.0 + 3 * 5.0
+SHORT_S = 4 * 15.0 + 3 * 5.0
 
 DONE, ANSWER_IS_NO, USAGE, BAD_INPUT, DEVICE_TROUBLE = 0, 1, 2, 3, 4
 
