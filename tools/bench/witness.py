@@ -70,9 +70,18 @@ def read_did(interface, did, seconds=5.0):
             return answer[3:]
 
 
-def coefficients_in_force(interface):
-    """(version, {name: value in the interfaces' unit})."""
-    record = read_did(interface, COEFFICIENTS_IN_FORCE)
+def coefficients_in_force(interface, patience_s=20.0):
+    """(version, {name: value in the interfaces' unit}). Asks again for a while: an INS that starts, or whose bus has
+    just come back, does not answer yet."""
+    give_up = time.monotonic() + patience_s
+    while True:
+        try:
+            record = read_did(interface, COEFFICIENTS_IN_FORCE, seconds=1.0)
+            break
+        except (Silence, OSError):
+            if time.monotonic() > give_up:
+                raise
+            time.sleep(0.2)
     if len(record) != 260 or record[:4] != b"SCCO":
         raise Silence(f"a coefficient record of {len(record)} bytes that begins with {record[:4].hex()}")
     version, = struct.unpack(">I", record[8:12])
