@@ -80,8 +80,8 @@ class Bench:
 
     # --- programs --------------------------------------------------------------------------------------------
     def _spawn(self, name, arguments):
-        log = open(self.folder / f"{name}.log", "ab")
-        return subprocess.Popen([str(a) for a in arguments], stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        with open(self.folder / f"{name}.log", "ab") as log:
+            return subprocess.Popen([str(a) for a in arguments], stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
     def log(self, name):
         return (self.folder / f"{name}.log").read_text(encoding="utf-8", errors="replace")
