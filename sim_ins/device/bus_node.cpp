@@ -71,13 +71,7 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       socket_(std::move(socket)),
       bus_(options.rates),
       random_(options.seed, fault_stream),
-      faulty_(options.scenario) {
-  for (const Fault& fault : options.scenario.faults) {
-    if (fault.kind == FaultKind::reset) {
-      options_.reset_at_s = fault.at_s;
-    }
-  }
-}
+      faulty_(options.scenario) {}
 
 Time BusNode::ins_time() const {
   return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_));
@@ -144,11 +138,32 @@ void BusNode::advance_clock(Time now) {
   }
   diagnostics_.set_instrument_time(now_s_);
   instrument_.advance(now_s_);
-  if (options_.reset_at_s && now_s_ >= *options_.reset_at_s) {
-    options_.reset_at_s.reset();
-    fmt::print(stderr, "sim_ins: reset on demand at {:.3f} s\n", now_s_);
-    reset(now);
+  note_state();
+  reset_on_demand(now);
+}
+
+void BusNode::note_state() {
+  options_.scenario.note_state(instrument_.state(), now_s_);
+  faulty_.note_state(instrument_.state(), now_s_);
+}
+
+// Each reset of the scenario happens once.
+void BusNode::reset_on_demand(Time now) {
+  std::vector<Fault>& faults = options_.scenario.faults;
+  const auto due = std::find_if(faults.begin(), faults.end(), [this](const Fault& fault) {
+    return fault.kind == FaultKind::reset && !fault.state && now_s_ >= fault.at_s;
+  });
+  const bool wanted = options_.reset_at_s && now_s_ >= *options_.reset_at_s;
+  if (due == faults.end() && !wanted) {
+    return;
   }
+  if (due != faults.end()) {
+    faults.erase(due);
+  } else {
+    options_.reset_at_s.reset();
+  }
+  fmt::print(stderr, "sim_ins: reset on demand at {:.3f} s, {}\n", now_s_, ins::name(instrument_.state()));
+  reset(now);
 }
 
 void BusNode::queue_status() {
@@ -334,6 +349,7 @@ void BusNode::run(const volatile int& stop) {
     }
     ::poll(&waiting, 1, more_to_send_ ? 0 : 1);
   }
+  fmt::print(stderr, "sim_ins: switched off at {:.3f} s\n", now_s_);
 }
 
 }  // namespace selfcal::sim

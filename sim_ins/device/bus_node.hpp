@@ -52,6 +52,8 @@ class BusNode {
   BusNode(const NodeOptions& options, Instrument& instrument, can::Socket socket);
 
   void reset(Time now);
+  void note_state();
+  void reset_on_demand(Time now);
   void receive(Time now);
   void lose_link(const Error& why);
   void try_reopen(Time now);

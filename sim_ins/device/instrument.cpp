@@ -122,7 +122,12 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   const std::uint64_t pages = (samples_wanted_ + flash::samples_per_page - 1) / flash::samples_per_page;
   raw_.begin(run_id, static_cast<std::uint32_t>(pages));
   if (faults_wanted_.spoilt_page) {
-    raw_.spoil(*faults_wanted_.spoilt_page);
+    raw_.spoil(*faults_wanted_.spoilt_page, 1);
+  }
+  for (const Fault& fault : faults_wanted_.scenario.faults) {
+    if (fault.kind == FaultKind::spoilt_page) {
+      raw_.spoil(static_cast<std::uint32_t>(fault.value), std::max(1, static_cast<int>(fault.amount)));
+    }
   }
   page_ = {};
   stopped_at_s_.reset();

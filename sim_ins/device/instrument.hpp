@@ -49,6 +49,7 @@ class Instrument {
   [[nodiscard]] Expected<void> start_navigation_check(const ins::NavigationCheckRequest& request, double now_s);
   const ins::NavigationCheckRecord& navigation_check() const { return check_; }
 
+  ins::State state() const { return state_; }
   ins::Status status() const;                        // `unlocked` is the server's to fill
   ins::StateRecord state_record() const;
   ins::RunRecord run_record() const;

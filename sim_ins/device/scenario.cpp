@@ -12,21 +12,45 @@
 namespace selfcal::sim {
 namespace {
 
-constexpr std::array<std::string_view, 19> names{
+constexpr std::array<std::string_view, 20> names{
     "drop", "duplicate", "reorder", "corrupt", "delay", "bus_off", "babble", "reset", "stuck_gimbal", "overshoot",
     "wrong_direction", "saturated_gyro", "saturated_accel", "frozen_gyro", "frozen_accel", "late_status",
-    "wrong_status", "second_tester", "nrc"};
+    "wrong_status", "second_tester", "nrc", "spoilt_page"};
 
 std::optional<FaultKind> kind_of(std::string_view name) {
   const auto found = std::find(names.begin(), names.end(), name);
   return found == names.end() ? std::nullopt : std::optional(static_cast<FaultKind>(found - names.begin()));
 }
 
+std::optional<ins::State> state_of(std::string_view name) {
+  for (int value = 0; value <= static_cast<int>(ins::State::checking); ++value) {
+    const auto state = static_cast<ins::State>(value);
+    if (ins::name(state) == name) {
+      return state;
+    }
+  }
+  return std::nullopt;
+}
+
+// These count from the start of the rotation, or not by time at all.
+bool by_rotation(FaultKind kind) {
+  return (kind >= FaultKind::stuck_gimbal && kind <= FaultKind::frozen_accel) || kind == FaultKind::spoilt_page;
+}
+
 }  // namespace
+
+void Scenario::note_state(ins::State state, double t) {
+  for (Fault& fault : faults) {
+    if (fault.state == state) {
+      fault.at_s += t;
+      fault.state.reset();
+    }
+  }
+}
 
 const Fault* Scenario::active(FaultKind kind, double t) const {
   for (const Fault& fault : faults) {
-    if (fault.kind == kind && t >= fault.at_s && t < fault.at_s + fault.for_s) {
+    if (fault.kind == kind && !fault.state && t >= fault.at_s && t < fault.at_s + fault.for_s) {
       return &fault;
     }
   }
@@ -57,6 +81,15 @@ Expected<Scenario> read_scenario(const std::string& path) {
         return;
       }
       fault.kind = *kind;
+      if (std::string state; table.has("state")) {
+        table.text("state", state);
+        fault.state = state_of(state);
+        if (!fault.state) {
+          table.refuse("state", fmt::format("'{}' is no state of the INS", state));
+        } else if (by_rotation(*kind)) {
+          table.refuse("state", fmt::format("{} counts from the start of the rotation already", name));
+        }
+      }
       scenario.faults.push_back(fault);
     });
   });

@@ -4,6 +4,7 @@
 //   [[fault]]
 //   kind = "drop"           # names in scenario.cpp
 //   at_s = 10.0             # INS time, for for_s seconds
+//   state = "rotating"      # at_s counts from when the INS first gets into this state
 //   probability = 0.01
 #pragma once
 
@@ -15,6 +16,7 @@
 
 #include "protocol/can/frame.hpp"
 #include "protocol/error.hpp"
+#include "protocol/ins_interface/status.hpp"
 #include "sim_ins/gimbal.hpp"
 #include "sim_ins/imu_simulator.hpp"
 #include "sim_ins/random.hpp"
@@ -31,11 +33,13 @@ enum class FaultKind : std::uint8_t {
   late_status, wrong_status,                            // no status frames; state says idle
   second_tester,                                        // somebody else asks for the serial number, `value` times a second
   nrc,                                                  // every request is answered with NRC `value`
+  spoilt_page,                                          // raw page `value` is read out wrong `amount` times (once, if 0)
 };
 
 struct Fault {
   FaultKind kind = FaultKind::drop;
-  double at_s = 0.0;              // from here, INS time: since the rotation began (sensors), else since power-on
+  double at_s = 0.0;              // from here, INS time: since the rotation began (sensors), else since power-on,
+  std::optional<ins::State> state;   // or since the INS first got into this state
   double for_s = 1e12;            // for so long
   double probability = 1.0;
   double value = 0.0;
@@ -47,6 +51,8 @@ struct Scenario {
   std::uint64_t seed = 1;
   std::vector<Fault> faults;
 
+  // The INS is in `state` at t: what waits for that begins to count.
+  void note_state(ins::State state, double t);
   // The first fault of the kind that acts at t.
   const Fault* active(FaultKind kind, double t) const;
 };
@@ -68,6 +74,7 @@ class FaultyBus {
   void pass(const can::CanFrame& frame, double t, std::vector<can::CanFrame>& out);
   // Delayed frames that are due, and babble.
   void flush(double t, std::vector<can::CanFrame>& out);
+  void note_state(ins::State state, double t) { scenario_.note_state(state, t); }
   const Scenario& scenario() const { return scenario_; }
 
  private:

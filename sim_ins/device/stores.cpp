@@ -182,6 +182,15 @@ std::span<const std::uint8_t> RawStore::page(std::uint32_t index) const {
   return flash_.read((raw_ring_first_block + index % raw_ring_pages) * flash_block_bytes, flash_block_bytes);
 }
 
-void RawStore::spoil(std::uint32_t index) { spoilt_ = index; }
+void RawStore::spoil(std::uint32_t index, int times) {
+  spoilt_ = index;
+  spoilt_times_ = times;
+}
+
+void RawStore::mend() {
+  if (--spoilt_times_ <= 0) {
+    spoilt_.reset();
+  }
+}
 
 }  // namespace selfcal::sim

@@ -86,9 +86,10 @@ class RawStore {
   std::uint32_t pages_written() const { return written_; }
   std::uint32_t first_page() const;
   std::span<const std::uint8_t> page(std::uint32_t index) const;
-  void spoil(std::uint32_t index);                       // fault on demand: a byte of the page flips on the next read
+  // Fault on demand: a bit of the page flips in the next `times` readings.
+  void spoil(std::uint32_t index, int times);
   std::optional<std::uint32_t> spoilt() const { return spoilt_; }
-  void mend() { spoilt_.reset(); }
+  void mend();                                           // one reading done
 
  private:
   FlashMemory& flash_;
@@ -96,6 +97,7 @@ class RawStore {
   std::uint64_t samples_ = 0;
   bool complete_ = true;
   std::optional<std::uint32_t> spoilt_;
+  int spoilt_times_ = 0;
 };
 
 }  // namespace selfcal::sim

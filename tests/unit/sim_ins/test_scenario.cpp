@@ -100,6 +100,18 @@ TEST(Scenario, SensorsSaturateAndFreeze) {
   EXPECT_FALSE(spoil_sample(*scenario_of("[[fault]]\nkind='frozen_accel'\nat_s=9\n"), 0.0, before, untouched));
 }
 
+TEST(Scenario, CountsFromTheFirstTimeInAState) {
+  Scenario scenario = *scenario_of("[[fault]]\nkind='bus_off'\nstate='rotating'\nat_s=5\nfor_s=2\n");
+  const auto off = [&](double t) { return scenario.active(FaultKind::bus_off, t) != nullptr; };
+  scenario.note_state(ins::State::idle, 10.0);
+  EXPECT_FALSE(off(6.0) || off(16.0));
+  scenario.note_state(ins::State::rotating, 100.0);
+  scenario.note_state(ins::State::rotating, 103.0);   // still, or again: counted from the first time
+  EXPECT_FALSE(off(104.9));
+  EXPECT_TRUE(off(105.0));
+  EXPECT_FALSE(off(107.0));
+}
+
 TEST(Scenario, FilesNameWhatIsWrong) {
   const auto message = [](const char* text) {
     const auto scenario = scenario_of(text);
@@ -108,6 +120,10 @@ TEST(Scenario, FilesNameWhatIsWrong) {
   EXPECT_THAT(message("[[fault]]\nkind = 'gremlins'\n"), HasSubstr("scenario.toml:2: fault[0].kind: no fault is called 'gremlins'"));
   EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nprobability = 2\n"), HasSubstr("scenario.toml:3: fault[0].probability: 2 is outside [0, 1]"));
   EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nwhen = 2\n"), HasSubstr("scenario.toml:3: fault[0].when: no such key"));
+  EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nstate = 'asleep'\n"),
+              HasSubstr("scenario.toml:3: fault[0].state: 'asleep' is no state of the INS"));
+  EXPECT_THAT(message("[[fault]]\nkind = 'frozen_gyro'\nstate = 'rotating'\n"),
+              HasSubstr("scenario.toml:3: fault[0].state: frozen_gyro counts from the start of the rotation already"));
 }
 
 }  // namespace
