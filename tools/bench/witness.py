@@ -1,5 +1,5 @@
-"""A second opinion on what the INS holds: reads its coefficients over classic CAN with nothing of our C++ code, so
-that a fault common to service and virtual INS does not hide."""
+"""A second opinion on what the INS holds: reads its coefficients over CAN, classic or FD, with nothing of our C++
+code, so that a fault common to service and virtual INS does not hide."""
 import math
 import socket
 import struct
@@ -28,7 +28,7 @@ def _receive(can, end):
     while True:
         can.settimeout(max(0.01, end - time.monotonic()))
         try:
-            frame = can.recv(16)
+            frame = can.recv(72)  # struct canfd_frame; a classic frame is 16 bytes
         except TimeoutError as error:
             raise Silence("no answer") from error
         identifier, length = struct.unpack("=IB", frame[:5])
@@ -44,12 +44,15 @@ def read_did(interface, did, seconds=5.0):
     """ReadDataByIdentifier: the record's bytes."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as can:
         can.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", RESPONSE, 0x1FFFFFFF))
+        can.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
         can.bind((interface,))
         _send(can, [3, 0x22, did >> 8, did & 0xFF])
         end = time.monotonic() + seconds
         while True:
             frame = _receive(can, end)
-            if frame[0] >> 4 == 0:
+            if frame[0] == 0:  # single frame longer than classic CAN can carry
+                answer = frame[2:2 + frame[1]]
+            elif frame[0] >> 4 == 0:
                 answer = frame[1:1 + frame[0]]
             else:
                 length = (frame[0] & 0xF) << 8 | frame[1]
