@@ -159,6 +159,7 @@ void BusNode::reset_on_demand(Time now) {
   }
   if (due != faults.end()) {
     faults.erase(due);
+    faulty_.count(FaultKind::reset);
   } else {
     options_.reset_at_s.reset();
   }
@@ -174,9 +175,11 @@ void BusNode::queue_status() {
   ins::Status status = instrument_.status();
   status.unlocked = diagnostics_.unlocked();
   if (acts(FaultKind::late_status)) {
+    faulty_.count(FaultKind::late_status);
     return;
   }
   if (acts(FaultKind::wrong_status)) {
+    faulty_.count(FaultKind::wrong_status);
     status.state = ins::State::idle;
   }
   status_frames_ = {ins::encode_state_frame(status, alive_, options_.status_id),
@@ -246,6 +249,7 @@ void BusNode::hear_second_tester(Time now) {
   request.extended = options_.extended_ids;
   request.size = 8;
   request.data = {0x03, 0x22, 0xF1, 0x8C};
+  faulty_.count(FaultKind::second_tester);
   bus_.transmit(request, ins_time());
   if (send_all({&request, 1}) && instrument_.ready()) {
     server_.on_frame(request, now);
@@ -349,7 +353,9 @@ void BusNode::run(const volatile int& stop) {
     }
     ::poll(&waiting, 1, more_to_send_ ? 0 : 1);
   }
-  fmt::print(stderr, "sim_ins: switched off at {:.3f} s\n", now_s_);
+  const std::string acted = faulty_.tally();
+  fmt::print(stderr, "sim_ins: switched off at {:.3f} s; faults of the bus that acted: {}\n", now_s_,
+             acted.empty() ? "none" : acted);
 }
 
 }  // namespace selfcal::sim

@@ -12,7 +12,7 @@
 namespace selfcal::sim {
 namespace {
 
-constexpr std::array<std::string_view, 20> names{
+constexpr std::array<std::string_view, fault_kinds> names{
     "drop", "duplicate", "reorder", "corrupt", "delay", "bus_off", "babble", "reset", "stuck_gimbal", "overshoot",
     "wrong_direction", "saturated_gyro", "saturated_accel", "frozen_gyro", "frozen_accel", "late_status",
     "wrong_status", "second_tester", "nrc", "spoilt_page"};
@@ -168,7 +168,21 @@ bool FaultyBus::hits(FaultKind kind, double t, const Fault** fault) {
   if (fault != nullptr) {
     *fault = active;
   }
-  return active != nullptr && random_.uniform() < active->probability;
+  if (active == nullptr || random_.uniform() >= active->probability) {
+    return false;
+  }
+  count(kind);
+  return true;
+}
+
+std::string FaultyBus::tally() const {
+  std::string text;
+  for (std::size_t kind = 0; kind < acted_.size(); ++kind) {
+    if (acted_[kind] > 0) {
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names[kind], acted_[kind]);
+    }
+  }
+  return text;
 }
 
 void FaultyBus::pass(const can::CanFrame& frame, double t, std::vector<can::CanFrame>& out) {
@@ -176,7 +190,11 @@ void FaultyBus::pass(const can::CanFrame& frame, double t, std::vector<can::CanF
     out.push_back(frame);
     return;
   }
-  if (scenario_.active(FaultKind::bus_off, t) != nullptr || hits(FaultKind::drop, t)) {
+  if (scenario_.active(FaultKind::bus_off, t) != nullptr) {
+    count(FaultKind::bus_off);
+    return;
+  }
+  if (hits(FaultKind::drop, t)) {
     return;
   }
   can::CanFrame spoilt = frame;
@@ -218,6 +236,7 @@ void FaultyBus::flush(double t, std::vector<can::CanFrame>& out) {
     noise.id = 0x100;
     noise.size = 8;
     out.push_back(noise);
+    count(FaultKind::babble);
     babbled_until_ += 1.0 / babble->value;
   }
   babbled_until_ = std::max(babbled_until_, t - 1.0);

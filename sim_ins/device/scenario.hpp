@@ -8,6 +8,7 @@
 //   probability = 0.01
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -35,6 +36,8 @@ enum class FaultKind : std::uint8_t {
   nrc,                                                  // every request is answered with NRC `value`
   spoilt_page,                                          // raw page `value` is read out wrong `amount` times (once, if 0)
 };
+
+inline constexpr std::size_t fault_kinds = 20;
 
 struct Fault {
   FaultKind kind = FaultKind::drop;
@@ -76,6 +79,9 @@ class FaultyBus {
   void flush(double t, std::vector<can::CanFrame>& out);
   void note_state(ins::State state, double t) { scenario_.note_state(state, t); }
   const Scenario& scenario() const { return scenario_; }
+  // How often each fault acted: "drop 12, reorder 3"; empty if none did.
+  std::string tally() const;
+  void count(FaultKind kind) { ++acted_[static_cast<std::size_t>(kind)]; }
 
  private:
   struct Held {
@@ -89,6 +95,7 @@ class FaultyBus {
   std::deque<Held> held_;
   std::optional<can::CanFrame> overtaken_;
   double babbled_until_ = 0.0;
+  std::array<std::uint64_t, fault_kinds> acted_{};
 };
 
 }  // namespace selfcal::sim

@@ -56,6 +56,11 @@ TEST(Scenario, DuplicateReorderCorruptDelay) {
   ASSERT_EQ(spoilt.size(), 1U);
   EXPECT_NE(spoilt[0], numbered(0));
 
+  FaultyBus counted(*scenario_of("[[fault]]\nkind='duplicate'\n[[fault]]\nkind='drop'\nprobability=0\n"));
+  std::vector<can::CanFrame> ignored;
+  counted.pass(numbered(1), 0.0, ignored);
+  EXPECT_EQ(counted.tally(), "duplicate 1");
+
   FaultyBus late(*scenario_of("[[fault]]\nkind='delay'\namount=0.5\n"));
   std::vector<can::CanFrame> out;
   late.pass(numbered(7), 1.0, out);
