@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/planning/remedy.hpp"
 
 namespace selfcal {
 
@@ -39,6 +40,8 @@ Expected<CalibrationResult> calibrate_recording(const Recording& recording, cons
   if (!outcome.result) {
     return fail(ErrorKind::bad_input, std::move(outcome.failure.message));
   }
+  CalibrationResult& result = *outcome.result;
+  add_remedies(result.undetermined, result.covariance, installation_of(result, data.site, options.tolerance));
   outcome.result->elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return std::move(*outcome.result);
 }

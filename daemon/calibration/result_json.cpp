@@ -96,7 +96,13 @@ Json undetermined_json(const CalibrationResult& result) {
     for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
       components[std::string(sensor_parameters[k].name)] = direction.direction[static_cast<Eigen::Index>(k)];
     }
+    Json supply = Json::array();
+    for (const SupplyingTurn& turn : direction.supply) {
+      const Json positions = {{turn.from.outer_deg, turn.from.inner_deg}, {turn.to.outer_deg, turn.to.inner_deg}};
+      supply.push_back({{"positions", positions}, {"sigma_in_tolerances", turn.sigma_after}});
+    }
     list.push_back({{"words", direction.words},
+                    {"supply", std::move(supply)},
                     {"sigma_in_tolerances", direction.sigma},
                     {"direction_in_tolerances", std::move(components)}});
   }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/geometry/schedule.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/models/imu_data.hpp"
 #include "estimator/models/sensor_model.hpp"
@@ -75,10 +76,17 @@ struct Consistency {
   std::string words;                  // one or two sentences for people
 };
 
+// Two gimbal positions, dwelt in one after the other, and what they would leave of a direction's sigma.
+struct SupplyingTurn {
+  GimbalPosition from, to;
+  double sigma_after = 0.0;           // in units of the tolerance
+};
+
 // A direction in parameter space that the recording did not fix: unit vector in units of the tolerances.
 struct UndeterminedDirection {
   ParameterVector direction;          // components along value/tolerance
   double sigma = 0.0;                 // in units of the tolerance
+  std::vector<SupplyingTurn> supply;  // positions that would fix it, best first (planning/remedy.hpp fills it)
   std::string words;                  // which parameters move together, and which positions would fix it
 };
 

@@ -25,22 +25,6 @@ std::string format(const char* pattern, auto... values) {
   return text;
 }
 
-// Which turns fix what the direction is made of.
-std::string remedy(const ParameterVector& direction) {
-  const double inner_scale = std::abs(direction(parameter::gyro_scale + 1));
-  const double cross = std::max(std::abs(direction(parameter::accel_misalignment + 1)),
-                                std::abs(direction(parameter::gyro_misalignment + 1)));
-  const double drift = direction.segment<3>(parameter::gyro_drift).cwiseAbs().maxCoeff();
-  if (std::max(inner_scale, cross) > 0.5 && drift < 0.5) {
-    return "turn the inner axis while it lies level (outer at 90: 90/90 to 90/180, 90/270 and back), as the schedule "
-           "'horizontal' does";
-  }
-  if (drift > 0.5) {
-    return "dwell longer: gyro drift falls as one over the root of the time";
-  }
-  return "turn both axes through full circles with the axis concerned up, down and level";
-}
-
 }  // namespace
 
 Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma,
@@ -139,7 +123,6 @@ std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix
                            std::string(sensor_parameters[static_cast<std::size_t>(i)].name);
       }
     }
-    direction.words += "; to fix it, " + remedy(direction.direction);
     found.push_back(direction);
   }
   return found;

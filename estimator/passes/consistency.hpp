@@ -13,7 +13,7 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
 
 std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segments, const PassOutput& pass);
 
-// Directions in parameter space, scaled by the tolerances, whose sigma is above 1.
+// Directions in parameter space, scaled by the tolerances, whose sigma is above 1; without remedies.
 std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix& covariance,
                                                            const ParameterVector& tolerance);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "estimator/passes/consistency.hpp"
+#include "estimator/planning/remedy.hpp"
 #include "estimator/planning/schedule_model.hpp"
 
 namespace selfcal {
@@ -32,6 +33,7 @@ Plan predict(const Schedule& schedule, const Installation& installation) {
     plan.determined[static_cast<std::size_t>(i)] = plan.sigma(i) <= installation.tolerance(i);
   }
   plan.undetermined = undetermined_directions(plan.covariance, installation.tolerance);
+  add_remedies(plan.undetermined, plan.covariance, installation);
   return plan;
 }
 
