@@ -35,6 +35,15 @@ ins::ScheduleRecord schedule_record(const Schedule& schedule) {
   return record;
 }
 
+std::string words_of_faults(std::uint8_t faults) {
+  std::string words;
+  for (const auto& [bit, name] : {std::pair(ins::fault::gimbal, "gimbal"), std::pair(ins::fault::sensor, "sensor"),
+                                  std::pair(ins::fault::flash, "FLASH")}) {
+    if ((faults & bit) != 0) words += fmt::format("{}{}", words.empty() ? ", fault of " : " and ", name);
+  }
+  return words;
+}
+
 // The daemon names each rotation, so that it knows its own again. Never 0: that means none.
 std::uint32_t new_rotation_number() {
   std::random_device device;
@@ -153,6 +162,7 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
   // Status frames from before the start are stale: the first look is a question.
   SteadyTime asked = context_.timers.now() - 2 * status_silence;
   const SteadyTime began = context_.timers.now();
+  int position = progress_.ins.position;   // the last one that it got to
   while (true) {
     const SteadyTime now = context_.timers.now();
     const bool heard = status_at_ > began && now - status_at_ < status_silence;
@@ -160,11 +170,16 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
       if (auto polled = co_await poll_state(); !polled) co_return tl::unexpected(polled.error());
       asked = now;
     }
+    if (progress_.ins.state == ins::State::rotating) {
+      if (progress_.ins.position > 0) position = progress_.ins.position;
+    } else if (auto polled = co_await poll_state(); !polled) {   // what a status frame says is not enough to end a run
+      co_return tl::unexpected(polled.error());
+    }
     if (progress_.ins.state == ins::State::complete) co_return Event::rotation_ended;
     if (progress_.ins.state != ins::State::rotating) {
-      co_return senseless(fmt::format("{}: the rotation ended before its time, at position {} of {}: the INS is {}",
-                                      config_.interface, progress_.ins.position, progress_.positions,
-                                      ins::name(progress_.ins.state)));
+      co_return senseless(fmt::format("{}: the rotation ended before its time, at position {} of {}: the INS is {}{}",
+                                      config_.interface, position, progress_.positions,
+                                      ins::name(progress_.ins.state), words_of_faults(stock_.faults)));
     }
     if (pages_->missing(progress_.ins.pages_written, 1).count > 0) {
       if (auto pulled = co_await pull(progress_.ins.pages_written); !pulled) co_return tl::unexpected(pulled.error());

@@ -128,11 +128,19 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
   ins::NavigationCheckRequest request;
   request.duration_s = static_cast<std::uint32_t>(config_.drift_check_s);
   request.compensation = ins::Slot::a;   // that is: what is in force
+  const auto before = co_await client_.read_state();
+  if (!before) co_return tl::unexpected(before.error());
   auto answer =
       co_await client_.routine(uds::RoutineAction::start, ins::routine::navigation_check, ins::encode(request));
   if (!answer) co_return tl::unexpected(answer.error());
   const SteadyTime end = context_.timers.now() + ins_time(config_.drift_check_s + drift_margin_s) + 5s;
   while (true) {
+    const auto state = co_await client_.read_state();
+    if (!state) co_return tl::unexpected(state.error());
+    if (state->power_cycles != before->power_cycles) {   // the same as a link that was away
+      co_return tl::unexpected<PortError>(PortError{
+          PortError::Kind::link, 0, config_.interface + ": the INS restarted in the middle of its navigation check"});
+    }
     answer = co_await client_.routine(uds::RoutineAction::result, ins::routine::navigation_check, {});
     if (!answer) co_return tl::unexpected(answer.error());
     const auto drift = ins::decode_navigation_result(*answer);

@@ -223,6 +223,26 @@ TEST_F(CalibrationRunTest, AStuckGimbalEndsTheRun) {
   EXPECT_THAT(reason(), HasSubstr("the INS is failed"));
 }
 
+TEST_F(CalibrationRunTest, AStatusFrameAloneDoesNotEndTheRotation) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  for (int k = 0; k < 50; ++k) {   // says idle for 50 s of the rotation's 100
+    timers_.run_until([] { return false; }, 1s);
+    ins_.on_status({.state = ins::State::idle});
+  }
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 1);
+}
+
+TEST_F(CalibrationRunTest, ANavigationCheckThatARestartBrokeOffBeginsAgain) {
+  begin();
+  ASSERT_TRUE(until(State::checking_old));
+  timers_.run_until([] { return false; }, 10s);
+  ins_.power_cycle();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(run_->record().drift_old_m, 500.0);
+}
+
 TEST_F(CalibrationRunTest, CoefficientsThatReadBackWrongAreNotCommitted) {
   ins_.loses_writes = true;
   begin();

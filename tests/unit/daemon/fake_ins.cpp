@@ -19,9 +19,14 @@ FakeIns::FakeIns(Timers& timers) : timers_(timers) {
 
 FakeIns::~FakeIns() { cancel(); }
 
+double FakeIns::check_elapsed() const {
+  return std::chrono::duration<double>(timers_.now() - *check_started_).count();
+}
+
 double FakeIns::since_start() const { return std::chrono::duration<double>(timers_.now() - started_).count(); }
 
 ins::State FakeIns::state() {
+  if (check_started_ && check_elapsed() < check_s) return ins::State::checking;
   if (!turning_) return resting_;
   if (gimbal_sticks && since_start() > rotation_s / 2) return ins::State::failed;
   return since_start() < rotation_s ? ins::State::rotating : ins::State::complete;
@@ -125,10 +130,10 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
       break;
     case ins::routine::navigation_check:
       if (start) check_started_ = timers_.now();
-      if (call->action == uds::RoutineAction::result && check_started_) {
-        const double elapsed = std::chrono::duration<double>(timers_.now() - *check_started_).count();
+      if (call->action == uds::RoutineAction::result) {
+        const double elapsed = check_started_ ? check_elapsed() : 0.0;
         const double drift = in_force().version == 0 ? 500.0 : 50.0;
-        status = ins::encode(ins::NavigationCheckRecord{elapsed >= 30, elapsed, drift, 0, drift});
+        status = ins::encode(ins::NavigationCheckRecord{elapsed >= check_s, elapsed, drift, 0, drift});
       }
       break;
     default: return no(0x31);

@@ -55,7 +55,9 @@ class FakeIns : public InsPort {
   Answer<Bytes> read(std::uint16_t did);
   tl::unexpected<PortError> no(std::uint8_t nrc);
   Bytes page(std::uint32_t number);
+  static constexpr double check_s = 30.0;
   double since_start() const;
+  double check_elapsed() const;
 
   Timers& timers_;
   Timers::Id timer_ = 0;
