@@ -189,6 +189,9 @@ Task<CalibrationRun::Step> CalibrationRun::write_set() {
 Task<CalibrationRun::Step> CalibrationRun::read_back() {
   const auto slot = co_await client_.read_record(ins::did::coefficients_inactive);
   if (!slot) co_return tl::unexpected(slot.error());
+  if (auto stored = context_.store.store_set(record_.id, SetRole::read_back, *slot); !stored) {
+    co_return senseless(stored.error().message);
+  }
   if (*slot != new_set_) co_return senseless(config_.interface + ": the coefficients read back are not those written");
   co_return Event::set_verified;
 }

@@ -3,7 +3,9 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/parameter_trend.hpp"
+#include "daemon/wall_clock.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/ins_interface/coefficients.hpp"
 
 namespace selfcal {
 namespace {
@@ -24,6 +26,8 @@ ordered_json summary(const RunRecord& run) {
       {"kind", run.rollback ? "rollback" : "calibration"},
       {"schedule", run.schedule},
       {"dry_run", run.dry_run},
+      {"stop_when_met", run.stop_when_met},
+      {"early_end_s", figure(run.early_end_s)},
       {"force_reason", run.force_reason},
       {"started_utc", run.started_utc},
       {"ended_utc", run.ended_utc},
@@ -33,6 +37,25 @@ ordered_json summary(const RunRecord& run) {
       {"drift_before_m", figure(run.drift_old_m)},
       {"drift_after_m", figure(run.drift_new_m)},
   };
+}
+
+// A coefficient record as it went over the bus, or null where there is none or it cannot be read.
+Expected<ordered_json> set_document(const RunStore& store, RunId run, SetRole role) {
+  const auto bytes = store.set(run, role);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (!*bytes) return ordered_json();
+  const auto set = ins::decode_coefficients(**bytes);
+  if (!set) return ordered_json();
+  ordered_json parameters = ordered_json::array();
+  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
+    const SensorParameter& parameter = sensor_parameters[i];
+    parameters.push_back(
+        {{"name", parameter.name}, {"unit", parameter.unit}, {"value", set->value[i] / parameter.si_per_unit}});
+  }
+  return ordered_json{{"version", set->version},
+                      {"date_utc", utc_text(set->date_s)},
+                      {"author", set->author},
+                      {"parameters", std::move(parameters)}};
 }
 
 }  // namespace
@@ -45,18 +68,28 @@ Expected<std::string> run_document(const RunStore& store, const RunRecord& run) 
   for (const EventRecord& event : *events) {
     document["events"].push_back({{"utc", event.utc}, {"kind", event.kind}, {"text", event.text}});
   }
+  ordered_json& sets = document["coefficients"];
+  for (const auto& [key, role] : {std::pair{"previous", SetRole::previous}, {"proposed", SetRole::written},
+                                  {"read_back", SetRole::read_back}}) {
+    auto set = set_document(store, run.id, role);
+    if (!set) return tl::unexpected(set.error());
+    sets[key] = std::move(*set);
+  }
+  // What the gate refused, or a dry run found, was proposed and never sent.
+  sets["pushed"] = sets["read_back"].is_null() ? ordered_json() : sets["proposed"];
+  sets["in_force"] = run.state == State::completed && !run.dry_run;
   document["result"] = run.result_json.empty() ? ordered_json() : ordered_json::parse(run.result_json, nullptr, false);
   return document.dump();
 }
 
-Expected<std::string> history_document(const RunStore& store, const std::string& serial) {
+Expected<std::string> history_document(const RunStore& store, const std::string& serial, const Limits& limits) {
   const auto runs = store.runs_of_serial(serial);
   if (!runs) return tl::unexpected(runs.error());
   ordered_json document{{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}};
   for (const RunRecord& run : *runs) document["runs"].push_back(summary(run));
   if (serial.empty()) return document.dump();
   for (int i = 0; i < sensor_parameter_count; ++i) {
-    const auto history = store.parameter_history(serial, i);
+    auto history = store.parameter_history(serial, i);
     if (!history) return tl::unexpected(history.error());
     const SensorParameter& parameter = sensor_parameters[static_cast<std::size_t>(i)];
     ordered_json values = ordered_json::array();
@@ -71,6 +104,15 @@ Expected<std::string> history_document(const RunStore& store, const std::string&
     if (const auto trend = parameter_trend(*history)) {
       entry["change_per_year"] = trend->slope_per_year;
       entry["change_per_year_sigma"] = trend->slope_sigma;
+      entry["ageing"] = trend->ageing;
+    }
+    const double limit = limits[static_cast<std::size_t>(i)].value_or(0.0);
+    entry["limit"] = limit > 0 ? ordered_json(limit) : ordered_json();
+    entry["warnings"] = ordered_json::array();
+    if (!history->empty()) {
+      const ParameterRecord latest = history->back();
+      history->pop_back();
+      entry["warnings"] = trend_warnings(std::string(parameter.name), std::string(parameter.unit), *history, latest, limit);
     }
     document["parameters"].push_back(std::move(entry));
   }

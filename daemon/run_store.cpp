@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 #include "daemon/sqlite.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
@@ -11,9 +13,8 @@ namespace {
 using sqlite::database_error;
 using sqlite::Statement;
 
-constexpr int schema_version = 1;
-
-constexpr const char* schema = R"sql(
+// Step k takes a database from version k to k + 1; version 0 is an empty file.
+constexpr std::array schema_steps{R"sql(
 CREATE TABLE runs(
   id INTEGER PRIMARY KEY AUTOINCREMENT,
   ins TEXT NOT NULL, serial TEXT NOT NULL, ins_software TEXT NOT NULL, state TEXT NOT NULL, user TEXT NOT NULL,
@@ -31,11 +32,17 @@ CREATE TABLE parameters(
   value REAL NOT NULL, sigma REAL NOT NULL, determined INTEGER NOT NULL, PRIMARY KEY(run, name));
 CREATE TABLE coefficient_sets(
   run INTEGER NOT NULL REFERENCES runs(id), role TEXT NOT NULL, bytes BLOB NOT NULL, PRIMARY KEY(run, role));
-)sql";
+)sql",
+                                  R"sql(
+ALTER TABLE runs ADD COLUMN stop_when_met INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE runs ADD COLUMN early_end_s REAL NOT NULL DEFAULT -1;
+)sql"};
+constexpr auto schema_version = static_cast<std::int64_t>(schema_steps.size());
 
 constexpr std::string_view run_columns =
     "id, ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, started_utc, ended_utc, "
-    "software, exit_status, reason, abort_wanted, rotation, recording, result_json, drift_old_m, drift_new_m";
+    "software, exit_status, reason, abort_wanted, rotation, recording, result_json, drift_old_m, drift_new_m, "
+    "stop_when_met, early_end_s";
 
 constexpr const char* final_states = "('completed','refused','failed','aborted')";
 
@@ -74,6 +81,8 @@ RunRecord read_run(Statement& row) {
   run.result_json = row.text();
   run.drift_old_m = row.real();
   run.drift_new_m = row.real();
+  run.stop_when_met = row.integer() != 0;
+  run.early_end_s = row.real();
   return run;
 }
 
@@ -87,7 +96,13 @@ Expected<std::vector<RunRecord>> read_runs(Statement& statement) {
   }
 }
 
-std::string role_name(SetRole role) { return role == SetRole::previous ? "previous" : "written"; }
+std::string role_name(SetRole role) {
+  switch (role) {
+    case SetRole::previous: return "previous";
+    case SetRole::written: return "written";
+    default: return "read_back";
+  }
+}
 
 Expected<void> verify_integrity(sqlite3* database) {
   Statement statement(database, "PRAGMA integrity_check(1)");
@@ -131,10 +146,10 @@ Expected<std::unique_ptr<RunStore>> RunStore::open(const std::filesystem::path& 
     return fail(ErrorKind::device, fmt::format("database {}: schema version {} is newer than this program's {}",
                                                file.string(), *version, schema_version));
   }
-  if (*version == 0) {
-    const std::string create =
-        fmt::format("BEGIN IMMEDIATE; {} PRAGMA user_version={}; COMMIT;", schema, schema_version);
-    if (auto ok = execute(database->get(), create.c_str()); !ok) return tl::unexpected(ok.error());
+  for (auto step = *version; step < schema_version; ++step) {
+    const std::string upgrade = fmt::format("BEGIN IMMEDIATE; {} PRAGMA user_version={}; COMMIT;",
+                                            schema_steps.at(static_cast<std::size_t>(step)), step + 1);
+    if (auto ok = execute(database->get(), upgrade.c_str()); !ok) return tl::unexpected(ok.error());
   }
   return std::unique_ptr<RunStore>(new RunStore(database->release()));
 }
@@ -145,10 +160,11 @@ Expected<RunId> RunStore::create_run(const RunRecord& run) {
   Statement insert(database_,
                    "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
                    "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
-                   "result_json, drift_old_m, drift_new_m) VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1)");
+                   "result_json, drift_old_m, drift_new_m, stop_when_met) "
+                   "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?)");
   insert.bind(run.ins).bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.user);
   insert.bind(run.schedule).bind(std::int64_t{run.dry_run}).bind(run.force_reason).bind(std::int64_t{run.rollback});
-  insert.bind(run.started_utc).bind(run.software);
+  insert.bind(run.started_utc).bind(run.software).bind(std::int64_t{run.stop_when_met});
   if (auto ok = insert.run(); !ok) return tl::unexpected(ok.error());
   return sqlite3_last_insert_rowid(database_);
 }
@@ -156,11 +172,12 @@ Expected<RunId> RunStore::create_run(const RunRecord& run) {
 Expected<void> RunStore::update_run(const RunRecord& run) {
   Statement update(database_,
                    "UPDATE runs SET serial=?, ins_software=?, state=?, ended_utc=?, exit_status=?, reason=?, "
-                   "abort_wanted=?, rotation=?, recording=?, result_json=?, drift_old_m=?, drift_new_m=? WHERE id=?");
+                   "abort_wanted=?, rotation=?, recording=?, result_json=?, drift_old_m=?, drift_new_m=?, "
+                   "early_end_s=? WHERE id=?");
   update.bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.ended_utc);
   update.bind(std::int64_t{run.exit_status}).bind(run.reason).bind(std::int64_t{run.abort_wanted});
   update.bind(std::int64_t{run.rotation}).bind(run.recording).bind(run.result_json);
-  update.bind(run.drift_old_m).bind(run.drift_new_m).bind(run.id);
+  update.bind(run.drift_old_m).bind(run.drift_new_m).bind(run.early_end_s).bind(run.id);
   return update.run();
 }
 

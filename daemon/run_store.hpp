@@ -31,6 +31,7 @@ struct RunRecord {
   bool dry_run = false;
   std::string force_reason;     // empty: not forced
   bool rollback = false;        // writes a former set instead of calibrating
+  bool stop_when_met = false;   // the rotation may end as soon as every tolerance is met
   std::string started_utc, ended_utc;
   std::string software;         // of the daemon
   int exit_status = -1;         // -1: not ended
@@ -40,6 +41,7 @@ struct RunRecord {
   std::string recording;        // path, empty: none (yet, or pruned)
   std::string result_json;      // selfcal estimate --json of the recording
   double drift_old_m = -1.0, drift_new_m = -1.0;   // free-inertial, horizontal; -1: not measured
+  double early_end_s = -1.0;    // of data, where the rotation was ended before its schedule; -1: it was not
 };
 
 struct EventRecord {
@@ -55,7 +57,8 @@ struct ParameterRecord {
   bool determined = false;
 };
 
-enum class SetRole { previous, written };   // found in force before the run; written by it
+// Found in force before the run; written by it; what the INS then gave back, before the commit.
+enum class SetRole { previous, written, read_back };
 
 class RunStore {
  public:

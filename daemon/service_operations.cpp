@@ -149,7 +149,11 @@ Granted<std::string> Service::show(RunId id) {
 }
 
 Granted<std::string> Service::history(const std::string& serial) {
-  auto document = history_document(*store_, serial);
+  const auto runs = store_->runs_of_serial(serial);
+  if (!runs) return unavailable(runs.error());
+  // Limits are those of the place where the INS was calibrated last.
+  const InsConfig* last = runs->empty() ? nullptr : config_.find(runs->back().ins);
+  auto document = history_document(*store_, serial, last == nullptr ? Limits() : last->limit);
   if (!document) return unavailable(document.error());
   return std::move(*document);
 }

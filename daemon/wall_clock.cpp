@@ -10,10 +10,12 @@ std::int64_t utc_now_us() {
       .count();
 }
 
-std::string utc_now() {
-  const std::time_t seconds = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+std::string utc_now() { return utc_text(utc_now_us() / 1000000); }
+
+std::string utc_text(std::int64_t seconds) {
+  const std::time_t time = seconds;
   std::tm parts{};
-  gmtime_r(&seconds, &parts);
+  gmtime_r(&time, &parts);
   char text[32];
   std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
   return text;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -64,6 +65,31 @@ TEST_F(RunStoreTest, ARunIsFoundAgainAfterReopening) {
   EXPECT_EQ(store->runs_of_serial("SN'1")->size(), 1u);
   EXPECT_EQ(store->runs_of_serial("other")->size(), 0u);
   EXPECT_EQ(store->runs_of_serial("")->size(), 1u);
+}
+
+// A database of the first release: what it holds stays, and what it cannot know has the value of its time.
+TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
+  RunRecord run = begun();
+  {
+    auto store = open();
+    run.id = *store->create_run(run);
+  }
+  sqlite3* raw = nullptr;
+  ASSERT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(raw,
+                         "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
+                         "PRAGMA user_version=1",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(raw);
+  auto store = open();
+  const auto found = *store->run(run.id);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->user, "ann");
+  EXPECT_FALSE(found->stop_when_met);
+  EXPECT_EQ(found->early_end_s, -1.0);
+  run.stop_when_met = true;
+  EXPECT_TRUE(store->run(*store->create_run(run)).value()->stop_when_met);
 }
 
 TEST_F(RunStoreTest, NumbersAreNeverUsedTwice) {
