@@ -61,6 +61,7 @@ class PiecePreparation {
 struct Spectrum {
   Eigen::ArrayXd density = Eigen::ArrayXd::Zero(highest_bin - lowest_bin + 1);
   std::size_t pieces = 0;
+  double group_s = 0.0;   // as grouped: whole samples
 };
 
 Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<Segment>& segments,
@@ -75,6 +76,7 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
   }
   const std::size_t stride = std::max<std::size_t>(1, available / most_pieces);
   Spectrum spectrum;
+  spectrum.group_s = static_cast<double>(group) / rate_hz;
   std::size_t piece = 0;
   Eigen::VectorXd rates(piece_length);
   for (const Segment& s : segments) {
@@ -91,9 +93,9 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
           for (std::size_t k = 0; k < group; ++k) {
             sum += increments[first + static_cast<std::size_t>(i) * group + k][axis];
           }
-          rates(i) = sum / (static_cast<double>(group) / rate_hz);
+          rates(i) = sum / spectrum.group_s;
         }
-        spectrum.density += preparation.periodogram(rates, group_s) / 3.0;
+        spectrum.density += preparation.periodogram(rates, spectrum.group_s) / 3.0;
       }
       ++spectrum.pieces;
     }
@@ -106,12 +108,12 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
 
 // density = N^2 + Q^2 * 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
 // A quantum that is carried on (known_angle) leaves quantum^2/12 of white angle; it is then not fitted.
-void fit_density(const Spectrum& spectrum, double group_s, std::optional<double> known_angle, TriadNoise& noise) {
+void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, TriadNoise& noise) {
   const Eigen::Index bins = spectrum.density.size();
   Eigen::ArrayXd shape(bins);
   for (Eigen::Index b = 0; b < bins; ++b) {
     const double sine = std::sin(std::numbers::pi * static_cast<double>(b + lowest_bin) / piece_length);
-    shape(b) = 4.0 * sine * sine / group_s;
+    shape(b) = 4.0 * sine * sine / spectrum.group_s;
   }
   std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
   std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
@@ -229,9 +231,8 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
     return noise;
   }
   const double accel_quantum = noise.accel.quantum;
-  fit_density(accel, fast_group_s,
-              accel_quantum > 0.0 ? std::optional(accel_quantum * accel_quantum / 12.0) : std::nullopt, noise.accel);
-  fit_density(gyro, fast_group_s, std::nullopt, noise.gyro);
+  fit_density(accel, accel_quantum > 0.0 ? std::optional(accel_quantum * accel_quantum / 12.0) : std::nullopt, noise.accel);
+  fit_density(gyro, std::nullopt, noise.gyro);
   // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
   const double expected = noise.accel.white_asd * noise.accel.white_asd;
   noise.base_moves = second_variance(data, segments) > 25.0 * expected;
@@ -239,7 +240,7 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
     const double group_s = slow_group(segments);
     const Spectrum slow = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
     if (slow.pieces >= enough_pieces) {
-      fit_density(slow, group_s, std::nullopt, noise.gyro);
+      fit_density(slow, std::nullopt, noise.gyro);
     }
   }
   return noise;
