@@ -36,7 +36,7 @@ Matrix9 transition(const SiteModel& site, const Vector3& f_n, double length_s, d
   F *= sign * length_s;
   // Horner: I + F (I + F/2 (I + F/3)).
   Matrix9 sum = Matrix9::Identity() + F / 3.0;
-  sum = Matrix9::Identity() + 0.5 * F.lazyProduct(sum);
+  sum = (Matrix9::Identity() + 0.5 * F.lazyProduct(sum)).eval();   // a lazy product must not overwrite its factor
   return Matrix9::Identity() + F.lazyProduct(sum);
 }
 
