@@ -42,7 +42,7 @@ Matrix9 transition(const SiteModel& site, const Vector3& f_n, double length_s, d
 
 ProcessNoise process_noise(const SiteModel& site, double gyro_arw, double accel_vrw, double T, double sign) {
   // phi = sign * int(-C n_g), dv = sign * (int C n_a + int f_n x phi), dp = sign * int dv: the sign patterns of the
-  // cross terms follow (D4).
+  // cross terms follow (D5).
   const double qg = gyro_arw * gyro_arw;
   const double qa = accel_vrw * accel_vrw;
   const Matrix3 S = skew(-site.gravity_n);

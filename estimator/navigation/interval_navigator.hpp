@@ -49,7 +49,7 @@ struct Interval {
 class IntervalNavigator {
  public:
   // C_nb: attitude at the start (forward) or at the end (reverse) of the recording. `data` and `extra` must outlive
-  // the navigator. Without `linearise` only the drive is computed.
+  // the navigator.
   IntervalNavigator(const ImuData& data, const ParameterVector& parameters, const Matrix3& C_nb, double sign,
                     double interval_s, ExtraSignatures* extra = nullptr);
 
