@@ -38,7 +38,8 @@ void add(Derivatives& sum, const std::vector<Settling>& settlings, double t) {
 
 bool BaseMotion::still() const {
   return roll.empty() && pitch.empty() && yaw.empty() && surge.empty() && heave.empty() && sway.empty() &&
-         settling_roll.empty() && settling_pitch.empty() && settling_heave.empty();
+         settling_roll.empty() && settling_pitch.empty() && settling_surge.empty() && settling_heave.empty() &&
+         settling_sway.empty();
 }
 
 BaseMotion moored_base_motion() {
@@ -66,9 +67,11 @@ BaseState base_state(const BaseMotion& motion, const Attitude& mean, double t) {
   add(pitch, motion.settling_pitch, t);
   add(yaw, motion.yaw, t);
   add(surge, motion.surge, t);
+  add(surge, motion.settling_surge, t);
   add(heave, motion.heave, t);
   add(heave, motion.settling_heave, t);
   add(sway, motion.sway, t);
+  add(sway, motion.settling_sway, t);
   state.attitude.roll += roll.value;
   state.attitude.pitch += pitch.value;
   state.attitude.heading += yaw.value;

@@ -24,7 +24,7 @@ struct Settling {
 struct BaseMotion {
   std::vector<Sine> roll, pitch, yaw;
   std::vector<Sine> surge, heave, sway;
-  std::vector<Settling> settling_roll, settling_pitch, settling_heave;
+  std::vector<Settling> settling_roll, settling_pitch, settling_surge, settling_heave, settling_sway;
 
   bool still() const;
 };

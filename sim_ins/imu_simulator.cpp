@@ -45,6 +45,8 @@ void add_base_effect(BaseMotion& base, const PhysicsEffect& effect) {
     base.settling_roll.push_back({v[0], v[3]});
     base.settling_pitch.push_back({v[1], v[3]});
     base.settling_heave.push_back({v[2], v[3]});
+    base.settling_surge.push_back({v[4], v[3]});
+    base.settling_sway.push_back({v[5], v[3]});
   }
 }
 

@@ -51,7 +51,8 @@ constexpr auto accel_temperature =
     join(join(axes("ug/degC", ug), warm_up("ug", ug)), std::array{tau(600.0), reference});
 constexpr auto gyro_ramp = axes("deg/h/h", dph / units::hour);
 constexpr auto accel_ramp = axes("ug/h", ug / units::hour);
-constexpr auto scale_temperature = join(axes("ppm/degC", ppm), std::array{reference});
+constexpr auto scale_temperature =
+    join(join(axes("ppm/degC", ppm), warm_up("ppm", ppm)), std::array{tau(600.0), reference});
 constexpr auto dead_zone = join(axes("deg/h", dph), std::array{P{"width", "deg/h", dph, 5.0},
                                 P{"threshold_x", "deg/h", dph}, P{"threshold_y", "deg/h", dph},
                                 P{"threshold_z", "deg/h", dph}});
@@ -71,7 +72,7 @@ constexpr std::array sway{P{"roll", "deg", units::degree}, P{"pitch", "deg", uni
                           P{"yaw", "deg", units::degree}, P{"surge", "cm", 0.01}, P{"heave", "cm", 0.01},
                           P{"sway", "cm", 0.01}, P{"period_s", "s", 1.0, 8.0}, P{"phase", "deg", units::degree}};
 constexpr std::array settling{P{"roll", "arcsec", arcsec}, P{"pitch", "arcsec", arcsec}, P{"heave", "mm", 1e-3},
-                              tau(300.0)};
+                              tau(300.0), P{"surge", "mm", 1e-3}, P{"sway", "mm", 1e-3}};
 constexpr auto gyro_noise = axes("deg/sqrt(h)", units::degree_per_sqrt_hour);
 constexpr auto accel_noise = axes("ug/sqrt(Hz)", units::micro_g_per_sqrt_hz);
 constexpr auto gyro_walk = axes("deg/h/sqrt(h)", dph / 60.0);     // 60 = sqrt(3600 s)

@@ -49,10 +49,10 @@ void gyro_drift_ramp(Values p, const Context& c, Deviation& d) { d.domega += vec
 void accel_bias_ramp(Values p, const Context& c, Deviation& d) { d.df += vector_at(p, 0) * c.t; }
 
 void gyro_scale_temperature(Values p, const Context& c, Deviation& d) {
-  d.domega += vector_at(p, 0).cwiseProduct(c.omega_ib_b) * (temperature_at(*c.temperature, c.t) - p[3]);
+  d.domega += thermal(p, c).cwiseProduct(c.omega_ib_b);
 }
 void accel_scale_temperature(Values p, const Context& c, Deviation& d) {
-  d.df += vector_at(p, 0).cwiseProduct(c.f_ib_b) * (temperature_at(*c.temperature, c.t) - p[3]);
+  d.df += thermal(p, c).cwiseProduct(c.f_ib_b);
 }
 
 // Smooth lock-in -a tanh(w/width), and the hard threshold: the output stays zero below it and lags above it.

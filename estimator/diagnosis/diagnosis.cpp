@@ -223,6 +223,7 @@ bool Diagnoser::calibrate_still() {
 
 void Diagnoser::name() {
   const RecordingContext context(data_);
+  d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
   PassInput input;
   input.data = &data_;
   input.parameters = d_.calibration.value;
@@ -247,6 +248,7 @@ void Diagnoser::decide(const Naming& naming) {
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
     named.push_back(describe(c, naming.rows()));
+    d_.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
   }
   bool jumps = false;
   for (const WalkTest& w : naming.walks()) {

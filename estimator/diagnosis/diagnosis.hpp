@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "estimator/diagnosis/data_faults.hpp"
+#include "estimator/diagnosis/effect.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/noise_check.hpp"
+#include "estimator/diagnosis/recording_context.hpp"
 #include "estimator/passes/calibration.hpp"
 
 namespace selfcal::diagnosis {
@@ -38,6 +40,14 @@ struct Finding {
   double delta_bic = 0.0;              // fall of the BIC: positive speaks for it
   double held_out_gain = 0.0;          // log-likelihood on dwells and rotations left out in turn
   bool stochastic = false;             // a noise model, not a mean
+};
+
+// One equation of the model that the findings make: for use on other recordings.
+struct ModelEffect {
+  const Effect* effect = nullptr;      // of the catalogue
+  double constant = 0.0;               // NaN: none
+  Eigen::VectorXd size;                // in typical sizes
+  Eigen::MatrixXd covariance;
 };
 
 struct Undetectable {
@@ -68,6 +78,8 @@ struct Diagnosis {
   Adequacy before, after;
   NoiseCheck noise;
   CalibrationResult calibration;       // of the 24 alone
+  std::vector<ModelEffect> model;      // equations among the findings
+  double mean_temperature_c = 0.0;     // of the recording; 0 without a channel
   ParameterVector value;               // of the 24 with the findings fitted too, SI
   ParameterVector sigma;
 };

@@ -22,7 +22,7 @@ struct EffectContext {
   Vector3 rate, force, u;                // means: rad/s, m/s^2, force in g
   Vector3 rate_change;                   // rate at the end less rate at the start: rad/s, zero in dwells
   Matrix3 C_nb;
-  double since_turn_start_s = 0.0;       // part of the stretch that lies in a dwell after a turn, since that turn
+  double since_turn_start_s = 0.0;       // part of the stretch after the end of the first turn, since the last one's
   double since_turn_end_s = 0.0;         // equal: none
   double duration_s = 0.0;               // of the recording
   double temperature = NAN;              // less its mean over the recording, degC; NaN: no channel
@@ -54,7 +54,7 @@ struct Effect {
   bool needs_temperature = false;
 };
 
-// int exp(-s/tau) ds over the part of the stretch that lies in a dwell after a turn; s counts from the turn's end.
+// int exp(-s/tau) ds over the part of the stretch that lies after a turn; s counts from the end of the last turn.
 inline double decay_integral(const EffectContext& c, double tau) {
   return tau * (std::exp(-c.since_turn_start_s / tau) - std::exp(-c.since_turn_end_s / tau));
 }

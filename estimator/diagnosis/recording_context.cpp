@@ -1,18 +1,14 @@
 #include "estimator/diagnosis/recording_context.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace selfcal::diagnosis {
-namespace {
-
-// Field of an axial dipole at the surface, gauss: 0.31 at the equator.
 Vector3 dipole_field(double latitude) {
   constexpr double equator = 0.31;
   return equator * Vector3(std::cos(latitude), -2.0 * std::sin(latitude), 0.0);
 }
-
-}  // namespace
 
 RecordingContext::RecordingContext(const ImuData& data)
     : data_(data),
@@ -67,6 +63,12 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
       c.since_turn_start_s = std::max(block.start_s, s.start_s) - s.start_s;
       c.since_turn_end_s = std::max(std::min(block.end_s, s.end_s) - s.start_s, c.since_turn_start_s);
     }
+  }
+  // What creeps after a turn goes on creeping while the next one is made.
+  const std::size_t here = segment_at(block.start_s);
+  if (segments_[here].rotation && here == segment_at(block.end_s - 1e-9) && here >= 2) {
+    c.since_turn_start_s = block.start_s - segments_[here - 2].end_s;
+    c.since_turn_end_s = block.end_s - segments_[here - 2].end_s;
   }
   if (has_temperature()) {
     double sum = 0.0;

@@ -9,6 +9,9 @@
 
 namespace selfcal::diagnosis {
 
+// Field of an axial dipole at the surface, n, gauss: 0.31 at the equator.
+Vector3 dipole_field(double latitude);
+
 class RecordingContext {
  public:
   // `data` must outlive this.
@@ -20,6 +23,7 @@ class RecordingContext {
 
   const ImuData& data() const { return data_; }
   const std::vector<Segment>& segments() const { return segments_; }
+  double mean_temperature() const { return mean_temperature_; }   // degC, where there is a channel
   bool has_temperature() const { return !data_.temperature.empty(); }
 
  private:

@@ -54,7 +54,8 @@ class BlockSignatures : public ExtraSignatures {
         case LocatedColumn::Kind::dwell: dt = !rotation && m.index == number ? c.dt : 0.0; break;
         case LocatedColumn::Kind::rotation: dt = rotation && m.index == number ? c.dt : 0.0; break;
         case LocatedColumn::Kind::after_turn:
-          dt = std::max(0.0, std::min(c.since_turn_end_s, m.end_s) - std::max(c.since_turn_start_s, m.start_s));
+          dt = std::min(c.since_turn_end_s, m.end_s) - std::max(c.since_turn_start_s, m.start_s);
+          dt = rotation ? 0.0 : std::max(0.0, dt);
           break;
         case LocatedColumn::Kind::time:
           dt = std::max(0.0, std::min(c.end_s, m.end_s) - std::max(c.start_s, m.start_s));

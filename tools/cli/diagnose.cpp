@@ -7,7 +7,10 @@
 
 #include "daemon/calibration/calibrate_recording.hpp"
 #include "estimator/geometry/units.hpp"
+#include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
+#include "protocol/recording/atomic_file.hpp"
+#include "tools/cli/amendment.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/diagnose_output.hpp"
 #include "tools/cli/terminal.hpp"
@@ -18,6 +21,7 @@ namespace {
 struct DiagnoseArguments {
   std::string recording;
   std::string physics;
+  std::string amended;
   bool json = false;
   double false_alarm_rate = 0.01;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
@@ -55,12 +59,17 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     fmt::print("{}", diagnosis_text(*outcome.diagnosis));
   }
   if (!arguments.physics.empty()) {
-    std::FILE* file = std::fopen(arguments.physics.c_str(), "w");
-    if (file == nullptr) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments.physics));
+    const std::string text = physics_text(*outcome.diagnosis, options.assumed, data.site.latitude);
+    if (const auto written = write_file_atomically(arguments.physics, text); !written) {
+      return tl::unexpected(written.error());
     }
-    fmt::print(file, "{}", physics_text(*outcome.diagnosis));
-    std::fclose(file);
+  }
+  if (!arguments.amended.empty()) {
+    const auto written =
+        write_amendment(arguments.amended, *outcome.diagnosis, options.assumed, loaded->recording, data);
+    if (!written) {
+      return tl::unexpected(written.error());
+    }
   }
   return outcome.diagnosis->mismatch ? 1 : 0;
 }
@@ -70,6 +79,8 @@ CommandRun configure(CLI::App& app) {
   app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
   app.add_flag("--json", arguments->json, "one JSON document on standard output");
   app.add_option("--physics", arguments->physics, "write what was named as a physics file for the simulation");
+  app.add_option("--amended", arguments->amended,
+                 "write physics.toml, sim.toml (with the 24 as fitted) and schedule.toml into this folder");
   app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of a whole recording")
       ->check(CLI::Range(1e-6, 0.2))
       ->capture_default_str();

@@ -191,16 +191,4 @@ std::string diagnosis_text(const diagnosis::Diagnosis& d) {
   return text;
 }
 
-std::string physics_text(const diagnosis::Diagnosis& d) {
-  std::string text = "# Physics that a diagnosis found left out; sim_ins and selfcal simulate load it.\n";
-  for (const Finding& f : d.findings) {
-    text += fmt::format("\n[[effect]]\nid = \"{}\"\n", f.effect);
-    for (const auto& p : f.parameters) {
-      const bool constant = p.name == "tau" && p.unit == "s";
-      text += fmt::format("{} = {:.8g}   # {} +- {:.2g}\n", constant ? "tau_s" : p.name, p.value, p.unit, p.sigma);
-    }
-  }
-  return text;
-}
-
 }  // namespace selfcal::cli

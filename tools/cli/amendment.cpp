@@ -1,0 +1,200 @@
+#include "tools/cli/amendment.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "estimator/geometry/units.hpp"
+#include "estimator/models/segments.hpp"
+#include "protocol/recording/atomic_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using diagnosis::Diagnosis;
+using diagnosis::Finding;
+using diagnosis::FindingParameter;
+
+std::string key_value(std::string_view key, double value) { return fmt::format("{} = {:.9g}\n", key, value); }
+std::string effect_head(std::string_view id) { return fmt::format("\n[[effect]]\nid = \"{}\"\n", id); }
+
+// The simulation's base moves along the vehicle, the diagnosis sees it along n.
+std::array<double, 3> along_vehicle(double north, double up, double east, double heading) {
+  return {north * std::cos(heading) + east * std::sin(heading), up,
+          east * std::cos(heading) - north * std::sin(heading)};
+}
+constexpr std::array<const char*, 3> vehicle_axes = {"surge", "heave", "sway"};
+
+std::map<std::string, double> values_of(const Finding& f) {
+  std::map<std::string, double> values;
+  for (const FindingParameter& p : f.parameters) {
+    values[p.name] = p.value;
+  }
+  return values;
+}
+
+std::string settling_text(const Finding& f, double heading) {
+  std::map<std::string, double> v = values_of(f);
+  const std::array<double, 3> moved = along_vehicle(v["north"], v["up"], v["east"], heading);
+  std::string text = effect_head(f.effect);
+  for (std::size_t k = 0; k < 3; ++k) {
+    text += key_value(vehicle_axes[k], moved[k]);
+  }
+  return text + key_value("tau_s", v["tau"]);
+}
+
+// One line of the file for each axis: they have phases of their own.
+std::string sway_text(const Finding& f, double heading) {
+  std::map<std::string, double> v = values_of(f);
+  const std::array<double, 3> sine = along_vehicle(v["north_sin"], v["up_sin"], v["east_sin"], heading);
+  const std::array<double, 3> cosine = along_vehicle(v["north_cos"], v["up_cos"], v["east_cos"], heading);
+  constexpr double mm_per_cm = 10.0;
+  std::string text;
+  for (std::size_t k = 0; k < 3; ++k) {
+    text += effect_head(f.effect) + key_value(vehicle_axes[k], std::hypot(sine[k], cosine[k]) / mm_per_cm) +
+            key_value("period_s", 1.0 / v["frequency"]) +
+            key_value("phase", std::atan2(cosine[k], sine[k]) / units::degree);
+  }
+  return text;
+}
+
+// The simulation adds to the noise of its configuration, which has what was assumed or, if less was found, that.
+std::string noise_text(const Finding& f, const diagnosis::AssumedNoise& assumed) {
+  const double known = f.effect == "gyro_noise_level" ? assumed.gyro_arw / units::degree_per_sqrt_hour
+                                                      : assumed.accel_vrw / units::micro_g_per_sqrt_hz;
+  const double found = f.parameters.front().value;
+  if (found <= known) {
+    return fmt::format("\n# {}: {:.4g} {} where {:.4g} was assumed: stands in the configuration\n", f.effect, found,
+                       f.parameters.front().unit, known);
+  }
+  const double more = std::sqrt(found * found - known * known);
+  return effect_head(f.effect) + key_value("x", more) + key_value("y", more) + key_value("z", more);
+}
+
+std::string quantum_text(const Finding& f) {
+  double gyro = 0.0, accel = 0.0;
+  for (const FindingParameter& p : f.parameters) {
+    double& largest = p.name.starts_with("gyro") ? gyro : accel;
+    largest = std::max(largest, p.value);
+  }
+  return effect_head(f.effect) + key_value("gyro_lsb", gyro) + key_value("accel_lsb", accel);
+}
+
+std::string equation_text(const Finding& f, double mean_temperature_c, double latitude) {
+  const bool thermal = f.effect.ends_with("_temperature");
+  std::string text = effect_head(f.effect);
+  bool measured = false;
+  for (const FindingParameter& p : f.parameters) {
+    std::string key = p.name;
+    double value = p.value;
+    measured = measured || p.unit.ends_with("/degC");
+    if (p.name == "tau" && p.unit == "s") {
+      key = "tau_s";
+    } else if (p.name == "w0") {
+      key = "width";
+      value /= units::degree_per_hour;
+    } else if (thermal && !p.unit.ends_with("/degC")) {
+      key = "warm_up_" + p.name;
+    }
+    text += key_value(key, value);
+  }
+  if (thermal && measured) {
+    text += key_value("reference_c", mean_temperature_c);
+  }
+  if (f.effect == "gyro_magnetic_sensitivity") {   // the field that the coefficients were found with
+    const Vector3 field = diagnosis::dipole_field(latitude);
+    text += key_value("field_north", field(0)) + key_value("field_up", field(1)) + key_value("field_east", field(2));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, double latitude) {
+  std::string text = "# Physics that a diagnosis found left out; sim_ins and selfcal simulate load it.\n";
+  const double heading = d.calibration.initial_attitude.heading;
+  for (const Finding& f : d.findings) {
+    if (f.effect == "base_settling") {
+      text += settling_text(f, heading);
+    } else if (f.effect == "base_sway") {
+      text += sway_text(f, heading);
+    } else if (f.effect == "gyro_noise_level" || f.effect == "accel_noise_level") {
+      text += noise_text(f, assumed);
+    } else if (f.effect == "quantisation") {
+      text += quantum_text(f);
+    } else {
+      text += equation_text(f, d.mean_temperature_c, latitude);
+    }
+  }
+  return text;
+}
+
+std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, const Recording& recording) {
+  const Attitude& attitude = d.calibration.initial_attitude;
+  std::string text = "# What a diagnosis makes of a recording: load it with the physics file beside it.\n";
+  text += fmt::format("serial = \"{}\"\nparameter_set = \"none\"\n", recording.serial);
+  text += key_value("sample_rate_hz", recording.sample_rate_hz);
+  text += "\n[site]\n" + key_value("latitude_deg", recording.latitude_deg) +
+          key_value("longitude_deg", recording.longitude_deg) + key_value("height_m", recording.height_m);
+  text += "\n[attitude]\n" + key_value("roll_deg", attitude.roll / units::degree) +
+          key_value("pitch_deg", attitude.pitch / units::degree) +
+          key_value("heading_deg", attitude.heading / units::degree);
+  text += "\n[noise]\n" +
+          key_value("gyro_arw_deg_per_sqrt_h",
+                    std::min(d.calibration.gyro_arw, assumed.gyro_arw) / units::degree_per_sqrt_hour) +
+          key_value("accel_vrw_ug_per_sqrt_hz",
+                    std::min(d.calibration.accel_vrw, assumed.accel_vrw) / units::micro_g_per_sqrt_hz) +
+          key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
+          key_value("accel_lsb_m_per_s", assumed.accel_quantum);
+  text += "\n[gimbal]\npositioning_error_deg = 0\n";
+  text += "\n[parameters]\n";
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+    text += key_value(p.name, d.value(k) / p.si_per_unit);
+  }
+  return text;
+}
+
+std::string schedule_text(const Recording& recording, const ImuData& data) {
+  Schedule schedule;
+  double turning = 0.0;
+  std::size_t turns = 0;
+  for (const Segment& s : find_segments(data)) {
+    if (s.rotation) {
+      turning += s.end_s - s.start_s;
+      ++turns;
+    } else {
+      schedule.positions.push_back({std::round(s.outer / units::degree), std::round(s.inner / units::degree)});
+      schedule.dwell_s.push_back(s.end_s - s.start_s);
+    }
+  }
+  schedule.rotation_s = turns > 0 ? turning / static_cast<double>(turns) : schedule.rotation_s;
+  const std::size_t stated = recording.schedule_deg.size();
+  if (stated == schedule.positions.size() && recording.dwell_s && recording.rotation_s) {
+    schedule.rotation_s = *recording.rotation_s;
+    for (std::size_t k = 0; k < stated; ++k) {
+      schedule.positions[k] = {recording.schedule_deg[k][0], recording.schedule_deg[k][1]};
+      schedule.dwell_s[k] = *recording.dwell_s;
+    }
+  }
+  return format_schedule(schedule);
+}
+
+Expected<void> write_amendment(const std::filesystem::path& folder, const Diagnosis& d,
+                               const diagnosis::AssumedNoise& assumed, const Recording& recording,
+                               const ImuData& data) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", folder.string(), error.message()));
+  }
+  return write_file_atomically(folder / "physics.toml", physics_text(d, assumed, data.site.latitude))
+      .and_then([&] { return write_file_atomically(folder / "sim.toml", sim_config_text(d, assumed, recording)); })
+      .and_then([&] { return write_file_atomically(folder / "schedule.toml", schedule_text(recording, data)); });
+}
+
+}  // namespace selfcal::cli

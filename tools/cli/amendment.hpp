@@ -1,0 +1,30 @@
+// What a diagnosis found, as files that the simulation loads: physics, configuration, schedule.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "protocol/error.hpp"
+#include "protocol/recording/recording.hpp"
+
+namespace selfcal::cli {
+
+// Physics file (sim_ins/physics.hpp) with what was named, in the simulation's names and units. What such a file cannot
+// hold becomes a comment.
+std::string physics_text(const diagnosis::Diagnosis& diagnosis, const diagnosis::AssumedNoise& assumed,
+                         double latitude);
+
+// sim.toml: site, attitude, rate, noise, and the 24 as fitted together with the physics.
+std::string sim_config_text(const diagnosis::Diagnosis& diagnosis, const diagnosis::AssumedNoise& assumed,
+                            const Recording& recording);
+
+// The schedule that the recording followed: its own attributes, else what the gimbal read-outs show.
+std::string schedule_text(const Recording& recording, const ImuData& data);
+
+// physics.toml, sim.toml and schedule.toml in `folder`, which is made where it is not there.
+Expected<void> write_amendment(const std::filesystem::path& folder, const diagnosis::Diagnosis& diagnosis,
+                               const diagnosis::AssumedNoise& assumed, const Recording& recording,
+                               const ImuData& data);
+
+}  // namespace selfcal::cli
