@@ -1,8 +1,10 @@
 #include "daemon/bus_connection.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/epoll.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
@@ -24,12 +26,17 @@ Expected<std::unique_ptr<sdbus::IConnection>> open_bus(const std::string& config
 
 BusPump::BusPump(EventLoop& loop, sdbus::IConnection& connection, std::function<void()> on_lost)
     : loop_(loop), connection_(connection), on_lost_(std::move(on_lost)) {
-  const auto poll = connection_.getEventLoopPollData();
-  io_ = std::make_unique<EventLoop::Io>(loop_, poll.fd, EPOLLIN, [this](unsigned) { serve(); });
+  // A duplicate: sd-bus closes its descriptor as soon as the bus is gone, while the loop still watches it.
+  fd_ = ::fcntl(connection_.getEventLoopPollData().fd, F_DUPFD_CLOEXEC, 0);
+  io_ = std::make_unique<EventLoop::Io>(loop_, fd_, EPOLLIN, [this](unsigned) { serve(); });
   serve();
 }
 
-BusPump::~BusPump() { loop_.cancel(timer_); }
+BusPump::~BusPump() {
+  loop_.cancel(timer_);
+  io_.reset();
+  ::close(fd_);
+}
 
 void BusPump::serve() {
   if (lost_) return;

@@ -25,6 +25,7 @@ class BusPump {
   EventLoop& loop_;
   sdbus::IConnection& connection_;
   std::function<void()> on_lost_;
+  int fd_ = -1;
   std::unique_ptr<EventLoop::Io> io_;
   Timers::Id timer_ = 0;
   bool lost_ = false;

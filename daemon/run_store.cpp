@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "daemon/sqlite.hpp"
@@ -108,8 +109,9 @@ Expected<void> verify_integrity(sqlite3* database) {
   Statement statement(database, "PRAGMA integrity_check(1)");
   const auto row = statement.step();
   if (!row) return tl::unexpected(row.error());
-  const std::string verdict = statement.text();
+  std::string verdict = statement.text();
   if (verdict == "ok") return {};
+  std::replace(verdict.begin(), verdict.end(), '\n', ' ');   // an error is one line
   return fail(ErrorKind::device, fmt::format("database {}: damaged: {}; restore a backup (selfcal db restore)",
                                              sqlite3_db_filename(database, "main"), verdict));
 }

@@ -5,8 +5,8 @@ import subprocess
 import time
 import unittest
 
-import bench
 import case
+from case import bench
 
 
 class Operators(case.OnBench):
