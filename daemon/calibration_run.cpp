@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/estimate_job.hpp"
 #include "daemon/journal.hpp"
 #include "daemon/wall_clock.hpp"
 
@@ -14,15 +15,6 @@ constexpr auto report_interval = 200ms;
 
 journal::Fields journal_fields(const RunRecord& run) {
   return {run.id, run.ins, run.serial, std::string(name(run.state)), -1};
-}
-
-int exit_status(State state, int failure) {
-  switch (state) {
-    case State::completed: return 0;
-    case State::refused:
-    case State::aborted: return 1;
-    default: return failure;
-  }
 }
 
 }  // namespace
@@ -39,6 +31,10 @@ CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule sc
   progress_.run = record_.id;
   progress_.state = record_.state;
   progress_.positions = static_cast<int>(schedule_.positions.size());
+  const ParameterVector tolerance = calibration_options(config_).tolerance;
+  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
+    progress_.tolerance[i] = tolerance(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
+  }
   context_.port.on_status = [this](const ins::Status& status) { on_status(status); };
 }
 
@@ -95,11 +91,7 @@ void CalibrationRun::fire(Event event) {
   if (row == nullptr) return;   // late: the state it belongs to has been left
   const State from = record_.state;
   record_.state = row->next;
-  if (is_final(row->next)) {
-    record_.ended_utc = utc_now();
-    record_.exit_status = exit_status(row->next, failure_status_);
-    if (row->next == State::completed && !record_.abort_wanted) record_.reason.clear();
-  }
+  if (is_final(row->next)) close_record();
   if (auto stored = context_.store.update_run(record_); !stored) {
     if (!storage_lost_) return storage_failed(stored.error(), from);
   } else if (row->next != from) {
@@ -168,6 +160,7 @@ Task<CalibrationRun::Step> CalibrationRun::step(Action action) {
     case Action::write_schedule: return write_schedule();
     case Action::start_rotation: return start_rotation();
     case Action::follow_rotation: return follow_rotation();
+    case Action::end_rotation_early: return end_rotation_early();
     case Action::pull_last_pages: return pull_last_pages();
     case Action::measure_drift_old: return measure_drift(&RunRecord::drift_old_m);
     case Action::measure_drift_new: return measure_drift(&RunRecord::drift_new_m);
@@ -204,16 +197,9 @@ void CalibrationRun::fail_with(const std::string& reason, ErrorKind kind) {
 void CalibrationRun::conclude() {
   task_ = {};
   context_.estimators.cancel();
-  finish_recording();
-  if (record_.state == State::refused) {
-    record_.reason = fmt::format("not written: {}", objections_.front());
-    if (objections_.size() > 1) record_.reason += fmt::format("; and {} more objections", objections_.size() - 1);
-  }
-  if (!storage_lost_) {
-    if (auto stored = context_.store.update_run(record_); !stored) {
-      journal::write(journal::Level::error, stored.error().message, journal_fields(record_));
-    }
-  }
+  // Of no use any more: the recording is kept, or the run will not be resumed.
+  pages_.reset();
+  drop_pages(folder_);
   const bool well = record_.state == State::completed;
   journal::Fields fields = journal_fields(record_);
   fields.nrc = last_nrc_;
@@ -249,6 +235,7 @@ void CalibrationRun::report_progress(bool at_once) {
 void CalibrationRun::on_status(const ins::Status& status) {
   status_at_ = context_.timers.now();
   progress_.ins = status;
+  foresee_finish();
   report_progress();
 }
 

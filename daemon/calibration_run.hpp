@@ -31,7 +31,12 @@ struct RunProgress {
   int pass = 0;
   double pass_fraction = 0.0;
   bool estimate_known = false;
-  std::array<double, sensor_parameter_count> value{}, sigma{};   // in the unit of sensor_parameters
+  std::array<double, sensor_parameter_count> value{}, sigma{}, tolerance{};   // in the unit of sensor_parameters
+  int tolerances_met = 0;              // parameters whose sigma is below its tolerance
+  bool running = false;                // the estimate is one of data that still come
+  double data_s = 0.0;                 // then: it is made of so much
+  double met_at_s = -1.0;              // and every tolerance is foreseen to be met so far into the schedule; -1: not
+  double finish_in_s = -1.0;           // until the rotation ends, on the operator's clock; -1: it does not turn
   bool link_up = true;
   std::uint64_t lost_frames = 0;
 };
@@ -95,6 +100,7 @@ class CalibrationRun {
   Task<Step> write_schedule();
   Task<Step> start_rotation();
   Task<Step> follow_rotation();
+  Task<Step> end_rotation_early();
   Task<Step> pull_last_pages();
   Task<Step> measure_drift(double RunRecord::*figure);
   Task<Step> erase_inactive_slot();
@@ -112,16 +118,22 @@ class CalibrationRun {
   Task<Answer<Done>> poll_state();
   Task<Answer<Done>> open_pages();
   Task<Answer<Done>> pull(std::uint32_t end);  // what is missing below `end`, once
+  Task<Answer<Done>> bring_to_rest();
   Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
   void note_bad_page(std::uint32_t page, const std::string& why);
   void estimate();
   void judge();
+  void estimate_meanwhile();
+  void on_running_estimate(const Expected<RunningEstimate>& answer);
+  bool may_end_early() const;
+  void show_estimate(const ParameterVector& value, const ParameterVector& sigma);
+  void foresee_finish();
   void on_estimate_progress(const CalibrationProgress& progress);
   void on_estimate(Expected<Estimate> answer);
   Expected<void> store_result();
   Expected<void> make_new_set();
   void warn_of_history(const RunStore::Parameters& parameters);
-  void finish_recording();
+  void close_record();
 
   RunContext context_;
   InsConfig config_;
@@ -141,6 +153,14 @@ class CalibrationRun {
   std::optional<Estimate> estimate_;
   std::vector<std::string> objections_;
   ins::StateRecord stock_;                    // the INS as it was found after recovery
+  std::shared_ptr<RunningEstimator> running_estimator_;
+  std::optional<RunningEstimate> running_;
+  bool running_busy_ = false;
+  double running_begun_s_ = 0.0;              // of data, when the last one was begun
+  SteadyTime running_begun_at_{};
+  SteadyTime running_not_before_{};
+  double page_s_ = 0.0;                       // of data in a full page
+  bool out_of_reach_said_ = false;
   Bytes in_force_;                            // coefficient records, as on the bus
   Bytes new_set_;
   SteadyTime lost_at_{};

@@ -130,6 +130,7 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
                                     directory->run_id, record_.rotation));
   }
   progress_.pages_expected = directory->pages_expected;
+  if (record_.early_end_s >= 0) record_.early_end_s = static_cast<double>(directory->samples) / format->sample_rate_hz;
   progress_.ins.pages_written = directory->pages_written;
   context.format = *format;
   context.site = *site;
@@ -141,6 +142,7 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
     pages_ = std::move(*pages);
   }
   progress_.pages_pulled = pages_->count();
+  page_s_ = format->samples_per_page / format->sample_rate_hz;
   co_return Done{};
 }
 
@@ -181,6 +183,8 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
                                       config_.interface, position, progress_.positions,
                                       ins::name(progress_.ins.state), words_of_faults(stock_.faults)));
     }
+    estimate_meanwhile();
+    if (may_end_early()) co_return Event::tolerances_met;
     if (pages_->missing(progress_.ins.pages_written, 1).count > 0) {
       if (auto pulled = co_await pull(progress_.ins.pages_written); !pulled) co_return tl::unexpected(pulled.error());
     } else {
@@ -241,16 +245,18 @@ Task<Answer<Done>> CalibrationRun::await_state(ins::State unwanted, double limit
   }
 }
 
-Task<CalibrationRun::Step> CalibrationRun::stop_gimbal() {
+Task<Answer<Done>> CalibrationRun::bring_to_rest() {
   if (auto state = co_await client_.read_state(); !state) {
     co_return tl::unexpected(state.error());
   } else if (state->state == ins::State::rotating) {
     const auto stopped = co_await client_.routine(uds::RoutineAction::stop, ins::routine::self_calibration, {});
     if (!stopped) co_return tl::unexpected(stopped.error());
   }
-  if (auto still = co_await await_state(ins::State::rotating, stop_limit_s, "the gimbal turns still"); !still) {
-    co_return tl::unexpected(still.error());
-  }
+  co_return co_await await_state(ins::State::rotating, stop_limit_s, "the gimbal turns still");
+}
+
+Task<CalibrationRun::Step> CalibrationRun::stop_gimbal() {
+  if (auto rests = co_await bring_to_rest(); !rests) co_return tl::unexpected(rests.error());
   co_return Event::gimbal_stopped;
 }
 

@@ -23,10 +23,20 @@ tl::unexpected<PortError> senseless(std::string message) {
   return tl::unexpected<PortError>(PortError{PortError::Kind::protocol, 0, std::move(message)});
 }
 
+int exit_status(State state, int failure) {
+  switch (state) {
+    case State::completed: return 0;
+    case State::refused:
+    case State::aborted: return 1;
+    default: return failure;
+  }
+}
+
 }  // namespace
 
 void CalibrationRun::estimate() {
   task_ = {};
+  running_busy_ = false;   // what still runs is dropped
   context_.estimators.start(
       estimate_job({folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_}),
       [this](const CalibrationProgress& progress) { on_estimate_progress(progress); },
@@ -36,11 +46,8 @@ void CalibrationRun::estimate() {
 void CalibrationRun::on_estimate_progress(const CalibrationProgress& progress) {
   progress_.pass = progress.pass;
   progress_.pass_fraction = progress.fraction;
-  progress_.estimate_known = true;
-  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    progress_.value[i] = progress.value(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
-    progress_.sigma[i] = progress.sigma(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
-  }
+  progress_.running = false;
+  show_estimate(progress.value, progress.sigma);
   report_progress();
 }
 
@@ -78,9 +85,7 @@ Expected<void> CalibrationRun::store_result() {
     parameters.sigma[i] = estimate_->result.sigma(index) / sensor_parameters[i].si_per_unit;
     parameters.determined[i] = estimate_->result.determined[i];
   }
-  progress_.value = parameters.value;
-  progress_.sigma = parameters.sigma;
-  progress_.estimate_known = true;
+  show_estimate(estimate_->result.value, estimate_->result.sigma);
   warn_of_history(parameters);
   record_.recording = estimate_->recording;
   record_.result_json = estimate_->result_json;
@@ -237,14 +242,19 @@ Task<CalibrationRun::Step> CalibrationRun::read_in_force() {
   co_return Event::set_confirmed;
 }
 
-// The pages are of no use once their recording is kept, or the run will not be resumed.
-void CalibrationRun::finish_recording() {
-  pages_.reset();
+// All that is to be known of a run that ends now, so that its last state is stored together with it.
+void CalibrationRun::close_record() {
+  record_.ended_utc = utc_now();
+  record_.exit_status = exit_status(record_.state, failure_status_);
   std::error_code ignored;
   if (record_.recording.empty() && std::filesystem::exists(recording_path(folder_), ignored)) {
     record_.recording = recording_path(folder_).string();
   }
-  std::filesystem::remove(page_path(folder_), ignored);
+  if (record_.state == State::completed && !record_.abort_wanted) record_.reason.clear();
+  if (record_.state == State::refused) {
+    record_.reason = fmt::format("not written: {}", objections_.front());
+    if (objections_.size() > 1) record_.reason += fmt::format("; and {} more objections", objections_.size() - 1);
+  }
 }
 
 }  // namespace selfcal

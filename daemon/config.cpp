@@ -116,6 +116,7 @@ const std::vector<Key<InsConfig>>& ins_keys() {
       number("rotation_s", &InsConfig::rotation_s, 1.0, 600.0),
       number("request_timeout_s", &InsConfig::request_timeout_s, 0.01, 60.0),
       number("lost_after_s", &InsConfig::lost_after_s, 0.1, 3600.0),
+      number("running_estimate_s", &InsConfig::running_estimate_s, 0.0, 3600.0),
       number("drift_check_s", &InsConfig::drift_check_s, 0.0, 7200.0),
       number("time_scale", &InsConfig::time_scale, 0.1, 10000.0),
       number("latitude_deg", &InsConfig::latitude_deg, -90.0, 90.0),

@@ -28,6 +28,7 @@ struct InsConfig {
   double rotation_s = 5.0;
   double request_timeout_s = 1.0;   // P2 client
   double lost_after_s = 30.0;       // link lost for longer: the run fails
+  double running_estimate_s = 60.0; // estimate anew while turning, after so much data more; 0: only at the end
   double drift_check_s = 300.0;     // free-inertial drift before and after; 0: not measured
   double time_scale = 1.0;          // the INS's clock runs so many times faster (virtual INS only)
   double latitude_deg = 0.0, longitude_deg = 0.0, height_m = 0.0;

@@ -1,38 +1,18 @@
 // From the pages in a run's folder to the answer: what the estimator's thread does.
 #pragma once
 
-#include <filesystem>
 #include <string>
+#include <vector>
 
-#include "daemon/config.hpp"
 #include "daemon/estimate_worker.hpp"
-#include "estimator/geometry/schedule.hpp"
-#include "protocol/ins_interface/records.hpp"
-#include "protocol/recording/recording.hpp"
+#include "daemon/page_recording.hpp"
 
 namespace selfcal {
 
-// What the pages do not tell. Kept beside them, so that a restarted daemon needs no INS to go on.
-struct PageContext {
-  ins::SampleFormatRecord format;
-  ins::SiteRecord site;
-  std::uint32_t pages = 0;
-};
-Expected<void> write_page_context(const std::filesystem::path& folder, const PageContext& context);
-Expected<PageContext> read_page_context(const std::filesystem::path& folder);
+CalibrationOptions calibration_options(const InsConfig& config);
 
-// Names of what a run's folder holds.
-std::filesystem::path page_path(const std::filesystem::path& folder);
-std::filesystem::path recording_path(const std::filesystem::path& folder);
-
-struct EstimateRequest {
-  std::filesystem::path folder;
-  std::uint32_t rotation = 0;
-  std::string serial;
-  std::string started_utc;
-  Schedule schedule;
-  InsConfig config;
-};
+// Why a result may not be written without the operator's word; empty: it may.
+std::vector<std::string> gate_objections(const CalibrationResult& result, const InsConfig& config);
 
 // All samples of the pages, gap-free from the first; warnings are about saturation.
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings);

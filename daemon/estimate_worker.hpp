@@ -5,11 +5,11 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <stop_token>
 #include <thread>
 
 #include "daemon/event_loop.hpp"
+#include "daemon/running_estimate.hpp"
 #include "estimator/passes/calibration.hpp"
 #include "protocol/error.hpp"
 
@@ -31,10 +31,12 @@ using EstimateJob = std::function<Expected<Estimate>(const EstimateProgress&, st
 class Estimators {
  public:
   virtual ~Estimators() = default;
-  // Both callbacks come on the loop. One job at a time; starting another, or cancel(), stops the one before, whose
-  // answer is then dropped.
+  // Callbacks come on the loop. One job at a time, of either kind; starting another, or cancel(), stops the one
+  // before, whose answer is then dropped.
   virtual void start(EstimateJob job, EstimateProgress on_progress,
                      std::function<void(Expected<Estimate>)> on_done) = 0;
+  // While data still come: at a lower priority than what brings them.
+  virtual void start_running(RunningJob job, std::function<void(Expected<RunningEstimate>)> on_done) = 0;
   virtual void cancel() = 0;
 };
 
@@ -45,25 +47,26 @@ class EstimateWorker : public Estimators {
 
   void start(EstimateJob job, EstimateProgress on_progress,
              std::function<void(Expected<Estimate>)> on_done) override;
+  void start_running(RunningJob job, std::function<void(Expected<RunningEstimate>)> on_done) override;
   void cancel() override;
 
  private:
+  using Delivery = std::function<void()>;   // to be called on the loop
   // Shared with the thread, which may outlive the interest in its answer.
   struct Mailbox {
     std::mutex mutex;
-    std::optional<CalibrationProgress> progress;
-    std::optional<Expected<Estimate>> answer;
+    Delivery progress;   // the latest
+    Delivery answer;
     int wake_fd = -1;
     ~Mailbox();
-    void wake() const;
+    void put(Delivery Mailbox::*slot, Delivery delivery);
   };
+  void launch(std::function<void(Mailbox&, std::stop_token)> work);
   void collect();
 
   EventLoop& loop_;
   std::shared_ptr<Mailbox> mailbox_;
   std::unique_ptr<EventLoop::Io> wake_;
-  EstimateProgress on_progress_;
-  std::function<void(Expected<Estimate>)> on_done_;
   std::jthread thread_;
 };
 

@@ -18,6 +18,7 @@ using namespace std::chrono_literals;
 
 constexpr auto retry_interval = 10s;
 constexpr std::int32_t schema = 1;
+constexpr std::int32_t estimate_schema = 2;
 constexpr std::string_view software_version = SELFCAL_VERSION;
 
 }  // namespace
@@ -86,7 +87,7 @@ void LcmPublisher::publish_estimate(const PublishedIns& ins) {
   if (ins.progress == nullptr || !ins.progress->estimate_known) return;
   const RunProgress& progress = *ins.progress;
   selfcal_lcm::estimate message;
-  message.schema = schema;
+  message.schema = estimate_schema;
   message.utime_us = utc_now_us();
   message.ins = ins.name;
   message.run = progress.run;
@@ -99,6 +100,12 @@ void LcmPublisher::publish_estimate(const PublishedIns& ins) {
   }
   message.value.assign(progress.value.begin(), progress.value.end());
   message.sigma.assign(progress.sigma.begin(), progress.sigma.end());
+  message.tolerance.assign(progress.tolerance.begin(), progress.tolerance.end());
+  message.tolerances_met = progress.tolerances_met;
+  message.running = progress.running ? 1 : 0;
+  message.data_s = progress.data_s;
+  message.met_at_s = progress.met_at_s;
+  message.finish_in_s = progress.finish_in_s;
   publish("SELFCAL_ESTIMATE_" + ins.name, message);
 }
 

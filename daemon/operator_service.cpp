@@ -31,6 +31,7 @@ Entries entries(const RunProgress& progress) {
       {"position", std::int32_t{progress.ins.position}},
       {"positions", std::int32_t{progress.positions}},
       {"time_left_s", progress.ins.time_left_s},
+      {"finish_in_s", progress.finish_in_s},
       {"outer_deg", progress.ins.outer_deg},
       {"inner_deg", progress.ins.inner_deg},
       {"pages_pulled", progress.pages_pulled},
@@ -46,6 +47,13 @@ Entries entries(const RunProgress& progress) {
   if (progress.estimate_known) {
     all["value"] = std::vector<double>(progress.value.begin(), progress.value.end());
     all["sigma"] = std::vector<double>(progress.sigma.begin(), progress.sigma.end());
+    all["tolerance"] = std::vector<double>(progress.tolerance.begin(), progress.tolerance.end());
+    all["tolerances_met"] = std::int32_t{progress.tolerances_met};
+    all["running"] = progress.running;
+  }
+  if (progress.running) {
+    all["data_s"] = progress.data_s;
+    all["met_at_s"] = progress.met_at_s;
   }
   return all;
 }
@@ -82,6 +90,7 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
     request.ins = ins;
     request.schedule = take<std::string>(options, "schedule", "");
     request.dry_run = take(options, "dry_run", false);
+    request.stop_when_met = take(options, "stop_when_met", false);
     request.force_reason = take<std::string>(options, "force", "");
     if (!options.empty()) {
       throw sdbus::Error(operator_api::error_unknown, fmt::format("unknown option {}", options.begin()->first));

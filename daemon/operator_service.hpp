@@ -16,6 +16,7 @@ struct StartRequest {
   std::string ins;
   std::string schedule;       // empty: the configured one
   bool dry_run = false;
+  bool stop_when_met = false;
   std::string force_reason;
   std::string user;
 };

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
+#include <algorithm>
 #include <system_error>
 
+#include "daemon/page_recording.hpp"
 #include "daemon/journal.hpp"
 #include "daemon/wall_clock.hpp"
 #include "protocol/operator_api/names.hpp"
@@ -129,7 +131,19 @@ void Service::resume_unfinished() {
     journal::write(journal::Level::error, run.reason, {run.id, run.ins, run.serial, "failed", -1});
     if (auto stored = store_->update_run(run); !stored) journal::write(journal::Level::error, stored.error().message);
   }
+  sweep_run_folders();
   notify_status();
+}
+
+// What a run left that had ended, but not tidied up, when the daemon was killed.
+void Service::sweep_run_folders() {
+  std::error_code ignored;
+  for (const auto& folder : fs::directory_iterator(fs::path(config_.state_directory) / "runs", ignored)) {
+    const bool in_use = std::any_of(sessions_.begin(), sessions_.end(), [&](const auto& session) {
+      return session.second.active() && run_folder(session.second.run->record().id) == folder.path();
+    });
+    if (!in_use) drop_pages(folder.path());
+  }
 }
 
 void Service::reload() {

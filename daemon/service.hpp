@@ -43,6 +43,7 @@ class Service : public Operations, public RunObserver {
   template <typename Call>
   void tell_bus(Call call);
   void publish();
+  void sweep_run_folders();
   void prune_recordings();
   void notify_status();
   Granted<RunId> launch(Session& session, RunRecord record, const std::string& schedule_name);

@@ -97,6 +97,7 @@ Granted<RunId> Service::start(const StartRequest& request) {
   record.user = request.user;
   record.dry_run = request.dry_run;
   record.force_reason = request.force_reason;
+  record.stop_when_met = request.stop_when_met;
   return launch(*chosen, record, request.schedule.empty() ? chosen->config.schedule : request.schedule);
 }
 

@@ -21,6 +21,8 @@ constexpr auto table = std::to_array<Transition>({
     {S::scheduling, E::schedule_accepted, G::always, A::start_rotation, S::starting},
     {S::starting, E::rotation_started, G::always, A::follow_rotation, S::rotating},
     {S::rotating, E::rotation_ended, G::always, A::pull_last_pages, S::draining},
+    {S::rotating, E::tolerances_met, G::always, A::end_rotation_early, S::ending_early},
+    {S::ending_early, E::rotation_ended, G::always, A::pull_last_pages, S::draining},
     {S::draining, E::pages_complete, G::always, A::estimate, S::estimating},
     {S::estimating, E::estimate_ready, G::always, A::judge, S::judging},
     {S::judging, E::judged, G::gate_refused, A::conclude, S::refused},
@@ -42,6 +44,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::scheduling, E::link_lost, G::always, A::recover_link, S::scheduling},
     {S::starting, E::link_lost, G::always, A::recover_link, S::starting},
     {S::rotating, E::link_lost, G::always, A::recover_link, S::rotating},
+    {S::ending_early, E::link_lost, G::always, A::recover_link, S::ending_early},
     {S::draining, E::link_lost, G::always, A::recover_link, S::draining},
     {S::checking_old, E::link_lost, G::always, A::recover_link, S::checking_old},
     {S::erasing, E::link_lost, G::always, A::recover_link, S::erasing},
@@ -63,6 +66,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::rotating, E::recovered, G::gimbal_turning, A::follow_rotation, S::rotating},
     {S::rotating, E::recovered, G::rotation_complete, A::pull_last_pages, S::draining},
     {S::rotating, E::recovered, G::always, A::stop_gimbal, S::stopping},
+    {S::ending_early, E::recovered, G::always, A::end_rotation_early, S::ending_early},
     {S::draining, E::recovered, G::always, A::pull_last_pages, S::draining},
     {S::estimating, E::recovered, G::always, A::estimate, S::estimating},
     {S::judging, E::recovered, G::always, A::judge, S::judging},
@@ -84,6 +88,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::scheduling, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::starting, E::abort_requested, G::always, A::stop_gimbal, S::stopping},
     {S::rotating, E::abort_requested, G::always, A::stop_gimbal, S::stopping},
+    {S::ending_early, E::abort_requested, G::always, A::stop_gimbal, S::stopping},
     {S::draining, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::estimating, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::judging, E::abort_requested, G::always, A::conclude, S::aborted},
@@ -103,6 +108,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::scheduling, E::step_failed, G::always, A::conclude, S::failed},
     {S::starting, E::step_failed, G::always, A::stop_gimbal, S::stopping},
     {S::rotating, E::step_failed, G::always, A::stop_gimbal, S::stopping},
+    {S::ending_early, E::step_failed, G::always, A::stop_gimbal, S::stopping},
     {S::draining, E::step_failed, G::always, A::conclude, S::failed},
     {S::estimating, E::step_failed, G::always, A::conclude, S::failed},
     {S::judging, E::step_failed, G::always, A::conclude, S::failed},
@@ -121,6 +127,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::scheduling, E::link_gone, G::always, A::conclude, S::failed},
     {S::starting, E::link_gone, G::always, A::conclude, S::failed},
     {S::rotating, E::link_gone, G::always, A::conclude, S::failed},
+    {S::ending_early, E::link_gone, G::always, A::conclude, S::failed},
     {S::draining, E::link_gone, G::always, A::conclude, S::failed},
     {S::checking_old, E::link_gone, G::always, A::conclude, S::failed},
     {S::erasing, E::link_gone, G::always, A::conclude, S::failed},
@@ -133,7 +140,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::stopping, E::link_gone, G::always, A::conclude, S::failed},
 });
 
-constexpr std::array state_names{"connecting", "unlocking",  "scheduling", "starting",   "rotating",  "draining",
+constexpr std::array state_names{"connecting", "unlocking",  "scheduling", "starting",   "rotating",  "ending_early", "draining",
                                  "estimating", "judging",    "checking_old", "erasing",  "writing",   "verifying",
                                  "committing", "resetting",  "confirming", "checking_new", "stopping", "completed",
                                  "refused",    "failed",     "aborted"};
@@ -142,6 +149,7 @@ constexpr std::array state_words{"looking for the INS",
                                  "writing the schedule",
                                  "starting the rotation",
                                  "rotating, pulling data",
+                                 "ending the rotation early: the data suffice",
                                  "pulling the last data",
                                  "estimating",
                                  "judging the result",
@@ -159,7 +167,7 @@ constexpr std::array state_words{"looking for the INS",
                                  "failed",
                                  "aborted"};
 constexpr std::array event_names{"begin",         "identified",     "unlocked",       "schedule_accepted",
-                                 "rotation_started", "rotation_ended", "pages_complete", "estimate_ready",
+                                 "rotation_started", "tolerances_met", "rotation_ended", "pages_complete", "estimate_ready",
                                  "judged",        "drift_measured", "slot_erased",    "set_written",
                                  "set_verified",  "set_committed",  "ins_restarted",  "set_confirmed",
                                  "gimbal_stopped", "link_lost",     "recovered",      "link_gone",
@@ -169,7 +177,7 @@ constexpr std::array guard_names{"always",       "rollback", "gimbal_turning",  
                                  "abort_pending"};
 constexpr std::array action_names{
     "none",       "identify",          "unlock",        "write_schedule",      "start_rotation", "follow_rotation",
-    "pull_last_pages", "estimate",     "judge",         "measure_drift_old",   "erase_inactive_slot", "write_set",
+    "end_rotation_early", "pull_last_pages", "estimate",     "judge",         "measure_drift_old",   "erase_inactive_slot", "write_set",
     "read_back",  "commit",            "reset_ins",     "read_in_force",       "measure_drift_new", "stop_gimbal",
     "recover_link", "decline_abort",   "conclude"};
 
@@ -186,7 +194,8 @@ std::span<const Transition> transition_table() { return table; }
 bool is_final(State state) { return state >= State::completed; }
 
 bool gimbal_may_turn(State state) {
-  return state == State::starting || state == State::rotating || state == State::stopping;
+  return state == State::starting || state == State::rotating || state == State::ending_early ||
+         state == State::stopping;
 }
 
 std::string_view name(State state) { return state_names.at(static_cast<std::size_t>(state)); }

@@ -18,6 +18,7 @@ enum class State {
   scheduling,      // write the rotation schedule
   starting,        // command the rotation
   rotating,        // follow it, pull pages meanwhile
+  ending_early,    // every tolerance is met: gimbal to rest, data stay
   draining,        // gimbal at rest, last pages
   estimating,      // estimator at work, off the loop
   judging,         // may this be written?
@@ -42,6 +43,7 @@ enum class Event {
   unlocked,
   schedule_accepted,
   rotation_started,
+  tolerances_met,    // and the gimbal stands
   rotation_ended,
   pages_complete,
   estimate_ready,
@@ -80,6 +82,7 @@ enum class Action {
   write_schedule,
   start_rotation,
   follow_rotation,
+  end_rotation_early,
   pull_last_pages,
   estimate,
   judge,

@@ -41,8 +41,12 @@ class Screen {
                     message->pages_expected, message->link_up != 0 ? "" : ", LINK LOST"));
   }
   void on_estimate(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::estimate* message) {
-    std::string text = fmt::format("{}: pass {}, {:.0f} %", message->ins, message->pass_number,
-                                   100 * message->pass_fraction);
+    const std::string when = message->running != 0
+                                 ? fmt::format("{:.0f} s of data, rotation ends in {:.0f} s", message->data_s,
+                                               message->finish_in_s)
+                                 : fmt::format("pass {}, {:.0f} %", message->pass_number, 100 * message->pass_fraction);
+    std::string text = fmt::format("{}: {}, {} of {} to tolerance", message->ins, when, message->tolerances_met,
+                                   message->count);
     for (std::size_t i = 0; i < message->name.size(); ++i) {
       text += fmt::format("{}{:<24}{:>12.5g} +- {:<10.3g} {}", terminal_ ? "\n  " : "; ", message->name[i],
                           message->value[i], message->sigma[i], message->unit[i]);

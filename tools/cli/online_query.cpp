@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "estimator/geometry/sensor_parameters.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_text.hpp"
@@ -29,6 +30,29 @@ CommandRun online(std::shared_ptr<Options> options, Body body) {
   };
 }
 
+// The figures so far, by name; null before the first.
+nlohmann::ordered_json estimate_of(const Entries& progress) {
+  const auto value = entry(progress, "value", std::vector<double>());
+  const auto sigma = entry(progress, "sigma", std::vector<double>());
+  const auto tolerance = entry(progress, "tolerance", std::vector<double>());
+  if (sigma.size() != sensor_parameters.size() || value.size() != sigma.size() || tolerance.size() != sigma.size()) {
+    return {};
+  }
+  nlohmann::ordered_json estimate{{"running", entry(progress, "running", false)},
+                                  {"tolerances_met", entry<std::int32_t>(progress, "tolerances_met", 0)},
+                                  {"data_s", entry(progress, "data_s", 0.0)},
+                                  {"met_at_s", entry(progress, "met_at_s", -1.0)},
+                                  {"parameters", nlohmann::ordered_json::array()}};
+  for (std::size_t i = 0; i < sigma.size(); ++i) {
+    estimate["parameters"].push_back({{"name", sensor_parameters[i].name},
+                                      {"unit", sensor_parameters[i].unit},
+                                      {"value", value[i]},
+                                      {"sigma", sigma[i]},
+                                      {"tolerance", tolerance[i]}});
+  }
+  return estimate;
+}
+
 Expected<int> status(ManagerClient& manager, const Options& options) {
   const auto instruments = manager.instruments();
   if (!instruments) return tl::unexpected(instruments.error());
@@ -52,7 +76,9 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                    {"pages_refetched", entry<std::uint32_t>(progress, "pages_refetched", 0)},
                    {"lost_frames", entry<std::uint64_t>(progress, "lost_frames", 0)},
                    {"pass", entry<std::int32_t>(progress, "pass", 0)},
-                   {"link_up", entry(progress, "link_up", true)}});
+                   {"finish_in_s", entry(progress, "finish_in_s", -1.0)},
+                   {"link_up", entry(progress, "link_up", true)},
+                   {"estimate", estimate_of(progress)}});
   }
   if (all.empty()) return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
   if (options.json) {
@@ -63,6 +89,9 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
     fmt::print("{} {}: {}", ins["ins"].get<std::string>(), ins["serial"].get<std::string>(),
                ins["state"].get<std::string>());
     if (ins["state"] != "idle") {
+      const auto& estimate = ins["estimate"];
+      if (!estimate.is_null()) fmt::print(", {} of 24 to tolerance", estimate["tolerances_met"].get<int>());
+      if (ins["finish_in_s"].get<double>() >= 0) fmt::print(", rotation ends in {:.0f} s", ins["finish_in_s"].get<double>());
       fmt::print(", run {} by {} since {}, position {} of {}, pages {}/{}", ins["run"].get<std::uint64_t>(),
                  ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
                  ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());

@@ -29,6 +29,24 @@ void catch_interrupts() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
+// The estimate of what has arrived so far: the parameter that needs most yet, and when all will be known.
+std::string running_text(const Entries& progress) {
+  const auto sigma = entry(progress, "sigma", std::vector<double>());
+  const auto tolerance = entry(progress, "tolerance", std::vector<double>());
+  if (sigma.size() != sensor_parameters.size() || tolerance.size() != sigma.size()) return "no estimate";
+  std::size_t worst = 0;
+  for (std::size_t i = 1; i < sigma.size(); ++i) {
+    if (sigma[i] / tolerance[i] > sigma[worst] / tolerance[worst]) worst = i;
+  }
+  std::string text = fmt::format("{} of {} to tolerance, {} {:.3g} of {:.3g} {}",
+                                 entry<std::int32_t>(progress, "tolerances_met", 0), sigma.size(),
+                                 sensor_parameters[worst].name, sigma[worst], tolerance[worst],
+                                 sensor_parameters[worst].unit);
+  const double met_at = entry(progress, "met_at_s", -1.0);
+  if (met_at >= 0) text += fmt::format(", all at {:.0f}:{:02.0f}", std::floor(met_at / 60), std::fmod(met_at, 60));
+  return text;
+}
+
 // One line of progress: what is done now, and how far.
 std::string progress_text(const Entries& progress) {
   std::string text = entry<std::string>(progress, "words", "");
@@ -37,10 +55,11 @@ std::string progress_text(const Entries& progress) {
   const auto expected = entry<std::uint32_t>(progress, "pages_expected", 0);
   const std::string state = entry<std::string>(progress, "state", "");
   if (state == "rotating") {
-    const double left = entry(progress, "time_left_s", 0.0);
+    const double left = std::max(0.0, entry(progress, "finish_in_s", 0.0));
     text += fmt::format(", position {} of {}, {:.0f}:{:02.0f} left", position,
                         entry<std::int32_t>(progress, "positions", 0), std::floor(left / 60), std::fmod(left, 60));
   }
+  if (state == "rotating" && entry(progress, "running", false)) text += ", " + running_text(progress);
   if (state == "rotating" || state == "draining") text += fmt::format(", pages {}/{}", pulled, expected);
   if (state == "estimating" && progress.contains("sigma")) {
     const auto sigma = entry(progress, "sigma", std::vector<double>());
@@ -138,7 +157,7 @@ Expected<int> report(ManagerClient& manager, std::uint64_t run, const Ending& en
 
 struct RunOptions {
   std::string ins, schedule, force;
-  bool dry_run = false, json = false, detach = false;
+  bool dry_run = false, stop_when_met = false, json = false, detach = false;
 };
 
 Expected<int> run(const RunOptions& options) {
@@ -151,6 +170,7 @@ Expected<int> run(const RunOptions& options) {
   Entries wanted;
   if (!options.schedule.empty()) wanted["schedule"] = options.schedule;
   if (options.dry_run) wanted["dry_run"] = true;
+  if (options.stop_when_met) wanted["stop_when_met"] = true;
   if (!options.force.empty()) wanted["force"] = options.force;
   const auto id = (*manager)->start(*ins, wanted);
   if (!id) return tl::unexpected(id.error());
@@ -168,6 +188,7 @@ CommandRun configure_run(CLI::App& app) {
   app.add_option("INS", options->ins, "which INS (a section of selfcald.toml); may be left out where there is one");
   app.add_option("--schedule", options->schedule, "table2, horizontal, or a file that the daemon can read");
   app.add_flag("--dry-run", options->dry_run, "estimate and judge, write nothing to the INS");
+  app.add_flag("--stop-when-met", options->stop_when_met, "end the rotation as soon as every tolerance is met");
   app.add_option("--force", options->force, "write a result that the gate refuses; the reason is recorded");
   app.add_flag("--detach", options->detach, "print the run's number and do not wait");
   app.add_flag("--json", options->json, "the run's document on standard output");

@@ -49,6 +49,9 @@ std::string run_text(const std::string& document, bool colour, bool story) {
   text += fmt::format("  {} to {}, schedule {}{}\n", text_of(run, "started_utc"),
                       ended ? text_of(run, "ended_utc") : "now", text_of(run, "schedule"),
                       run.at("dry_run").get<bool>() ? ", dry run" : "");
+  if (run.at("early_end_s").is_number()) {
+    text += fmt::format("  rotation ended early, after {:.0f} s: every tolerance was met\n", run.at("early_end_s").get<double>());
+  }
   text += "  " + paint(text_of(run, "state"), well ? "32" : ended ? "31" : "36", colour);
   if (!text_of(run, "reason").empty()) text += ": " + text_of(run, "reason");
   text += '\n';

@@ -30,6 +30,7 @@ TEST(Config, TheShippedFileIsWellFormedAndHoldsTheDefaults) {
   EXPECT_EQ(shipped.request_timeout_s, defaults.request_timeout_s);
   EXPECT_EQ(shipped.lost_after_s, defaults.lost_after_s);
   EXPECT_EQ(shipped.drift_check_s, defaults.drift_check_s);
+  EXPECT_EQ(shipped.running_estimate_s, defaults.running_estimate_s);
   EXPECT_EQ(shipped.time_scale, defaults.time_scale);
   EXPECT_EQ(config->state_directory, Config().state_directory);
   EXPECT_EQ(config->bus, Config().bus);

@@ -17,7 +17,23 @@ FakeIns::FakeIns(Timers& timers) : timers_(timers) {
   slots_[1] = slots_[0];
 }
 
-FakeIns::~FakeIns() { cancel(); }
+FakeIns::~FakeIns() {
+  cancel();
+  timers_.cancel(status_timer_);
+}
+
+void FakeIns::send_status(double schedule_s) {
+  schedule_s_ = schedule_s;
+  if (on_status && !dead) {
+    ins::Status status;
+    status.state = state();
+    status.moving = moving;
+    status.pages_written = pages_written();
+    status.time_left_s = state() == ins::State::rotating ? schedule_s_ * (1.0 - since_start() / rotation_s) : 0.0;
+    on_status(status);
+  }
+  status_timer_ = timers_.after(100ms, [this] { send_status(schedule_s_); });
+}
 
 double FakeIns::check_elapsed() const {
   return std::chrono::duration<double>(timers_.now() - *check_started_).count();
@@ -34,7 +50,7 @@ ins::State FakeIns::state() {
 
 std::uint32_t FakeIns::pages_written() {
   if (rotation_ == 0) return 0;
-  return std::min(pages, static_cast<std::uint32_t>(since_start() / rotation_s * pages));
+  return std::min(pages, static_cast<std::uint32_t>((stopped_s_ < 0 ? since_start() : stopped_s_) / rotation_s * pages));
 }
 
 void FakeIns::power_cycle() {
@@ -67,8 +83,8 @@ Bytes FakeIns::page(std::uint32_t number) {
   flash::Page page;
   page.run_id = rotation_;
   page.sequence = number;
-  page.first_sample = std::uint64_t{number} * 10;
-  page.samples.resize(10);
+  page.first_sample = std::uint64_t{number} * flash::samples_per_page;
+  page.samples.resize(flash::samples_per_page);
   flash::PageBytes bytes;
   flash::encode_page(page, bytes);
   if (bad_pages[number]-- > 0) bytes[100] = static_cast<std::uint8_t>(bytes[100] ^ 1);
@@ -97,9 +113,9 @@ Answer<Bytes> FakeIns::read(std::uint16_t did) {
     case ins::did::coefficients_inactive: return inactive_.empty() ? set(slots_.at(1 - in_force_)) : inactive_;
     case ins::did::site: return ins::encode(ins::SiteRecord{40, 116, 50});
     case ins::did::sample_format:
-      return ins::encode(ins::SampleFormatRecord{200, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
+      return ins::encode(ins::SampleFormatRecord{sample_rate_hz, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
     case ins::did::raw_data_directory:
-      return ins::encode(ins::DirectoryRecord{rotation_, 0, pages_written(), pages, std::uint64_t{pages_written()} * 10,
+      return ins::encode(ins::DirectoryRecord{rotation_, 0, pages_written(), pages, std::uint64_t{pages_written()} * flash::samples_per_page,
                                               state() != ins::State::rotating});
     default: return no(0x31);
   }
@@ -117,9 +133,11 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
         if (state() == ins::State::rotating) ++second_starts;
         turning_ = true;
         started_ = timers_.now();
+        stopped_s_ = -1.0;
         rotation_ = ByteReader(call->option).get<std::uint32_t>();
       } else {
         ++stops;
+        if (turning_) stopped_s_ = since_start();
         turning_ = false;
         resting_ = ins::State::aborted;
       }

@@ -39,10 +39,15 @@ class FakeIns : public InsPort {
   bool ignores_commit = false;
   bool gimbal_sticks = false;           // the rotation fails half-way
 
+  // Sends status frames, whose clock runs `schedule_s` in a rotation; standing but for `moving` of each second.
+  void send_status(double schedule_s);
+  bool moving = false;
+
   UnlockKey key{1, 2, 3};
   std::string serial = "FAKE-1";
   static constexpr std::uint32_t pages = 20;
   static constexpr double rotation_s = 100.0;
+  double sample_rate_hz = 1.0;          // so that the pages hold about as many seconds as a schedule
 
   int starts = 0;                       // rotations commanded
   int second_starts = 0;                // of them, on top of one that was not over
@@ -73,6 +78,9 @@ class FakeIns : public InsPort {
   Bytes inactive_;                      // as written, not committed yet
   std::optional<SteadyTime> check_started_;
   std::uint32_t upload_page_ = 0;
+  Timers::Id status_timer_ = 0;
+  double schedule_s_ = 0.0;
+  double stopped_s_ = -1.0;             // into the rotation
 };
 
 }  // namespace selfcal::testing_support
