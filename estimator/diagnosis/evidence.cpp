@@ -65,13 +65,15 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   double best = 0.0;
   for (Eigen::Index k = 0; k < b.size(); ++k) {
     test.expected_z = std::max(test.expected_z, std::sqrt(std::max(G(k, k), 0.0)));
-    if (G(k, k) > 1e-5 && G(k, k) > 1e-9 * e.information(group[static_cast<std::size_t>(k)],
+    if (G(k, k) > least_information && G(k, k) > 1e-9 * e.information(group[static_cast<std::size_t>(k)],
                                                           group[static_cast<std::size_t>(k)])) {
       best = std::max(best, b(k) * b(k) / G(k, k));
     }
   }
-  const double single = log_corrected(log_chi_squared_tail(best, 1.0), static_cast<double>(b.size()));
+  const double alone = log_chi_squared_tail(best, 1.0);
+  const double single = log_corrected(alone, static_cast<double>(b.size()));
   test.log_p = log_chi_squared_tail(fit.gain, fit.rank);
+  test.log_detection = std::min(test.log_p, alone);
   if (b.size() > 1) {
     test.log_p = log_corrected(std::min(test.log_p, single), 2.0);
   }

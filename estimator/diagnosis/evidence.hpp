@@ -25,10 +25,14 @@ struct Evidence {
   Fit fit(const std::vector<int>& columns) const;
 };
 
+// A coefficient with less information than this per typical size squared is not seen.
+constexpr double least_information = 1e-5;
+
 struct GroupTest {
   double gain = 0.0;           // fall of the residuals' square
   int rank = 0;
   double log_p = 0.0;          // of the group: whole group and best single column, corrected for looking at both
+  double log_detection = 0.0;  // the smaller of both, not corrected: for effective_tests, and for rivals the above
   double expected_z = 0.0;     // of its best single coefficient at typical size
 };
 // `group` given that `others` are fitted too.

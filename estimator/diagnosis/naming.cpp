@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/multiplicity.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
 constexpr std::size_t most_effects = 6;
+constexpr int walk_axes = 6;
 constexpr int most_relinearisations = 4;
 constexpr double converged_sigma = 0.1;
 // Effects whose odds against the best are better than 1:100 stay in its class.
@@ -58,6 +59,7 @@ Naming::Naming(const RecordingContext& context, PassInput input, double log_thre
     rows_ = pass_.run(input_);
     evidence_ = Evidence(rows_);
   }
+  effective_tests_ = diagnosis::effective_tests(evidence_, pass_.candidates(), std::exp(log_threshold_));
   map_before_ = locate(evidence_, pass_.map(), pass_.first_map_column(), {});
   square_before_ = evidence_.square;
   white_before_ = diagnosis::log_p_white(rows_.residual);
@@ -98,17 +100,11 @@ std::vector<int> Naming::chosen_columns(std::size_t without) const {
   return columns;
 }
 
-std::size_t Naming::variants_of(const std::string& effect) const {
-  return static_cast<std::size_t>(std::count_if(pass_.candidates().begin(), pass_.candidates().end(),
-                                                [&](const Candidate& c) { return c.effect->id == effect; }));
-}
-
+// For the catalogue's tests on this recording (multiplicity.hpp) and the walks of six axes, each at the edge of its
+// range. The frequency of a sway was looked for in a spectrum.
 double Naming::corrected(double log_p, const std::string& effect) const {
-  std::set<std::string> ids = {"gyro_random_walk", "accel_random_walk"};
-  for (const Candidate& c : pass_.candidates()) {
-    ids.insert(c.effect->id);
-  }
-  return log_corrected(log_p, static_cast<double>(ids.size() * std::max<std::size_t>(1, variants_of(effect))));
+  const double spectrum = effect == "base_sway" ? std::max(1.0, evidence_.rows / 6.0) : 1.0;
+  return log_corrected(log_p, (effective_tests_ + 0.5 * walk_axes) * spectrum);
 }
 
 void Naming::refit() {
@@ -143,6 +139,7 @@ void Naming::relinearise() {
     }
     correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
     applied_ = correction.size;
+    correction_ = correction;
     const ImuData& original = context_.data();
     if (!sizes.empty()) {
       theta_.assign(original.delta_theta.begin(), original.delta_theta.end());
@@ -186,11 +183,14 @@ void Naming::relinearise() {
 // Takes the constant to the top of the likelihood: a parabola through the gain over its logarithm, on a grid that
 // closes in.
 void Naming::refine_constant(Chosen& chosen) {
-  if (std::isnan(chosen.candidate.constant) || chosen.candidate.effect->sensor == nullptr) {
+  if (std::isnan(chosen.candidate.constant)) {
     return;
   }
   constexpr int steps = 3;   // to either side
-  for (const double step : {0.2, 0.04}) {
+  // A frequency comes from a spectrum: it lies within half a bin.
+  const double bin = 1.0 / (chosen.candidate.constant * rows_.time_s.back());
+  const double coarse = chosen.candidate.effect->id == "base_sway" ? 0.25 * bin : 0.2;
+  for (const double step : {coarse, 0.2 * coarse}) {
     std::vector<Candidate> grid;
     for (int k = -steps; k <= steps; ++k) {
       grid.push_back({chosen.candidate.effect, chosen.candidate.constant * std::exp(k * step), 0, 0});
@@ -201,13 +201,22 @@ void Naming::refine_constant(Chosen& chosen) {
         grid.push_back(c.candidate);
       }
     }
+    const std::size_t applied = grid.size();   // what the recording's correction took out comes back first
+    grid.insert(grid.end(), correction_.effects.begin(), correction_.effects.end());
     SignaturePass pass(context_, grid, false);
     const SignatureRows rows = pass.run(input_);
     Evidence evidence(rows);
-    std::vector<int> others;
-    for (std::size_t i = own; i < grid.size(); ++i) {
-      const std::vector<int> columns = columns_of(pass.candidates()[i]);
-      others.insert(others.end(), columns.begin(), columns.end());
+    const auto columns_between = [&](std::size_t from, std::size_t to) {
+      std::vector<int> all;
+      for (std::size_t i = from; i < to; ++i) {
+        const std::vector<int> columns = columns_of(pass.candidates()[i]);
+        all.insert(all.end(), columns.begin(), columns.end());
+      }
+      return all;
+    };
+    const std::vector<int> others = columns_between(own, applied);
+    if (applied < grid.size()) {
+      evidence.restore(columns_between(applied, grid.size()), correction_.size);
     }
     std::vector<double> gain;
     for (std::size_t i = 0; i < own; ++i) {
@@ -227,7 +236,7 @@ void Naming::refine_constant(Chosen& chosen) {
 
 bool Naming::add_best() {
   const std::vector<int> others = chosen_columns();
-  double best = 0.0;
+  double best = 0.0, detected = 0.0;   // name by the one, presence by the other
   const Candidate* winner = nullptr;
   for (const Candidate& c : pass_.candidates()) {
     const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
@@ -238,9 +247,10 @@ bool Naming::add_best() {
     if (taken || same) {
       continue;
     }
-    const double log_p = corrected(test_group(evidence_, columns_of(c), others).log_p, c.effect->id);
-    if (log_p < best) {
-      best = log_p;
+    const GroupTest test = test_group(evidence_, columns_of(c), others);
+    detected = std::min(detected, corrected(test.log_detection, c.effect->id));
+    if (test.log_p < best) {
+      best = test.log_p;
       winner = &c;
     }
   }
@@ -252,15 +262,18 @@ bool Naming::add_best() {
     tests.push_back(test_walk(evidence_, pass_.map(), pass_.first_map_column(), axis, others));
   }
   for (const WalkTest& test : tests) {
-    const double log_p = corrected(log_corrected(log_chi_squared_tail(test.gain, 1.0), 3.0), "gyro_random_walk");
+    const double log_p = log_chi_squared_tail(test.gain, 1.0);
     const bool taken = std::any_of(walks_.begin(), walks_.end(),
                                    [&](const WalkTest& w) { return w.axis == test.axis; });
+    if (!taken) {
+      detected = std::min(detected, corrected(log_p, test.axis < 3 ? "gyro_random_walk" : "accel_random_walk"));
+    }
     if (!taken && log_p < best) {
       best = log_p;
       walker = &test;
     }
   }
-  if (best > log_threshold_) {
+  if (detected > log_threshold_) {
     return false;
   }
   // A walk can follow any slow curve. It is taken where it beats every equation by far; an equation whose constant is
@@ -277,6 +290,9 @@ bool Naming::add_best() {
     chosen_.emplace_back();
     chosen_.back().candidate = *winner;
     refine_constant(chosen_.back());
+    for (std::size_t i = 0; i + 1 < chosen_.size(); ++i) {   // they were found while this one was left out
+      refine_constant(chosen_[i]);
+    }
     rows_ = pass_.run(input_);
     evidence_ = Evidence(rows_);
     if (!applied_columns_.empty()) {
@@ -290,7 +306,7 @@ bool Naming::add_best() {
 bool Naming::drop_weak() {
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     const GroupTest test = test_group(evidence_, columns_of(chosen_[i].candidate), chosen_columns(i));
-    if (corrected(test.log_p, chosen_[i].candidate.effect->id) > log_threshold_) {
+    if (corrected(test.log_detection, chosen_[i].candidate.effect->id) > log_threshold_) {
       chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(i));
       relinearise();
       return true;
@@ -308,7 +324,7 @@ bool Naming::exchange() {
     const Candidate* winner = nullptr;
     for (const Candidate& c : pass_.candidates()) {
       const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
-        return x.candidate.effect->id == c.effect->id && x.candidate.first != own.first;
+        return x.candidate.effect->id == c.effect->id;   // its own constant is refined already
       });
       if (taken || c.first == own.first) {
         continue;
@@ -321,6 +337,7 @@ bool Naming::exchange() {
     }
     if (winner != nullptr) {
       chosen_[i].candidate = *winner;
+      refine_constant(chosen_[i]);
       relinearise();
       return true;
     }
@@ -344,7 +361,7 @@ void Naming::judge() {
     const GroupTest own = test_group(evidence_, columns_of(c.candidate), others);
     c.gain = own.gain;
     c.rank = own.rank;
-    c.log_p = corrected(own.log_p, c.candidate.effect->id);
+    c.log_p = corrected(own.log_detection, c.candidate.effect->id);
     c.held_out = held_out_gain(rows_.columns, residual, fold, all, others);
     c.equivalent.clear();
     for (const Candidate& rival : pass_.candidates()) {
@@ -394,7 +411,7 @@ std::vector<Suspect> Naming::suspects() const {
       continue;
     }
     const GroupTest test = test_group(evidence_, columns_of(c), others);
-    const double log_p = corrected(test.log_p, c.effect->id);
+    const double log_p = corrected(test.log_detection, c.effect->id);
     const auto same = std::find_if(all.begin(), all.end(), [&](const Suspect& s) { return s.effect == c.effect->id; });
     if (same == all.end()) {
       all.push_back({c.effect->id, log_p, test.expected_z});

@@ -48,6 +48,7 @@ class Naming {
   double square_before() const { return square_before_; }
   double square_after() const;
   double rows() const { return evidence_.rows; }
+  double effective_tests() const { return effective_tests_; }
   double log_p_white_before() const { return white_before_; }
   double log_p_white_after() const;
   // The 24 with everything fitted.
@@ -64,7 +65,6 @@ class Naming {
   bool drop_weak();
   bool exchange();
   void judge();
-  std::size_t variants_of(const std::string& effect) const;
   double corrected(double log_p, const std::string& effect) const;
   Eigen::VectorXd final_residual() const;
 
@@ -73,6 +73,7 @@ class Naming {
   ImuData corrected_view_;
   AngleVelocity theta_, velocity_;
   double log_threshold_;
+  double effective_tests_ = 1.0;       // of the catalogue on this recording
   SignaturePass pass_;
   SignatureRows rows_;
   Evidence evidence_;                  // with what the correction took out added back, walks integrated out
@@ -84,6 +85,7 @@ class Naming {
   double square_before_ = 0.0, white_before_ = 0.0;
   Eigen::VectorXd applied_;            // sizes of chosen_ that the correction holds
   std::vector<int> applied_columns_;
+  Correction correction_;              // the same with the constants it was made with
 };
 
 }  // namespace selfcal::diagnosis

@@ -52,6 +52,24 @@ double sigma_from_log_p(double log_p) {
   return low;
 }
 
+namespace {
+
+// Directions below it are invisible.
+double least_eigenvalue(const Eigen::VectorXd& eigenvalues, double most) {
+  return std::max(1.0 / (most * most), 1e-10 * eigenvalues(eigenvalues.size() - 1));
+}
+
+}  // namespace
+
+Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const double floor = least_eigenvalue(eigen.eigenvalues(), most);
+  const Eigen::Index hidden = (eigen.eigenvalues().array() <= floor).count();   // they come first
+  const Eigen::Index seen = information.rows() - hidden;
+  return eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse().asDiagonal() *
+         eigen.eigenvectors().rightCols(seen).transpose();
+}
+
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most) {
   Fit fit;
   const Eigen::Index n = score.size();
@@ -60,7 +78,7 @@ Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score
     return fit;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  const double floor = std::max(prior, 1e-10 * eigen.eigenvalues()(n - 1));
+  const double floor = least_eigenvalue(eigen.eigenvalues(), most);
   const Eigen::VectorXd rotated = eigen.eigenvectors().transpose() * score;
   Eigen::VectorXd solved = Eigen::VectorXd::Zero(n);
   for (Eigen::Index k = 0; k < n; ++k) {

@@ -23,5 +23,7 @@ struct Fit {
   int rank = 0;
 };
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most = 300.0);
+// Rows r_k of the visible directions with gain = sum (r_k score)^2, as fit_columns takes them.
+Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most = 300.0);
 
 }  // namespace selfcal::diagnosis
