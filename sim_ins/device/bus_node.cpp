@@ -33,13 +33,24 @@ Time real_now() {
 
 double seconds(Time t) { return std::chrono::duration<double>(t).count(); }
 
+Time stretched(Time time, double factor) { return std::chrono::duration_cast<Time>(time * factor); }
+
 isotp::Options transport_options(const NodeOptions& o) {
   isotp::Options options;
   options.address = {o.response_id, o.request_id, o.functional_id, o.extended_ids};
   options.fd = o.fd;
   options.frame_bytes = o.fd ? can::max_fd_bytes : can::max_classic_bytes;
   options.max_message = 65535;
+  for (Time* time : {&options.n_as, &options.n_bs, &options.n_cr}) {
+    *time = stretched(*time, o.patience);
+  }
   return options;
+}
+
+uds::ServerTimings server_timings(const NodeOptions& o) {
+  uds::ServerTimings timings;
+  timings.s3 = stretched(timings.s3, o.patience);
+  return timings;
 }
 
 }  // namespace
@@ -67,7 +78,7 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
     : options_(options),
       instrument_(instrument),
       diagnostics_(instrument, options.diagnostics),
-      server_(transport_options(options), uds::ServerTimings{}, diagnostics_),
+      server_(transport_options(options), server_timings(options), diagnostics_),
       socket_(std::move(socket)),
       bus_(options.rates),
       random_(options.seed, fault_stream),

@@ -34,6 +34,7 @@ struct NodeOptions {
   bool fd = false;
   can::BitRates rates;
   double speed = 1.0;                    // INS seconds per second
+  double patience = 1.0;                 // stretches N_As, N_Bs, N_Cr and S3, which run in real time
   FrameFaults frame_faults;
   Scenario scenario;                     // faults of the bus, of status and answers, by time
   std::optional<double> reset_at_s;      // INS time of one spontaneous reset
