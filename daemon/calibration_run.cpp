@@ -5,6 +5,7 @@
 #include "daemon/estimate_job.hpp"
 #include "daemon/journal.hpp"
 #include "daemon/wall_clock.hpp"
+#include "protocol/uds/services.hpp"
 
 namespace selfcal {
 namespace {
@@ -12,6 +13,13 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto report_interval = 200ms;
+constexpr auto bus_event_interval = 10s;   // the same is not said more often
+
+// What an operator should know at once; the rest is for the story of the run.
+bool alarming(can::BusEvent event) {
+  return event == can::BusEvent::bus_off || event == can::BusEvent::restarted ||
+         event == can::BusEvent::error_passive || event == can::BusEvent::controller_overrun;
+}
 
 journal::Fields journal_fields(const RunRecord& run) {
   return {run.id, run.ins, run.serial, std::string(name(run.state)), -1};
@@ -36,10 +44,12 @@ CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule sc
     progress_.tolerance[i] = tolerance(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
   }
   context_.port.on_status = [this](const ins::Status& status) { on_status(status); };
+  context_.port.on_bus_event = [this](can::BusEvent event) { on_bus_event(event); };
 }
 
 CalibrationRun::~CalibrationRun() {
   context_.port.on_status = {};
+  context_.port.on_bus_event = {};
   context_.timers.cancel(event_timer_);
   context_.estimators.cancel();
 }
@@ -117,7 +127,7 @@ bool CalibrationRun::holds(Guard guard) const {
     case Guard::always: return true;
     case Guard::rollback: return record_.rollback;
     case Guard::gimbal_turning: return ours && stock_.state == ins::State::rotating;
-    case Guard::rotation_complete: return ours && stock_.state == ins::State::complete;
+    case Guard::rotation_complete: return ours && (stock_.state == ins::State::complete || data_complete_);
     case Guard::gate_refused: return !objections_.empty() && record_.force_reason.empty();
     case Guard::dry_run: return record_.dry_run;
     case Guard::drift_check_wanted: return config_.drift_check_s > 0 && !record_.rollback;
@@ -180,8 +190,18 @@ void CalibrationRun::settle(const Step& step) {
   link_trouble_ = step.error().message;
   if (step.error().kind == PortError::Kind::link) return post(Event::link_lost);
   last_nrc_ = step.error().kind == PortError::Kind::negative ? step.error().nrc : -1;
+  if (session_lost(last_nrc_)) return post(Event::link_lost);
   fail_with(step.error().message);
   post(Event::step_failed);
+}
+
+// An INS that restarted faster than a request times out shows in what it allows no more.
+bool CalibrationRun::session_lost(int nrc) {
+  constexpr int at_most = 5;   // in one run; more often it is no accident
+  const bool unlocked_before = record_.state != State::connecting && record_.state != State::unlocking;
+  const bool locked = nrc == static_cast<int>(uds::Nrc::service_not_supported_in_session) ||
+                      nrc == static_cast<int>(uds::Nrc::security_access_denied);
+  return unlocked_before && locked && ++sessions_lost_ <= at_most;
 }
 
 // The first reason is the one that counts: what follows is its consequence.
@@ -197,6 +217,8 @@ void CalibrationRun::fail_with(const std::string& reason, ErrorKind kind) {
 void CalibrationRun::conclude() {
   task_ = {};
   context_.estimators.cancel();
+  running_estimator_.reset();
+  sum_up_bus_events();
   // Of no use any more: the recording is kept, or the run will not be resumed.
   pages_.reset();
   drop_pages(folder_);
@@ -237,6 +259,26 @@ void CalibrationRun::on_status(const ins::Status& status) {
   progress_.ins = status;
   foresee_finish();
   report_progress();
+}
+
+void CalibrationRun::on_bus_event(can::BusEvent event) {
+  if (is_final(record_.state)) return;
+  BusEventCount& seen = bus_events_[event];
+  const SteadyTime now = context_.timers.now();
+  const bool first = ++seen.count == 1;
+  if (!first && now - seen.said_at < bus_event_interval) return;
+  seen.said_at = now;
+  std::string text = fmt::format("{}: {}", config_.interface, can::name(event));
+  if (!first) text += fmt::format(", {} times in this run", seen.count);
+  alarming(event) ? warn(text) : remember("bus", text);
+}
+
+void CalibrationRun::sum_up_bus_events() {
+  std::string text;
+  for (const auto& [event, seen] : bus_events_) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", seen.count, can::name(event));
+  }
+  if (!text.empty()) remember("bus", fmt::format("{}: error frames in this run: {}", config_.interface, text));
 }
 
 std::chrono::nanoseconds CalibrationRun::ins_time(double seconds) const {

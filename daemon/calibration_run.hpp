@@ -92,6 +92,8 @@ class CalibrationRun {
 
   void warn(const std::string& text);
   void on_status(const ins::Status& status);
+  void on_bus_event(can::BusEvent event);
+  void sum_up_bus_events();
   std::chrono::nanoseconds ins_time(double seconds) const;   // real time in which the INS's clock runs so long
 
   // Steps, in the order of the table; each answers with the event that follows.
@@ -115,6 +117,8 @@ class CalibrationRun {
   // Parts of steps.
   Task<Answer<Done>> check_serial();
   Task<Answer<Done>> take_stock();            // the INS's state and the set in force
+  Task<Answer<Done>> look_for_data();
+  Task<Answer<Done>> check_space();
   Task<Answer<Done>> poll_state();
   Task<Answer<Done>> open_pages();
   Task<Answer<Done>> pull(std::uint32_t end);  // what is missing below `end`, once
@@ -134,6 +138,7 @@ class CalibrationRun {
   Expected<void> make_new_set();
   void warn_of_history(const RunStore::Parameters& parameters);
   void close_record();
+  bool session_lost(int nrc);
 
   RunContext context_;
   InsConfig config_;
@@ -148,6 +153,11 @@ class CalibrationRun {
   Timers::Id event_timer_ = 0;
   std::optional<Event> pending_;
   std::optional<PageFile> pages_;
+  struct BusEventCount {
+    std::uint64_t count = 0;
+    SteadyTime said_at{};
+  };
+  std::map<can::BusEvent, BusEventCount> bus_events_;
   std::map<std::uint32_t, int> bad_pages_;    // page, how often it came wrong
   std::optional<Error> storage_error_;
   std::optional<Estimate> estimate_;
@@ -169,6 +179,8 @@ class CalibrationRun {
   std::string link_trouble_;
   int failure_status_ = static_cast<int>(ErrorKind::device);
   int last_nrc_ = -1;
+  int sessions_lost_ = 0;
+  bool data_complete_ = false;   // the FLASH holds all of the last rotation, whatever the INS has done since
   bool failed_ = false;
   bool storage_lost_ = false;
 };

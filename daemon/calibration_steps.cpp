@@ -7,6 +7,7 @@
 
 #include "daemon/calibration_run.hpp"
 #include "daemon/estimate_job.hpp"
+#include "daemon/recording_store.hpp"
 #include "protocol/byte_order.hpp"
 
 namespace selfcal {
@@ -74,6 +75,14 @@ Task<Answer<Done>> CalibrationRun::take_stock() {
   co_return Done{};
 }
 
+Task<Answer<Done>> CalibrationRun::look_for_data() {
+  const auto directory = co_await client_.read_directory();
+  if (!directory) co_return tl::unexpected(directory.error());
+  data_complete_ = directory->complete && directory->pages_expected > 0 &&
+                   directory->pages_written == directory->pages_expected;
+  co_return Done{};
+}
+
 Task<CalibrationRun::Step> CalibrationRun::identify() {
   if (auto known = co_await check_serial(); !known) co_return tl::unexpected(known.error());
   if (auto taken = co_await take_stock(); !taken) co_return tl::unexpected(taken.error());
@@ -95,7 +104,21 @@ Task<CalibrationRun::Step> CalibrationRun::unlock() {
   co_return Event::unlocked;
 }
 
+// Before anything turns: a full disk must not end a run in the middle.
+Task<Answer<Done>> CalibrationRun::check_space() {
+  const auto format = co_await client_.read_sample_format();
+  if (!format) co_return tl::unexpected(format.error());
+  const auto samples = static_cast<std::uint64_t>(std::ceil(schedule_.duration_s() * format->sample_rate_hz));
+  const std::string what_for =
+      fmt::format("a run of {:.0f} s at {} Hz", schedule_.duration_s(), format->sample_rate_hz);
+  if (auto room = require_space(folder_, bytes_of_a_run(samples), what_for); !room) {
+    co_return senseless(room.error().message);
+  }
+  co_return Done{};
+}
+
 Task<CalibrationRun::Step> CalibrationRun::write_schedule() {
+  if (auto room = co_await check_space(); !room) co_return tl::unexpected(room.error());
   const auto written = co_await client_.write_record(ins::did::schedule, ins::encode(schedule_record(schedule_)));
   if (!written) co_return tl::unexpected(written.error());
   // Known before the start is asked for, and stored with the next state.
@@ -140,6 +163,8 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
     auto pages = PageFile::open(page_path(folder_), record_.rotation);
     if (!pages) co_return senseless(pages.error().message);
     pages_ = std::move(*pages);
+    const std::uint64_t samples = std::uint64_t{directory->pages_expected} * format->samples_per_page;
+    if (auto kept = pages_->reserve(bytes_of_a_run(samples)); !kept) co_return senseless(kept.error().message);
   }
   progress_.pages_pulled = pages_->count();
   page_s_ = format->samples_per_page / format->sample_rate_hz;
@@ -256,6 +281,10 @@ Task<Answer<Done>> CalibrationRun::bring_to_rest() {
 }
 
 Task<CalibrationRun::Step> CalibrationRun::stop_gimbal() {
+  if (!record_.abort_wanted && record_.reason.empty()) {   // neither asked for nor failed: the INS restarted
+    fail_with(fmt::format("{}: the rotation is lost: the INS is {} when it answers again", config_.interface,
+                          ins::name(stock_.state)));
+  }
   if (auto rests = co_await bring_to_rest(); !rests) co_return tl::unexpected(rests.error());
   co_return Event::gimbal_stopped;
 }
@@ -268,6 +297,7 @@ Task<CalibrationRun::Step> CalibrationRun::recover_link() {
     auto back = co_await check_serial();
     if (back) back = co_await client_.unlock(key_);
     if (back) back = co_await take_stock();
+    if (back) back = co_await look_for_data();
     if (back) {
       if (!progress_.link_up) {
         progress_.link_up = true;

@@ -134,7 +134,10 @@ bool CanPort::receive_batch() {
   }
   bool status_news = false;
   for (const can::ReceivedFrame& received : *batch) {
-    if (received.event) continue;
+    if (received.event) {
+      if (on_bus_event) on_bus_event(*received.event);
+      continue;
+    }
     if (!client_.accepts(received.frame)) {
       take_status(received.frame, status_news);
     } else if (const auto outcome = client_.on_frame(received.frame, loop_.now())) {

@@ -23,6 +23,9 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   Estimate estimate;
   auto recording = recording_from_pages(request, estimate.warnings);
   if (!recording) return tl::unexpected(recording.error());
+  // What was set aside behind the pages is wanted now (truncating to the present size frees it).
+  std::error_code ignored;
+  fs::resize_file(page_path(request.folder), fs::file_size(page_path(request.folder), ignored), ignored);
   {
     const std::lock_guard lock(hdf5_mutex);
     if (auto written = write_hdf5(*recording, recording_path(request.folder)); !written) {

@@ -115,6 +115,10 @@ int EventLoop::run() {
   return status;
 }
 
+void EventLoop::turn(std::chrono::microseconds longest) {
+  require(sd_event_run(event_, static_cast<std::uint64_t>(longest.count())), "turn");
+}
+
 void EventLoop::stop(int exit_status) { require(sd_event_exit(event_, exit_status), "stop"); }
 
 }  // namespace selfcal

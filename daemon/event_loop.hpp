@@ -51,6 +51,7 @@ class EventLoop : public Timers {
 
   bool enable_watchdog();   // feeds systemd's watchdog from this loop, if the unit asks for one
   int run();
+  void turn(std::chrono::microseconds longest);   // serves one event, if one comes in this time
   void stop(int exit_status);
 
  private:

@@ -9,6 +9,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "protocol/can/bus_event.hpp"
 #include "protocol/error.hpp"
 #include "protocol/ins_interface/status.hpp"
 
@@ -42,6 +43,8 @@ class InsPort {
   virtual void reopen() = 0;    // after the link was lost: a fresh socket and transport
   virtual std::uint64_t lost_frames() const = 0;
 
+  // What the CAN controller says of itself and the bus (error frames), as it comes.
+  std::function<void(can::BusEvent)> on_bus_event;
   // What the status frames told last, after each batch that held one.
   std::function<void(const ins::Status&)> on_status;
 };

@@ -21,7 +21,7 @@ bool journal_is_there() {
 
 }  // namespace
 
-void write(Level level, std::string_view message, const Fields& fields) {
+std::vector<std::string> entry(Level level, std::string_view message, const Fields& fields) {
   std::vector<std::string> lines{fmt::format("MESSAGE={}", message), fmt::format("PRIORITY={}", static_cast<int>(level)),
                                  "SYSLOG_IDENTIFIER=selfcald"};
   if (fields.run > 0) lines.push_back(fmt::format("SELFCAL_RUN={}", fields.run));
@@ -29,7 +29,12 @@ void write(Level level, std::string_view message, const Fields& fields) {
   if (!fields.serial.empty()) lines.push_back("SELFCAL_SERIAL=" + fields.serial);
   if (!fields.state.empty()) lines.push_back("SELFCAL_STATE=" + fields.state);
   if (fields.nrc >= 0) lines.push_back(fmt::format("SELFCAL_NRC=0x{:02X}", fields.nrc));
+  return lines;
+}
+
+void write(Level level, std::string_view message, const Fields& fields) {
   if (journal_is_there()) {
+    std::vector<std::string> lines = entry(level, message, fields);
     std::vector<iovec> parts;
     for (std::string& line : lines) parts.push_back({line.data(), line.size()});
     if (sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) >= 0) return;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace selfcal::journal {
 
@@ -18,6 +19,9 @@ struct Fields {
   std::string state;
   int nrc = -1;
 };
+
+// The fields as journald takes them, NAME=value.
+std::vector<std::string> entry(Level level, std::string_view message, const Fields& fields);
 
 void write(Level level, std::string_view message, const Fields& fields = {});
 

@@ -110,6 +110,7 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
   std::string History(const std::string& serial) override { return granted(operations_.history(serial)); }
   std::string CheckDatabase() override { return granted(operations_.check_database()); }
   std::string BackupDatabase(const std::string& file) override { return granted(operations_.backup_database(file)); }
+  std::string RestoreDatabase(const std::string& file) override { return granted(operations_.restore_database(file)); }
   std::string Version() override { return SELFCAL_VERSION; }
   std::vector<std::string> Instruments() override { return operations_.instruments(); }
 

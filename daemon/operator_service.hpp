@@ -40,6 +40,7 @@ class Operations {
   virtual Granted<std::string> history(const std::string& serial) = 0;
   virtual Granted<std::string> check_database() = 0;
   virtual Granted<std::string> backup_database(const std::string& name) = 0;
+  virtual Granted<std::string> restore_database(const std::string& name) = 0;
   virtual std::vector<std::string> instruments() const = 0;
   // Null before the first run of this daemon's life.
   virtual const RunProgress* progress(const std::string& ins) const = 0;

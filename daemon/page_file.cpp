@@ -74,6 +74,11 @@ Expected<std::string> PageFile::store(std::uint32_t page, std::span<const std::u
   return std::string();
 }
 
+Expected<void> PageFile::reserve(std::uint64_t bytes) {
+  if (fallocate(fd_, FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) == 0 || errno == EOPNOTSUPP) return {};
+  return fail(ErrorKind::device, fmt::format("{}: {} bytes cannot be set aside: {}", name_, bytes, std::strerror(errno)));
+}
+
 PageFile::Range PageFile::missing(std::uint32_t end, std::uint32_t longest) {
   while (full_below_ < end && has(full_below_)) ++full_below_;
   Range range{full_below_, 0};

@@ -22,6 +22,10 @@ class PageFile {
   // Empty: stored. Else why the page is no good ("bad CRC").
   Expected<std::string> store(std::uint32_t page, std::span<const std::uint8_t> bytes);
 
+  // Sets disk space aside for the pages and, behind them, for the recording to be made of them; the file does not
+  // grow. Where the file system cannot do that, nothing is set aside.
+  Expected<void> reserve(std::uint64_t bytes);
+
   bool has(std::uint32_t page) const { return page < have_.size() && have_[page]; }
   std::uint32_t count() const { return count_; }
   // The first range of missing pages below `end`, at most `longest` long; count 0: none is missing.

@@ -112,7 +112,7 @@ Expected<void> verify_integrity(sqlite3* database) {
   std::string verdict = statement.text();
   if (verdict == "ok") return {};
   std::replace(verdict.begin(), verdict.end(), '\n', ' ');   // an error is one line
-  return fail(ErrorKind::device, fmt::format("database {}: damaged: {}; restore a backup (selfcal db restore)",
+  return fail(ErrorKind::device, fmt::format("database {}: damaged: {}; restore a backup (selfcal db restore --offline NAME)",
                                              sqlite3_db_filename(database, "main"), verdict));
 }
 

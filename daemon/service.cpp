@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <system_error>
 
-#include "daemon/page_recording.hpp"
+#include "daemon/database_copies.hpp"
 #include "daemon/journal.hpp"
+#include "daemon/page_recording.hpp"
+#include "daemon/recording_store.hpp"
 #include "daemon/wall_clock.hpp"
 #include "protocol/operator_api/names.hpp"
 
@@ -20,7 +22,6 @@ using namespace std::chrono_literals;
 constexpr auto publish_interval = 200ms;
 constexpr unsigned publishes_per_second = 5;
 constexpr auto bus_retry_interval = 5s;
-constexpr double mebibyte = 1048576.0;
 
 }  // namespace
 
@@ -30,18 +31,22 @@ Expected<std::unique_ptr<Service>> Service::create(EventLoop& loop, Config confi
   if (error) {
     return fail(ErrorKind::device, fmt::format("{}: {}", config.state_directory, error.message()));
   }
-  auto store = RunStore::open(fs::path(config.state_directory) / "selfcal.db");
+  auto lock = StateLock::take(config.state_directory);
+  if (!lock) return tl::unexpected(lock.error());
+  auto store = RunStore::open(database_path(config.state_directory));
   if (!store) return tl::unexpected(store.error());
   std::unique_ptr<Service> service(
-      new Service(loop, std::move(config), std::move(config_file), std::move(*store)));
+      new Service(loop, std::move(config), std::move(config_file), std::move(*lock), std::move(*store)));
   if (auto ok = service->connect_bus(); !ok) return tl::unexpected(ok.error());
   return service;
 }
 
-Service::Service(EventLoop& loop, Config config, std::string config_file, std::unique_ptr<RunStore> store)
+Service::Service(EventLoop& loop, Config config, std::string config_file, StateLock lock,
+                 std::unique_ptr<RunStore> store)
     : loop_(loop),
       config_(std::move(config)),
       config_file_(std::move(config_file)),
+      lock_(std::move(lock)),
       store_(std::move(store)),
       publisher_(loop, config_.lcm_url) {
   for (const InsConfig& ins : config_.instruments) sessions_[ins.name].config = ins;
@@ -49,6 +54,7 @@ Service::Service(EventLoop& loop, Config config, std::string config_file, std::u
     if (bus_) bus_->serve();
   });
   publish();
+  prune_every_hour();
 }
 
 Service::~Service() = default;
@@ -231,31 +237,21 @@ void Service::publish() {
   loop_.after(publish_interval, [this] { publish(); });
 }
 
-// Oldest first, until quota and age are kept. The result stays; only the raw data go.
 void Service::prune_recordings() {
-  const auto runs = store_->runs_with_recordings();
-  if (!runs) return journal::write(journal::Level::warning, runs.error().message);
-  std::error_code ignored;
-  const auto size_mib = [&](const RunRecord& run) {
-    const auto bytes = fs::file_size(run.recording, ignored);
-    return ignored ? 0.0 : static_cast<double>(bytes) / mebibyte;
-  };
-  double total = 0.0;
-  for (const RunRecord& run : *runs) total += size_mib(run);
-  const auto now = fs::file_time_type::clock::now();
-  for (RunRecord run : *runs) {
-    const double size = size_mib(run);
-    const auto age = std::chrono::duration<double>(now - fs::last_write_time(run.recording, ignored)).count() / 86400.0;
-    const bool too_old = config_.recordings_keep_days > 0 && age > config_.recordings_keep_days;
-    if (total <= config_.recordings_quota_mib && !too_old) continue;
-    fs::remove(run.recording, ignored);
-    journal::write(journal::Level::notice, fmt::format("recording {} removed: {}", run.recording,
-                                                       too_old ? "older than recordings_keep_days" : "over the quota"),
-                   {run.id, run.ins, run.serial, "", -1});
-    run.recording.clear();
-    total -= size;
-    if (auto stored = store_->update_run(run); !stored) journal::write(journal::Level::error, stored.error().message);
+  const auto pruned =
+      selfcal::prune_recordings(*store_, {config_.recordings_quota_mib, config_.recordings_keep_days},
+                                fs::file_time_type::clock::now());
+  if (!pruned) return journal::write(journal::Level::warning, pruned.error().message);
+  for (const PrunedRecording& gone : *pruned) {
+    journal::write(journal::Level::notice, fmt::format("recording {} removed: {}", gone.run.recording, gone.why),
+                   {gone.run.id, gone.run.ins, gone.run.serial, "", -1});
   }
+}
+
+// Age passes without runs too.
+void Service::prune_every_hour() {
+  prune_recordings();
+  loop_.after(1h, [this] { prune_every_hour(); });
 }
 
 }  // namespace selfcal

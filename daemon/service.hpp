@@ -14,6 +14,7 @@
 #include "daemon/lcm_publisher.hpp"
 #include "daemon/operator_service.hpp"
 #include "daemon/run_store.hpp"
+#include "daemon/state_lock.hpp"
 
 namespace selfcal {
 
@@ -37,7 +38,7 @@ class Service : public Operations, public RunObserver {
     bool active() const { return run && !is_final(run->record().state); }
   };
 
-  Service(EventLoop& loop, Config config, std::string config_file, std::unique_ptr<RunStore> store);
+  Service(EventLoop& loop, Config config, std::string config_file, StateLock lock, std::unique_ptr<RunStore> store);
   Expected<void> connect_bus();
   void bus_lost();
   template <typename Call>
@@ -45,10 +46,10 @@ class Service : public Operations, public RunObserver {
   void publish();
   void sweep_run_folders();
   void prune_recordings();
+  void prune_every_hour();
   void notify_status();
   Granted<RunId> launch(Session& session, RunRecord record, const std::string& schedule_name);
   Expected<void> attach(Session& session, RunRecord record, const std::string& schedule_name);
-  Expected<void> room_for_a_run() const;
   std::filesystem::path run_folder(RunId run) const;
   Session* session(const std::string& ins);
   const Session* session(const std::string& ins) const;
@@ -60,6 +61,7 @@ class Service : public Operations, public RunObserver {
   Granted<std::string> history(const std::string& serial) override;
   Granted<std::string> check_database() override;
   Granted<std::string> backup_database(const std::string& name) override;
+  Granted<std::string> restore_database(const std::string& name) override;
   std::vector<std::string> instruments() const override;
   const RunProgress* progress(const std::string& ins) const override;
   const RunRecord* record(const std::string& ins) const override;
@@ -72,6 +74,7 @@ class Service : public Operations, public RunObserver {
   EventLoop& loop_;
   Config config_;
   std::string config_file_;
+  StateLock lock_;
   std::unique_ptr<RunStore> store_;
   std::map<std::string, Session> sessions_;
   LcmPublisher publisher_;

@@ -1,7 +1,12 @@
 // What operators may ask of the service (operator_service.hpp).
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "daemon/can_port.hpp"
+#include "daemon/database_copies.hpp"
+#include "daemon/journal.hpp"
+#include "daemon/recording_store.hpp"
 #include "daemon/run_documents.hpp"
 #include "daemon/service.hpp"
 #include "daemon/unlock_key.hpp"
@@ -14,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double mebibyte = 1048576.0;
+constexpr std::uint64_t mebibyte = 1 << 20;
 
 tl::unexpected<Refusal> refuse(const char* name, std::string message) {
   return tl::unexpected<Refusal>(Refusal{name, std::move(message)});
@@ -31,16 +36,6 @@ Expected<Schedule> schedule_of(const InsConfig& config, const std::string& name_
 }
 
 }  // namespace
-
-Expected<void> Service::room_for_a_run() const {
-  std::error_code error;
-  const auto space = fs::space(config_.state_directory, error);
-  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", config_.state_directory, error.message()));
-  const double free_mib = static_cast<double>(space.available) / mebibyte;
-  if (free_mib >= config_.free_space_mib) return {};
-  return fail(ErrorKind::device, fmt::format("{}: {:.0f} MiB free, a run needs {:.0f} MiB (free_space_mib)",
-                                             config_.state_directory, free_mib, config_.free_space_mib));
-}
 
 Expected<void> Service::attach(Session& session, RunRecord record, const std::string& schedule_name) {
   auto schedule = schedule_of(session.config, schedule_name);
@@ -67,7 +62,10 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
                   fmt::format("busy, run {} by user {} since {}", other.id, other.user, other.started_utc));
   }
   if (stopping_) return refuse(operator_api::error_unavailable, "the daemon is stopping");
-  if (auto room = room_for_a_run(); !room) return unavailable(room.error());
+  const auto least = static_cast<std::uint64_t>(config_.free_space_mib) * mebibyte;
+  if (auto room = require_space(config_.state_directory, least, "a run (free_space_mib)"); !room) {
+    return unavailable(room.error());
+  }
   // Checked before a run exists, so that a wrong name leaves no trace.
   if (auto schedule = schedule_of(session.config, schedule_name); !schedule) {
     return refuse(operator_api::error_unknown, schedule.error().message);
@@ -160,21 +158,38 @@ Granted<std::string> Service::history(const std::string& serial) {
 }
 
 Granted<std::string> Service::check_database() {
-  const auto ok = RunStore::check(fs::path(config_.state_directory) / "selfcal.db");
+  const auto ok = RunStore::check(database_path(config_.state_directory));
   return ok ? std::string() : ok.error().message;
 }
 
-Granted<std::string> Service::backup_database(const std::string& file) {
-  if (file.empty() || file.front() == '.' || file.find('/') != std::string::npos) {
-    return refuse(operator_api::error_unknown, fmt::format("\"{}\": a plain file name is wanted", file));
+Granted<std::string> Service::backup_database(const std::string& name) {
+  const auto path = back_up_database(config_.state_directory, name);
+  if (path) return path->string();
+  if (path.error().kind == ErrorKind::usage) return refuse(operator_api::error_unknown, path.error().message);
+  return unavailable(path.error());
+}
+
+// Runs in progress belong to the database that would go.
+Granted<std::string> Service::restore_database(const std::string& name) {
+  for (const auto& [ins, other] : sessions_) {
+    if (!other.active()) continue;
+    const RunRecord& run = other.run->record();
+    return refuse(operator_api::error_busy,
+                  fmt::format("busy, run {} by user {} since {}", run.id, run.user, run.started_utc));
   }
-  const fs::path folder = fs::path(config_.state_directory) / "backups";
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return refuse(operator_api::error_unavailable, fmt::format("{}: {}", folder.string(), error.message()));
-  const auto copied = RunStore::copy(fs::path(config_.state_directory) / "selfcal.db", folder / file);
-  if (!copied) return unavailable(copied.error());
-  return (folder / file).string();
+  for (auto& [ins, other] : sessions_) other.run.reset();   // ended ones look into the store still
+  store_.reset();
+  const auto kept = selfcal::restore_database(config_.state_directory, name);
+  auto store = RunStore::open(database_path(config_.state_directory));
+  // Either the new one or, after a failure, the old one, which was open a moment ago.
+  if (!store) throw std::runtime_error(store.error().message);
+  store_ = std::move(*store);
+  if (!kept) {
+    const bool named = kept.error().kind != ErrorKind::usage;
+    return refuse(named ? operator_api::error_unavailable : operator_api::error_unknown, kept.error().message);
+  }
+  journal::write(journal::Level::warning, fmt::format("database restored from backup {}; the former one is {}", name, kept->string()));
+  return kept->string();
 }
 
 std::vector<std::string> Service::instruments() const {

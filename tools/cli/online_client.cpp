@@ -88,6 +88,9 @@ Expected<std::string> ManagerClient::check_database() {
 Expected<std::string> ManagerClient::backup_database(const std::string& name) {
   return call([&] { return proxy_->BackupDatabase(name); });
 }
+Expected<std::string> ManagerClient::restore_database(const std::string& name) {
+  return call([&] { return proxy_->RestoreDatabase(name); });
+}
 Expected<std::vector<std::string>> ManagerClient::instruments() {
   return call([&] { return proxy_->Instruments(); });
 }

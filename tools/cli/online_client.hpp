@@ -28,6 +28,7 @@ class ManagerClient {
   Expected<std::string> history(const std::string& serial);
   Expected<std::string> check_database();
   Expected<std::string> backup_database(const std::string& name);
+  Expected<std::string> restore_database(const std::string& name);
   Expected<std::vector<std::string>> instruments();
   sdbus::IConnection& connection() { return *connection_; }
 

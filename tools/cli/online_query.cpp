@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/database_copies.hpp"
+#include "daemon/state_lock.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
@@ -15,6 +17,8 @@ namespace {
 
 struct Options {
   std::string ins, reason, serial, name;
+  std::string state_directory = "/var/lib/selfcal";
+  bool offline = false;
   std::uint64_t run = 0;
   bool json = false, csv = false;
 };
@@ -174,20 +178,49 @@ Expected<int> backup_database(ManagerClient& manager, const Options& options) {
   return 0;
 }
 
+Expected<int> say_restored(const std::string& kept, const Options& options) {
+  fmt::print("{}\n", options.json ? nlohmann::json{{"kept", kept}}.dump()
+                     : kept.empty() ? std::string("restored")
+                                    : "restored; the former database is " + kept);
+  return 0;
+}
+
+Expected<int> restore_online(ManagerClient& manager, const Options& options) {
+  const auto kept = manager.restore_database(options.name);
+  if (!kept) return tl::unexpected(kept.error());
+  return say_restored(*kept, options);
+}
+
+Expected<int> restore_offline(const Options& options) {
+  const auto lock = StateLock::take(options.state_directory);
+  if (!lock) return tl::unexpected(lock.error());
+  const auto kept = restore_database(options.state_directory, options.name);
+  if (!kept) return tl::unexpected(kept.error());
+  return say_restored(kept->string(), options);
+}
+
 CommandRun configure_database(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.require_subcommand(1);
   auto* check = app.add_subcommand("check", "integrity, and rows that belong to no run");
   auto* backup = app.add_subcommand("backup", "copy the database while the daemon uses it");
   backup->add_option("NAME", options->name, "name of the copy, in the state directory's folder backups")->required();
+  auto* restore = app.add_subcommand("restore", "put a backup in the database's place; the former one is kept");
+  restore->add_option("NAME", options->name, "name of the copy, in the state directory's folder backups")->required();
+  restore->add_flag("--offline", options->offline, "the daemon is stopped (it does not start on a damaged database)");
+  restore->add_option("--state-directory", options->state_directory, "with --offline")->capture_default_str();
   app.add_flag("--json", options->json, "as JSON");
+  const CommandRun run_restore = online(options, restore_online);
   const CommandRun run_check = online(options, check_database);
   const CommandRun run_backup = online(options, backup_database);
-  return [=] { return check->parsed() ? run_check() : run_backup(); };
+  return [=] {
+    if (restore->parsed()) return options->offline ? restore_offline(*options) : run_restore();
+    return check->parsed() ? run_check() : run_backup();
+  };
 }
 
 const CommandRegistration registrations[] = {
-    {{"db", "check or back up the daemon's database", configure_database}},
+    {{"db", "check, back up or restore the daemon's database", configure_database}},
     {{"status", "what each INS is doing", configure_status}},
     {{"abort", "stop a run safely", configure_abort}},
     {{"show", "the story and the result of a run", configure_show}},

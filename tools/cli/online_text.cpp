@@ -61,6 +61,11 @@ std::string run_text(const std::string& document, bool colour, bool story) {
     text += fmt::format("  free-inertial drift: {:.1f} m before, {:.1f} m after\n", run.at("drift_before_m").get<double>(),
                         run.at("drift_after_m").get<double>());
   }
+  const json& pushed = run.at("coefficients").at("pushed");
+  if (pushed.is_object()) {
+    text += fmt::format("  coefficients version {} written and read back{}\n", pushed.at("version").get<int>(),
+                        run.at("coefficients").at("in_force").get<bool>() ? ", in force" : "");
+  }
   if (story) {
     for (const json& event : run.at("events")) {
       text += fmt::format("  {}  {:<9} {}\n", text_of(event, "utc"), text_of(event, "kind"), text_of(event, "text"));
@@ -92,6 +97,7 @@ std::string history_text(const std::string& document) {
                           value.at("value").get<double>(), value.at("sigma").get<double>(),
                           value.at("determined").get<bool>() ? "" : "  not determined");
     }
+    for (const json& warning : parameter.at("warnings")) text += fmt::format("  warning: {}\n", warning.get<std::string>());
   }
   return text.empty() ? "no runs\n" : text;
 }

@@ -1,0 +1,169 @@
+// The service as a whole, on a D-Bus of its own: what a reload, a full disk and a restore do to runs and to operators.
+// Its INS does not exist, so that a run stays in its first state.
+#include "daemon/service.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <fstream>
+
+#include "daemon/database_copies.hpp"
+#include "protocol/operator_api/names.hpp"
+
+namespace selfcal {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// A dbus-daemon on a socket of its own; it ends with the test.
+class PrivateBus {
+ public:
+  PrivateBus() {
+    std::array<int, 2> ends{};
+    if (pipe(ends.data()) != 0) return;
+    pid_ = fork();
+    if (pid_ == 0) {
+      dup2(ends[1], STDOUT_FILENO);
+      execlp("dbus-daemon", "dbus-daemon", "--session", "--nofork", "--print-address", nullptr);
+      _exit(127);
+    }
+    close(ends[1]);
+    char c = 0;
+    while (read(ends[0], &c, 1) == 1 && c != '\n') address_ += c;
+    close(ends[0]);
+  }
+  ~PrivateBus() {
+    if (pid_ <= 0) return;
+    kill(pid_, SIGTERM);
+    waitpid(pid_, nullptr, 0);
+  }
+  PrivateBus(const PrivateBus&) = delete;
+  PrivateBus& operator=(const PrivateBus&) = delete;
+  const std::string& address() const { return address_; }
+
+ private:
+  pid_t pid_ = -1;
+  std::string address_;
+};
+
+class ServiceTest : public testing::Test {
+ protected:
+  ServiceTest() {
+    std::string pattern = testing::TempDir() + "service_XXXXXX";
+    folder_ = mkdtemp(pattern.data());
+    std::ofstream(folder_ / "key") << "000102030405060708090a0b0c0d0e0f\n";
+    unsetenv(operator_api::bus_variable);
+  }
+  ~ServiceTest() override {
+    service_.reset();
+    fs::remove_all(folder_);
+  }
+
+  void configure(const std::string& daemon_keys, const std::string& sections) {
+    std::ofstream(folder_ / "selfcald.toml")
+        << "[daemon]\nstate_directory = \"" << (folder_ / "state").string() << "\"\nbus = \"" << bus_.address()
+        << "\"\nlcm_url = \"\"\n" << daemon_keys << sections;
+  }
+  std::string section(const std::string& name, const std::string& keys = "") const {
+    return "[ins." + name + "]\ninterface = \"absent-" + name + "\"\nkey_file = \"" + (folder_ / "key").string() +
+           "\"\n" + keys;
+  }
+  void start() {
+    const std::string file = folder_ / "selfcald.toml";
+    auto config = load_config(file);
+    ASSERT_TRUE(config) << config.error().message;
+    auto service = Service::create(loop_, std::move(*config), file);
+    ASSERT_TRUE(service) << service.error().message;
+    service_ = std::move(*service);
+  }
+  Operations& operations() { return *service_; }
+  Granted<RunId> run(const std::string& ins) {
+    StartRequest request;
+    request.ins = ins;
+    request.user = "ann";
+    return operations().start(request);
+  }
+
+  PrivateBus bus_;
+  fs::path folder_;
+  EventLoop loop_;
+  std::unique_ptr<Service> service_;
+};
+
+TEST_F(ServiceTest, AReloadTakesUpTheNewAndLeavesRunsAlone) {
+  configure("", section("a") + section("b"));
+  start();
+  const auto first = run("a");
+  ASSERT_TRUE(first) << first.error().message;
+  // a is gone from the file, b has another schedule, c is new.
+  configure("", section("b", "schedule = \"table2\"\n") + section("c"));
+  service_->reload();
+  EXPECT_THAT(operations().instruments(), ElementsAre("a", "b", "c"));
+  ASSERT_NE(operations().record("a"), nullptr);
+  EXPECT_EQ(operations().record("a")->id, *first);
+  EXPECT_FALSE(is_final(operations().record("a")->state));
+  const auto second = run("a");
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().name, operator_api::error_busy);
+  EXPECT_THAT(second.error().message, HasSubstr("busy, run 1 by user ann since"));
+  ASSERT_TRUE(run("b"));
+  EXPECT_EQ(operations().record("b")->schedule, "table2");
+  ASSERT_TRUE(run("c"));
+}
+
+TEST_F(ServiceTest, AReloadOfAFaultyFileChangesNothing) {
+  configure("", section("a"));
+  start();
+  configure("", section("a", "typo = 1\n") + section("b"));
+  service_->reload();
+  EXPECT_THAT(operations().instruments(), ElementsAre("a"));
+}
+
+TEST_F(ServiceTest, WithTooLittleDiskNoRunBegins) {
+  configure("free_space_mib = 1e12\n", section("a"));
+  start();
+  const auto refused = run("a");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().name, operator_api::error_unavailable);
+  EXPECT_THAT(refused.error().message, HasSubstr("MiB free, a run (free_space_mib) needs"));
+  EXPECT_FALSE(operations().show(1));   // not even a record of one
+}
+
+TEST_F(ServiceTest, ARestoreWaitsForRunsAndThenBringsBackTheirPast) {
+  configure("", section("a"));
+  start();
+  ASSERT_TRUE(operations().backup_database("before.db"));
+  ASSERT_TRUE(run("a"));
+  const auto busy = operations().restore_database("before.db");
+  ASSERT_FALSE(busy);
+  EXPECT_EQ(busy.error().name, operator_api::error_busy);
+  ASSERT_TRUE(operations().abort("a", "test"));
+  // An abort is taken up in the next turns of the loop; a hang would be ended by the test's time limit.
+  while (!is_final(operations().record("a")->state)) loop_.turn(std::chrono::seconds(1));
+  EXPECT_FALSE(operations().restore_database("absent.db"));
+  EXPECT_TRUE(operations().show(1));   // the database is as it was
+  const auto kept = operations().restore_database("before.db");
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_TRUE(fs::exists(*kept));
+  EXPECT_FALSE(operations().show(1));
+  EXPECT_EQ(*operations().check_database(), "");
+  EXPECT_EQ(*run("a"), 1);   // the daemon goes on with it
+}
+
+TEST_F(ServiceTest, TwoServicesDoNotShareAStateDirectory) {
+  configure("", section("a"));
+  start();
+  const std::string file = folder_ / "selfcald.toml";
+  const auto second = Service::create(loop_, *load_config(file), file);
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().message, HasSubstr("in use by another"));
+}
+
+}  // namespace
+}  // namespace selfcal
