@@ -21,8 +21,9 @@ constexpr double least_duration_s = 60.0;
 constexpr double first_still_sigma = 3e-6;    // m
 constexpr double first_moored_sigma = 0.2;    // m
 constexpr double least_position_sigma = 1e-6; // m: a still base stands to micrometres
-constexpr int motion_order = 8;               // up to four spectral peaks per axis
-constexpr int most_motion_fits = 8;
+constexpr double moored_velocity = 0.2;       // m/s
+constexpr int motion_order = 12;              // up to six spectral peaks
+constexpr int most_motion_rounds = 10;
 constexpr int motion_start_up = 100;          // epochs left out of the first fit, while the filter settles
 constexpr double fair_nis = 10.0;             // beyond it another heading is tried
 
@@ -70,7 +71,7 @@ class Calibration {
   bool settle(int least_passes);
   bool fit_position_sigma();
   bool fit_base_motion();
-  bool sharpen_base_motion(double best_likelihood);
+  PassOutput observe_motion(const ObservationModel& observation) const;
   CalibrationResult result();
   ParameterVector sigma() const {
     return last_.covariance.diagonal().segment<sensor_parameter_count>(last_.layout.parameters()).cwiseSqrt();
@@ -175,7 +176,8 @@ bool Calibration::settle(int least_passes) {
   return true;
 }
 
-// A still base: the white position noise is the one with the greatest likelihood, from 1 um upwards by factors of 3.
+// A still base: the white position noise is the one with the greatest likelihood, from 1 um upwards by factors of 3;
+// where it lies above that, to a seventh (3^(1/8) either way).
 bool Calibration::fit_position_sigma() {
   PassOutput best = last_;
   double best_sigma = input_.noise.observation.sigma;
@@ -195,64 +197,61 @@ bool Calibration::fit_position_sigma() {
   const double factor = last_.nis_mean > 1.0 ? 3.0 : 1.0 / 3.0;
   for (double s = factor * best_sigma; s < 1.0 && s > 0.9 * least_position_sigma && attempt(s); s *= factor) {
   }
+  if (best_sigma > 1.5 * least_position_sigma) {
+    for (double step = std::sqrt(3.0); step > 1.2; step = std::sqrt(step)) {
+      attempt(best_sigma * step) || attempt(best_sigma / step);
+    }
+  }
   input_.noise.observation.sigma = std::max(best_sigma, least_position_sigma);
   return !stop_.stop_requested();
 }
 
-// A moored base: an autoregressive model of its motion, fitted to what the filter took for motion, again and again
-// while the likelihood grows.
-bool Calibration::fit_base_motion() {
-  ObservationModel best = input_.noise.observation;
-  double best_likelihood = last_.log_likelihood;
-  for (int fit = 0; fit < most_motion_fits; ++fit) {
-    ObservationModel& model = input_.noise.observation;
-    const auto count = static_cast<Eigen::Index>(last_.epochs.size());
-    const Eigen::Index skip = std::min<Eigen::Index>(motion_start_up, count / 4);
-    for (int axis = 0; axis < 3; ++axis) {
-      VectorX series(count - skip);
-      for (Eigen::Index k = skip; k < count; ++k) {
-        const Epoch& e = last_.epochs[static_cast<std::size_t>(k)];
-        series(k - skip) = fit == 0 ? e.innovation(axis) : -e.position(axis);
-      }
-      model.motion[static_cast<std::size_t>(axis)] = fit_motion(series, motion_order);
-    }
-    model.sigma = first_still_sigma;
-    if (!pass(next_sign_)) {
-      return false;
-    }
-    if (fit > 0 && last_.log_likelihood < best_likelihood + 3.0 * motion_order && fit > 3) {
-      break;
-    }
-    if (last_.log_likelihood > best_likelihood) {
-      best_likelihood = last_.log_likelihood;
-      best = model;
-    }
-  }
-  input_.noise.observation = best;
-  return sharpen_base_motion(best_likelihood);
+// A pass that shows the motion of the base: the parameters are taken as known from the passes so far, so that the
+// filter's settling does not pass for motion. Nothing of it goes into the answer.
+PassOutput Calibration::observe_motion(const ObservationModel& observation) const {
+  PassInput trial = input_;
+  trial.sign = next_sign_;
+  trial.noise.observation = observation;
+  const int at = last_.layout.parameters();
+  trial.prior.carried = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).eval();
+  trial.prior.velocity = moored_velocity;
+  trial.prior.attitude = 3.0 * std::sqrt(last_.covariance.diagonal().segment<3>(StateLayout::attitude).maxCoeff());
+  return run_pass(trial, {}, stop_);
 }
 
-// What drives the motion model was judged from a series with the filter's own noise in it, so it comes out too large:
-// drawn down, axis by axis, by what the innovations say, while the likelihood grows.
-bool Calibration::sharpen_base_motion(double best_likelihood) {
-  constexpr int most_rounds = 6;
-  for (int round = 0; round < most_rounds; ++round) {
-    const ObservationModel before = input_.noise.observation;
-    if (round > 0) {
-      const Vector3 nis = axis_nis(last_);
-      for (int axis = 0; axis < 3; ++axis) {
-        input_.noise.observation.motion[static_cast<std::size_t>(axis)].innovation_sigma *=
-            std::clamp(nis(axis), 0.2, 2.0);
-      }
-    }
-    if (!pass(next_sign_)) {
+// A moored base: an autoregressive model of its motion, fitted to what is left of the position when white noise of
+// decimetres is assumed. What drives the model was judged from a series with the filter's own noise in it, so it comes
+// out too large: drawn down, axis by axis, by what the innovations say, while the likelihood grows.
+bool Calibration::fit_base_motion() {
+  PassOutput seen = observe_motion(input_.noise.observation);
+  if (seen.stopped) {
+    return false;
+  }
+  const auto count = static_cast<Eigen::Index>(seen.epochs.size());
+  const Eigen::Index skip = std::min<Eigen::Index>(motion_start_up, count / 4);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> series(count - skip, 3);
+  for (Eigen::Index k = skip; k < count; ++k) {
+    series.row(k - skip) = seen.epochs[static_cast<std::size_t>(k)].innovation;
+  }
+  ObservationModel& best = input_.noise.observation;
+  ObservationModel trial;
+  trial.sigma = first_still_sigma;
+  trial.motion = fit_motion(series, motion_order);
+  double best_likelihood = -HUGE_VAL;
+  for (int round = 0; round < most_motion_rounds; ++round) {
+    seen = observe_motion(trial);
+    if (seen.stopped) {
       return false;
     }
-    if (round > 0 && last_.log_likelihood < best_likelihood + 3.0) {
-      input_.noise.observation = last_.log_likelihood > best_likelihood ? input_.noise.observation : before;
+    if (seen.log_likelihood < best_likelihood + 3.0) {
       break;
     }
-    best_likelihood = last_.log_likelihood;
+    best = trial;
+    best_likelihood = seen.log_likelihood;
+    const Vector3 nis = axis_nis(seen);
+    for (int axis = 0; axis < 3; ++axis) {
+      trial.motion[static_cast<std::size_t>(axis)].innovation_sigma *= std::clamp(nis(axis), 0.2, 2.0);
+    }
   }
   return true;
 }
