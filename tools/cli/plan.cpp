@@ -13,6 +13,7 @@
 #include "protocol/schedule_file/schedule_file.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/estimator_arguments.hpp"
+#include "tools/cli/page_writer.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -33,6 +34,7 @@ struct PlanArguments {
   bool optimize = false;
   double longest_s = SearchOptions{}.longest_s;
   std::string output;
+  std::string compared;        // a second schedule for the page
   bool json = false;
 };
 
@@ -145,10 +147,38 @@ std::vector<std::string> warnings_for(const Plan& plan, const Schedule& schedule
   return warnings;
 }
 
+// The page of this plan, beside the schedule that it is to be compared with.
+Expected<void> write_page(const PlanArguments& a, report::PlannedSchedule planned, const Installation& installation) {
+  if (plan_page_writer() == nullptr) {
+    return fail(ErrorKind::usage, fmt::format("{}: this program was built without pages (npm was missing)", a.output));
+  }
+  std::vector<report::PlannedSchedule> schedules = {std::move(planned)};
+  if (!a.compared.empty()) {
+    Expected<Schedule> other = find_schedule(a.compared, a.dwell_s, a.rotation_s);
+    if (!other) {
+      return tl::unexpected(other.error());
+    }
+    const Plan plan = predict(*other, installation);
+    const std::vector<std::string> warnings = warnings_for(plan, *other, installation);
+    schedules.push_back({a.compared, *other, plan, plan_json(plan, *other, installation, warnings)});
+  }
+  return plan_page_writer()(schedules, installation, a.output);
+}
+
+Expected<void> write_output(const PlanArguments& a, const report::PlannedSchedule& planned, const Installation& installation) {
+  if (is_page(a.output)) {
+    return write_page(a, planned, installation);
+  }
+  return write_file_atomically(a.output, format_schedule(planned.schedule));
+}
+
 Expected<int> plan(const PlanArguments& a) {
   const Expected<Installation> installation = installation_from(a);
   if (!installation) {
     return tl::unexpected(installation.error());
+  }
+  if (!a.compared.empty() && !is_page(a.output)) {
+    return fail(ErrorKind::usage, "--compare: for a page only (-o NAME.html or NAME.pdf)");
   }
   Schedule schedule;
   Plan result;
@@ -178,7 +208,9 @@ Expected<int> plan(const PlanArguments& a) {
   }
   const std::vector<std::string> warnings = warnings_for(result, schedule, *installation);
   if (!a.output.empty()) {
-    if (const auto written = write_file_atomically(a.output, format_schedule(schedule)); !written) {
+    const report::PlannedSchedule planned{a.optimize ? "optimized" : a.schedule, schedule, result,
+                                          plan_json(result, schedule, *installation, warnings)};
+    if (const auto written = write_output(a, planned, *installation); !written) {
       return tl::unexpected(written.error());
     }
   }
@@ -221,7 +253,8 @@ CommandRun configure(CLI::App& app) {
   app.add_option("--longest", a->longest_s, "with --optimize: no schedule beyond so many seconds")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("-o,--output", a->output, "write the schedule to a TOML file, ready to run");
+  app.add_option("-o,--output", a->output, "file to write: .html or .pdf a page with plots, else the schedule as TOML, ready to run");
+  app.add_option("--compare", a->compared, "with a page: a second schedule (table2, horizontal, or a TOML file) beside it");
   app.add_flag("--json", a->json, "one JSON document on standard output");
   return [a] { return plan(*a); };
 }

@@ -1,59 +1,261 @@
-// selfcal report: a recording's calibration as one self-contained HTML page.
+// selfcal report: one calibration, or all units, as a self-contained HTML page or an A4 PDF.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/wall_clock.hpp"
+#include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/diagnose_output.hpp"
 #include "tools/cli/estimator_arguments.hpp"
-#include "tools/report/report.hpp"
+#include "tools/cli/online_client.hpp"
+#include "tools/cli/page_writer.hpp"
+#include "tools/cli/terminal.hpp"
+#include "tools/report/calibration_document.hpp"
+#include "tools/report/fleet_document.hpp"
+#include "tools/report/misfit_map.hpp"
+#include "tools/report/page.hpp"
+#include "tools/report/plan_document.hpp"
+#include "tools/report/run_document.hpp"
 
 namespace selfcal::cli {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t largest_document = 50'000'000;   // bytes of a saved document of the daemon
+
 struct ReportArguments {
-  std::string recording;
+  std::vector<std::string> subjects;
   std::string output;
+  std::string past;
   std::vector<std::string> tolerance;
   NoiseArguments noise;
+  bool fleet = false;
+  bool no_diagnosis = false;
+  double false_alarm_rate = diagnosis::DiagnosisOptions{}.false_alarm_rate;
+  report::FleetOptions fleet_options;
 };
 
-Expected<int> write_report(const ReportArguments& arguments) {
+Expected<CalibrationOptions> options_from(const ReportArguments& arguments) {
   CalibrationOptions options;
   options.noise = arguments.noise.in_si();
-  const Expected<ParameterVector> tolerance = tolerance_from(arguments.tolerance);
-  if (!tolerance) {
-    return tl::unexpected(tolerance.error());
+  return tolerance_from(arguments.tolerance).map([&](const ParameterVector& tolerance) {
+    options.tolerance = tolerance;
+    return options;
+  });
+}
+
+Expected<Json> diagnosis_document(const Recording& recording, const std::string& name, double false_alarm_rate) {
+  std::vector<double> first_temperature;
+  const ImuData data = imu_view(recording, first_temperature);
+  diagnosis::DiagnosisOptions options;
+  options.false_alarm_rate = false_alarm_rate;
+  ProgressLine line;
+  const diagnosis::DiagnosisOutcome outcome =
+      diagnosis::diagnose(data, options, [&line](const std::string& words) { line.show("diagnosis: " + words); });
+  if (!outcome.diagnosis) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, outcome.failure));
   }
-  options.tolerance = *tolerance;
-  const Expected<LoadedRecording> loaded = read_recording(arguments.recording);
+  Json document = diagnosis_json(*outcome.diagnosis, false_alarm_rate);
+  document["map"] = report::misfit_map(data, *outcome.diagnosis);
+  return document;
+}
+
+Expected<Json> recording_document(const std::string& file, const ReportArguments& arguments) {
+  const Expected<CalibrationOptions> options = options_from(arguments);
+  if (!options) {
+    return tl::unexpected(options.error());
+  }
+  const Expected<LoadedRecording> loaded = read_recording(file);
   if (!loaded) {
     return tl::unexpected(loaded.error());
   }
-  const Expected<CalibrationResult> result = calibrate_recording(loaded->recording, options);
+  const Expected<CalibrationResult> result = calibrate_recording(loaded->recording, *options);
   if (!result) {
-    return fail(result.error().kind, fmt::format("{}: {}", arguments.recording, result.error().message));
+    return fail(result.error().kind, fmt::format("{}: {}", file, result.error().message));
   }
-  const std::string page =
-      report::report_page(report::report_document(*result, options, loaded->recording, loaded->warnings));
-  // The page is the answer, whatever it says; `estimate` has the status that a script asks for.
-  return write_file_atomically(arguments.output, page).map([] { return 0; });
+  Json document = report::calibration_document(*result, *options, loaded->recording, loaded->warnings);
+  if (!arguments.no_diagnosis) {
+    Expected<Json> diagnosed = diagnosis_document(loaded->recording, file, arguments.false_alarm_rate);
+    if (!diagnosed) {
+      return diagnosed;
+    }
+    document["diagnosis"] = std::move(*diagnosed);
+  }
+  return document;
+}
+
+// From the daemon, or from a file that holds what it said.
+Expected<Json> history_of(const std::string& serial) {
+  auto manager = ManagerClient::connect();
+  if (!manager) {
+    return tl::unexpected(manager.error());
+  }
+  return (*manager)->history(serial).and_then(
+      [&](const std::string& text) { return report::read_history(text, "history of " + serial); });
+}
+
+Expected<Json> saved_history(const std::string& file) {
+  return read_text_file(file, largest_document).and_then(
+      [&](const std::string& text) { return report::read_history(text, file); });
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() && text.size() < 19 && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+Expected<Json> run_of_daemon(const std::string& number) {
+  auto manager = ManagerClient::connect();
+  if (!manager) {
+    return tl::unexpected(manager.error());
+  }
+  return (*manager)->show(std::stoull(number)).and_then(
+      [&](const std::string& text) { return report::read_run(text, "run " + number); });
+}
+
+Expected<Json> saved_run(const std::string& file) {
+  return read_text_file(file, largest_document).and_then(
+      [&](const std::string& text) { return report::read_run(text, file); });
+}
+
+// A recording that is gone or may not be read costs the curves, not the page.
+Json document_of_run(const Json& run, const ReportArguments& arguments) {
+  const std::string recording = run.value("recording", std::string());
+  if (recording.empty()) {
+    return report::run_page_document(run, std::nullopt);
+  }
+  Expected<Json> recomputed = recording_document(recording, arguments);
+  if (!recomputed) {
+    Json document = report::run_page_document(run, std::nullopt);
+    document["warnings"].push_back("no curves: " + recomputed.error().message);
+    return document;
+  }
+  return report::run_page_document(run, std::move(*recomputed));
+}
+
+Expected<Json> page_of(const std::string& subject, const ReportArguments& arguments) {
+  const bool live = is_number(subject);
+  const bool saved = subject.ends_with(".json");
+  Json document;
+  std::string serial, utc;
+  if (live || saved) {
+    const Expected<Json> run = live ? run_of_daemon(subject) : saved_run(subject);
+    if (!run) {
+      return run;
+    }
+    document = document_of_run(*run, arguments);
+    serial = run->at("serial").get<std::string>();
+    utc = run->at("started_utc").get<std::string>();
+  } else {
+    Expected<Json> made = recording_document(subject, arguments);
+    if (!made) {
+      return made;
+    }
+    document = std::move(*made);
+    utc = document.value("start_time_utc", std::string());
+  }
+  if (!arguments.past.empty() || (live && !serial.empty())) {
+    const Expected<Json> history = arguments.past.empty() ? history_of(serial) : saved_history(arguments.past);
+    if (!history) {
+      return history;
+    }
+    report::add_history(document, *history, utc);
+  }
+  return document;
+}
+
+Expected<std::vector<Json>> histories_of_daemon() {
+  const Expected<Json> all = history_of("");
+  if (!all) {
+    return tl::unexpected(all.error());
+  }
+  std::set<std::string> serials;
+  for (const Json& run : all->at("runs")) {
+    if (!run.at("serial").get<std::string>().empty()) {
+      serials.insert(run.at("serial").get<std::string>());
+    }
+  }
+  std::vector<Json> histories;
+  for (const std::string& serial : serials) {
+    Expected<Json> history = history_of(serial);
+    if (!history) {
+      return tl::unexpected(history.error());
+    }
+    histories.push_back(std::move(*history));
+  }
+  return histories;
+}
+
+Expected<Json> fleet_page(const ReportArguments& arguments) {
+  std::vector<Json> histories;
+  if (arguments.subjects.empty()) {
+    Expected<std::vector<Json>> live = histories_of_daemon();
+    if (!live) {
+      return tl::unexpected(live.error());
+    }
+    histories = std::move(*live);
+  }
+  for (const std::string& file : arguments.subjects) {
+    Expected<Json> history = saved_history(file);
+    if (!history) {
+      return history;
+    }
+    histories.push_back(std::move(*history));
+  }
+  return report::fleet_document(histories, arguments.fleet_options);
+}
+
+// The page is the answer, whatever it says; `estimate` and `diagnose` have the status that a script asks for.
+Expected<int> write_report(ReportArguments arguments) {
+  if (arguments.fleet) {
+    if (arguments.fleet_options.as_of_utc.empty()) {
+      arguments.fleet_options.as_of_utc = utc_now();
+    }
+  } else if (arguments.subjects.size() != 1) {
+    return fail(ErrorKind::usage, "one RUN or RECORDING is wanted (or --history for all units)");
+  }
+  return (arguments.fleet ? fleet_page(arguments) : page_of(arguments.subjects.front(), arguments))
+      .and_then([&](const Json& document) { return report::write_page(document, arguments.output); })
+      .map([] { return 0; });
+}
+
+Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& schedules, const Installation& installation,
+                               const std::filesystem::path& file) {
+  return report::write_page(report::plan_document(schedules, installation), file);
 }
 
 CommandRun configure(CLI::App& app) {
+  plan_page_writer() = write_plan_page;
   auto arguments = std::make_shared<ReportArguments>();
-  app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
-  app.add_option("-o,--output", arguments->output, "HTML file to write")->required();
+  app.add_option("RUN", arguments->subjects,
+                 "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
+                 "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
+                 "of the daemon");
+  app.add_option("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)")->required();
+  app.add_flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
+  app.add_option("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
+  app.add_option("--interval", arguments->fleet_options.interval_days, "with --history: days between calibrations")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--as-of", arguments->fleet_options.as_of_utc, "with --history: UTC of the page; now if left out");
+  app.add_flag("--no-diagnosis", arguments->no_diagnosis, "leave out the comparison of recording and model");
+  app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of the diagnosis, of a whole recording")
+      ->check(CLI::Range(1e-6, 0.2))
+      ->capture_default_str();
   app.add_option("--tolerance", arguments->tolerance, "NAME=VALUE, as for estimate");
   arguments->noise.add_to(app);
   return [arguments] { return write_report(*arguments); };
 }
 
-const CommandRegistration registration{{"report", "a calibration as one HTML page with plots", configure}};
+const CommandRegistration registration{{"report", "a calibration, or all units, as an HTML page with plots", configure}};
 
 }  // namespace
 }  // namespace selfcal::cli

@@ -1,39 +1,24 @@
-#include "tools/report/report.hpp"
+#include "tools/report/calibration_document.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "daemon/calibration/calibrate_recording.hpp"
 #include "daemon/calibration/result_json.hpp"
+#include "estimator/diagnosis/signature_pass.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/report/allan_deviation.hpp"
-#include "tools/report/page_assets.hpp"
+#include "tools/report/page.hpp"
 
 namespace selfcal::report {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double curve_digits = 6.0;          // of a plotted number: far below a pixel
+constexpr double innovation_scale = 1000.0;   // plotted to a thousandth of a sigma
 constexpr std::size_t gimbal_points = 1500;   // a point a pixel on a wide screen
-
-double rounded(double value) {
-  if (value == 0.0 || !std::isfinite(value)) {
-    return value;
-  }
-  const double scale = std::pow(10.0, curve_digits - 1.0 - std::floor(std::log10(std::abs(value))));
-  return std::round(value * scale) / scale;
-}
-
-void round_numbers(Json& value) {
-  if (value.is_number_float()) {
-    value = rounded(value.get<double>());
-  } else if (value.is_array()) {
-    std::for_each(value.begin(), value.end(), round_numbers);
-  }
-}
 
 // Curves only: the numbers of the tables stay as they are in the JSON.
 void round_curves(Json& document) {
@@ -77,48 +62,42 @@ Json allan_json(const Recording& recording) {
           {"accel_ug", {columns[3], columns[4], columns[5]}}};
 }
 
-// JSON inside a <script> element: "</script>" and "<!--" must not appear, and "<" appears in strings only.
-std::string script_safe(const Json& document) {
-  const std::string text = document.dump();
-  std::string safe;
-  safe.reserve(text.size());
-  for (const char c : text) {
-    if (c == '<') {
-      safe += "\\u003c";
-    } else {
-      safe += c;
+// Innovations of a forward pass at the answer, over their predicted sigma: unit variance where nothing is left out.
+Json innovations_json(const CalibrationResult& result, const Recording& recording) {
+  std::vector<double> first_temperature;
+  const ImuData data = imu_view(recording, first_temperature);
+  const diagnosis::RecordingContext context(data);
+  PassInput input;
+  input.data = &data;
+  input.parameters = result.value;
+  input.C_nb = result.C_nb_start;
+  input.noise = result.noise;
+  input.prior.parameter_sigma = 2.0 * plausible_limit();
+  const diagnosis::SignatureRows rows = diagnosis::SignaturePass(context, {}, false).run(input);
+  Json time = Json::array();
+  std::array<Json, 3> axes;
+  axes.fill(Json::array());
+  for (Eigen::Index row = 0; row + 2 < rows.residual.size(); row += 3) {
+    time.push_back(rounded(rows.time_s[static_cast<std::size_t>(row)]));
+    for (std::size_t axis = 0; axis < axes.size(); ++axis) {
+      const double value = rows.residual[row + static_cast<Eigen::Index>(axis)];
+      axes[axis].push_back(std::round(value * innovation_scale) / innovation_scale);
     }
   }
-  return safe;
+  return {{"time_s", std::move(time)}, {"north", axes[0]}, {"up", axes[1]}, {"east", axes[2]}};
 }
 
 }  // namespace
 
-nlohmann::ordered_json report_document(const CalibrationResult& result, const CalibrationOptions& options,
-                                       const Recording& recording, const std::vector<std::string>& warnings) {
+nlohmann::ordered_json calibration_document(const CalibrationResult& result, const CalibrationOptions& options,
+                                            const Recording& recording, const std::vector<std::string>& warnings) {
   Json document = result_json(result, options, recording, warnings, true);
+  document["kind"] = "calibration";
   round_curves(document);
   document["gimbal"] = gimbal_json(recording);
   document["allan"] = allan_json(recording);
+  document["innovations"] = innovations_json(result, recording);
   return document;
-}
-
-std::string report_page(const nlohmann::ordered_json& document) {
-  std::string page = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-                     "<link rel=\"icon\" href=\"data:,\">\n<title>Self-calibration report</title>\n<style>\n";
-  for (const std::string_view style : page_styles()) {
-    page += style;
-  }
-  page += "</style>\n</head>\n<body>\n";
-  page += page_body();
-  page += "<script type=\"application/json\" id=\"document\">" + script_safe(document) + "</script>\n";
-  for (const std::string_view script : page_scripts()) {
-    page += "<script>\n";
-    page += script;
-    page += "\n</script>\n";
-  }
-  return page + "</body>\n</html>\n";
 }
 
 }  // namespace selfcal::report

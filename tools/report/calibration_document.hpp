@@ -1,4 +1,4 @@
-// The report: one self-contained HTML file that opens from disk, with everything known about one calibration.
+// What the page of one calibration shows.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -11,10 +11,7 @@
 namespace selfcal::report {
 
 // result_json() with its curves, and what the plots need besides: gimbal angles over time, Allan deviations.
-nlohmann::ordered_json report_document(const CalibrationResult& result, const CalibrationOptions& options,
-                                       const Recording& recording, const std::vector<std::string>& warnings);
-
-// The page that shows `document`; it holds the document, the program and the plotting library, and asks no network.
-std::string report_page(const nlohmann::ordered_json& document);
+nlohmann::ordered_json calibration_document(const CalibrationResult& result, const CalibrationOptions& options,
+                                            const Recording& recording, const std::vector<std::string>& warnings);
 
 }  // namespace selfcal::report

@@ -83,6 +83,22 @@ function showNis(report) {
   });
 }
 
+// A thousand points a line: the mean of each stretch would hide what the picture is for, so every k-th is shown.
+function showInnovations(report) {
+  const all = report.innovations;
+  const step = Math.ceil(all.time_s.length / 1500);
+  const thin = (list) => list.filter((_, k) => k % step === 0);
+  addPlot(document.getElementById('innovation-plot'), {
+    id: 'innovations',
+    title: 'Innovations of the last answer over their predicted σ (unit variance expected; dotted: ±3 σ)',
+    x: {label: 'time', unit: 'min', values: thin(all.time_s).map((at) => at / 60)},
+    y: {label: 'innovation / σ', unit: '1'},
+    series: ['north', 'up', 'east'].map((axis, k) => ({label: axis, colour: axisColours[k], points: true, small: true,
+                                                      values: thin(all[axis])})),
+    levels: [3, -3],
+  });
+}
+
 function showGimbal(report) {
   const gimbal = report.gimbal;
   addPlot(document.getElementById('gimbal-plot'), {

@@ -1,21 +1,38 @@
 // Reads the document of this page and shows it.
 'use strict';
 
+function showCalibration(report) {
+  document.title = `Self-calibration of ${report.serial || report.run?.serial || 'an INS'}`;
+  showVerdict(report);
+  showRun(report);
+  showHistory(report);
+  if (report.parameters) {
+    showFacts(report);
+    showParameters(report);
+    showConsistency(report);
+    showUndetermined(report);
+  } else {
+    ['parameters', 'consistency', 'noise', 'correlation'].forEach(hideSection);
+  }
+  showDiagnosis(report);
+  // What only the recording itself can tell.
+  if (report.gimbal) {
+    showPasses(report);
+    showConvergence(report);
+    showNis(report);
+    showInnovations(report);
+    showGimbal(report);
+    showSegments(report);
+    showAllan(report);
+    showCorrelation(report);
+  } else {
+    ['convergence', 'schedule', 'noise'].forEach(hideSection);
+  }
+}
+
 (function show() {
   const report = JSON.parse(document.getElementById('document').textContent);
-  document.title = `Self-calibration of ${report.serial || 'an INS'}`;
-  showVerdict(report);
-  showFacts(report);
-  showParameters(report);
-  showPasses(report);
-  showConvergence(report);
-  showConsistency(report);
-  showNis(report);
-  showGimbal(report);
-  showSegments(report);
-  showAllan(report);
-  showUndetermined(report);
-  showCorrelation(report);
+  ({calibration: showCalibration, plan: showPlan, fleet: showFleet})[report.kind](report);
   document.getElementById('save-json').addEventListener(
       'click', () => saveBlob('report.json', 'application/json', JSON.stringify(report)));
 

@@ -1,8 +1,10 @@
 // One plot: a figure with title, legend, uPlot canvas, read-out, saving, and its numbers as a table.
 //
 // spec: {id, title, height, x: {label, unit, values, log}, y: {label, unit, log, range: [low, high]},
-//        series: [{label, colour, values, shown, dash, points, thin}] (shown: what is drawn, where not all values), band: [upper, lower] (series numbers),
-//        marks: [x, ...] (dotted vertical lines), level: y (dotted horizontal line)}
+//        series: [{label, colour, values, shown, errors, dash, points, marks, thin, spanGaps}] (shown: what is drawn, where
+//        not all values; errors: half a bar; points: no line, small: small ones; marks: points on the line),
+//        band: [upper, lower] (series numbers), marks: [x, ...] (dotted vertical lines),
+//        level or levels: y (dotted horizontal lines)}
 'use strict';
 
 const livePlots = [];
@@ -64,13 +66,58 @@ function drawMarks(spec, plot) {
     ctx.moveTo(across, bbox.top);
     ctx.lineTo(across, bbox.top + bbox.height);
   }
-  if (spec.level !== undefined) {
-    const down = plot.valToPos(spec.level, 'y', true);
+  for (const level of levelsOf(spec)) {
+    const down = plot.valToPos(level, 'y', true);
     ctx.moveTo(bbox.left, down);
     ctx.lineTo(bbox.left + bbox.width, down);
   }
   ctx.stroke();
   ctx.restore();
+}
+
+function levelsOf(spec) {
+  return spec.levels ?? (spec.level === undefined ? [] : [spec.level]);
+}
+
+// [[x, low, high], ...] of the bars of a series.
+function errorBars(spec, series) {
+  return (series.errors ?? []).map((half, row) => [spec.x.values[row], series.values[row] - half, series.values[row] + half])
+      .filter((bar, row) => series.errors[row] !== null && series.values[row] !== null);
+}
+
+function drawErrors(spec, plot) {
+  const {ctx, bbox} = plot;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  for (const series of spec.series) {
+    ctx.strokeStyle = cssColour(series.colour);
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    for (const [x, low, high] of errorBars(spec, series)) {
+      const across = plot.valToPos(x, 'x', true);
+      ctx.moveTo(across, plot.valToPos(low, 'y', true));
+      ctx.lineTo(across, plot.valToPos(high, 'y', true));
+    }
+    ctx.stroke();
+  }
+  ctx.restore();
+}
+
+// Room for every value, its bar and the levels; and for a single point at all.
+function paddedRange(spec, which) {
+  if (spec[which].log) {
+    return undefined;
+  }
+  const values = which === 'x' ? spec.x.values
+      : spec.series.flatMap((series) => [...(series.shown ?? series.values), ...errorBars(spec, series).flatMap((bar) => bar.slice(1))])
+          .concat(levelsOf(spec));
+  const finite = values.filter((value) => value !== null && Number.isFinite(value));
+  const low = Math.min(...finite);
+  const high = Math.max(...finite);
+  const room = high > low ? 0.05 * (high - low) : Math.max(1e-9, 0.05 * Math.abs(high), which === 'x' ? 0.05 : 0);
+  return [low - room, high + room];
 }
 
 function seriesOptions(series) {
@@ -80,32 +127,41 @@ function seriesOptions(series) {
     stroke: colour,
     width: series.points ? 0 : series.thin ? 0.8 : 1.6,
     dash: series.dash,
-    spanGaps: false,
+    spanGaps: Boolean(series.spanGaps),
     paths: series.points ? () => null : undefined,
-    points: {show: Boolean(series.points), size: 6, fill: colour, stroke: colour},
+    points: {show: Boolean(series.points || series.marks), size: series.small ? 2.5 : 6, fill: colour, stroke: colour},
   };
 }
 
 function plotOptions(spec, width, ticks, readout) {
-  const scale = (axis) => ({
-    time: false,
-    distr: axis.log ? 3 : 1,
-    ...(axis.range ? {range: () => axis.range} : {}),
-  });
+  // With bars or single points uPlot's own range is too narrow. A zoom by dragging sets the scale past this.
+  const bars = spec.series.some((series) => series.errors);
+  const scale = (which) => {
+    const axis = spec[which];
+    const range = axis.range ?? (bars ? paddedRange(spec, which) : undefined);
+    return {time: false, distr: axis.log ? 3 : 1, ...(range ? {range: (plot, low, high) => zoomed(plot, low, high, range, which)} : {})};
+  };
   return {
     width,
     height: spec.height || 230,
     legend: {show: false},
     cursor: {drag: {x: true, y: false}},
-    scales: {x: scale(spec.x), y: scale(spec.y)},
+    scales: {x: scale('x'), y: scale('y')},
     axes: [axisOptions(spec, 'x', ticks), axisOptions(spec, 'y', ticks)],
     series: [{label: spec.x.label}, ...spec.series.map(seriesOptions)],
     bands: spec.band ? [{series: spec.band, fill: cssColour('band')}] : [],
     hooks: {
-      draw: [(plot) => drawMarks(spec, plot)],
+      draw: [(plot) => drawMarks(spec, plot), (plot) => drawErrors(spec, plot)],
       setCursor: [(plot) => showReadout(spec, plot, readout)],
     },
   };
+}
+
+// uPlot asks for a range both for all data and for a stretch chosen by dragging.
+function zoomed(plot, low, high, range, which) {
+  const values = plot.data?.[0] ?? [];
+  const whole = which === 'y' || values.length === 0 || (low <= values[0] && high >= values[values.length - 1]);
+  return whole ? range : [low, high];
 }
 
 function showReadout(spec, plot, readout) {
@@ -171,7 +227,7 @@ function addPlot(parent, spec) {
     return made;
   };
   const tools = element('div', {class: 'tools'},
-      button('CSV', () => saveBlob(spec.id + '.csv', 'text/csv', csvText(spec))),
+      button('CSV', () => saveBlob(spec.id + '.csv', 'text/csv', columnsCsv(plotColumns(spec)))),
       button('JSON', () => saveBlob(spec.id + '.json', 'application/json', JSON.stringify(plotColumns(spec)))),
       button('SVG', () => saveBlob(spec.id + '.svg', 'image/svg+xml', svgText(spec, state.plot, state.ticks))),
       button('PNG', async () => saveBlob(spec.id + '.png', 'image/png', await pngBlob(spec, state.plot))));
@@ -190,6 +246,17 @@ function addPlot(parent, spec) {
   }
   addKeys(host, state);
   livePlots.push(state);
+}
+
+// Takes the plots of a place away again.
+function dropPlots(place) {
+  for (let k = livePlots.length - 1; k >= 0; --k) {
+    if (place.contains(livePlots[k].host)) {
+      livePlots[k].plot.destroy();
+      livePlots.splice(k, 1);
+    }
+  }
+  place.replaceChildren();
 }
 
 function redrawPlots() {

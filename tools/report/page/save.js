@@ -14,16 +14,19 @@ function plotColumns(spec) {
   const columns = [{title: title(spec.x.label, spec.x.unit), values: spec.x.values}];
   for (const series of spec.series) {
     columns.push({title: title(series.label, spec.y.unit), values: series.values});
+    if (series.errors) {
+      columns.push({title: title('σ of ' + series.label.replace(', ±1 σ', ''), spec.y.unit), values: series.errors});
+    }
   }
   return columns;
 }
 
-function csvText(spec) {
-  const columns = plotColumns(spec);
+// columns: [{title, values}]
+function columnsCsv(columns) {
   const quote = (text) => (/[",\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text);
   const lines = [columns.map((column) => quote(column.title)).join(',')];
-  for (let row = 0; row < spec.x.values.length; ++row) {
-    lines.push(columns.map((column) => column.values[row] ?? '').join(','));
+  for (let row = 0; row < columns[0].values.length; ++row) {
+    lines.push(columns.map((column) => quote(String(column.values[row] ?? ''))).join(','));
   }
   return lines.join('\n') + '\n';
 }
@@ -69,6 +72,11 @@ function svgText(spec, plot, ticks) {
 function svgSeries(spec, series, place) {
   const colour = cssColour(series.colour);
   const group = svgElement('g');
+  for (const [x, low, high] of errorBars(spec, series)) {
+    const across = place(x, 'x').toFixed(2);
+    group.append(svgElement('line', {x1: across, x2: across, y1: place(low, 'y').toFixed(2), y2: place(high, 'y').toFixed(2),
+                                     stroke: colour}));
+  }
   let path = '';
   spec.x.values.forEach((x, row) => {
     const y = (series.shown || series.values)[row];

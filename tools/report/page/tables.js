@@ -3,10 +3,30 @@
 
 function showVerdict(report) {
   const verdict = document.getElementById('verdict');
+  if (!report.parameters) {
+    const run = report.run;
+    verdict.textContent = `${run.exit_status === 0 ? '✔' : '✘'} Run ${run.run} ${run.state}${run.reason ? ': ' + run.reason : ''}.`;
+    verdict.className = run.exit_status === 0 ? 'yes' : 'no';
+    return;
+  }
   const lead = report.acceptable ? 'Accepted: all 24 parameters are determined and consistent with the recording. '
                                  : `Not accepted: ${report.objections.join('; ')}. `;
-  verdict.textContent = (report.acceptable ? '✔ ' : '✘ ') + lead + report.consistency.words;
+  verdict.textContent = (report.acceptable ? '✔ ' : '✘ ') + lead + report.consistency.words + runSentence(report.run);
   verdict.className = report.acceptable ? 'yes' : 'no';
+}
+
+function runSentence(run) {
+  if (!run) {
+    return '';
+  }
+  return run.coefficients?.in_force ? ' The set was pushed, read back and is in force.' : ` The run ${run.state}: the set is not in force.`;
+}
+
+function fillFacts(facts) {
+  const list = document.getElementById('facts');
+  for (const [name, value] of facts) {
+    list.append(element('div', {}, element('dt', {}, name), element('dd', {}, value)));
+  }
 }
 
 function showFacts(report) {
@@ -20,10 +40,19 @@ function showFacts(report) {
     ['Base', report.noise.base],
     ['Computed in', `${significant(report.elapsed_s, 3)} s, ${report.passes.length} passes`],
   ];
-  const list = document.getElementById('facts');
-  for (const [name, value] of facts) {
-    list.append(element('div', {}, element('dt', {}, name), element('dd', {}, value)));
+  fillFacts(facts);
+}
+
+// Against the last calibration: the difference, its sigma, and how many of them it is.
+function changeOf(parameter) {
+  const change = parameter.change;
+  if (!change) {
+    return '–';
   }
+  const decimals = decimalsFor(change.sigma);
+  const size = Math.abs(change.value) / change.sigma;
+  return element('span', {title: `since run ${change.run}, ${change.utc}`},
+                 `${change.value >= 0 ? '+' : '−'}${Math.abs(change.value).toFixed(decimals)} (${significant(size, 2)} σ)`);
 }
 
 function stateOf(parameter) {
@@ -52,6 +81,7 @@ function showParameters(report) {
     {title: 'unit', cells: list.map((p) => unitSymbol(p.unit)), class: 'left'},
     {title: 'tolerance', cells: list.map((p) => significant(p.tolerance, 3))},
     {title: 'σ / tolerance', cells: list.map((p) => shareBar(p.sigma / p.tolerance)), class: 'left'},
+    {title: 'since the last calibration', cells: list.map(changeOf)},
     {title: 'state', cells: list.map(stateOf), class: 'left'},
   ], {id: 'values'}));
   const objections = document.getElementById('objections');

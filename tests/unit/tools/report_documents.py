@@ -1,0 +1,53 @@
+"""What the daemon says of a run and of three units, made from an estimate: report_documents.py ESTIMATE.json RECORDING
+writes run.json and history-SN-000{1,2,3}.json (the formats of `selfcal show --json` and `selfcal history --json`).
+
+SN-0002's accel_bias_z moves by 9 sigma a year, its limit two years ahead; the other values stand still to the millionth of
+their sigma, so that no slope among the 71 others can pass for a drift by chance.
+"""
+import json
+import sys
+
+estimate_file, recording = sys.argv[1:]
+estimate = json.load(open(estimate_file))
+parameters = estimate["parameters"]
+
+
+def summary(run, serial, year):
+    return {"run": run, "ins": "bench", "serial": serial, "state": "completed", "exit_status": 0, "reason": "",
+            "user": "operator", "kind": "calibration", "schedule": "table2", "dry_run": False, "stop_when_met": False,
+            "early_end_s": None, "force_reason": "", "started_utc": f"{year}-03-01T08:00:00Z",
+            "ended_utc": f"{year}-03-01T09:00:00Z", "software": "1.0", "ins_software": "2.1", "recording": recording,
+            "drift_before_m": 425.0, "drift_after_m": 31.0}
+
+
+def history(serial, slope_sigmas):
+    first = 100 * int(serial[-1])
+    runs = [summary(first + k, serial, 2021 + k) for k in range(5)]
+    entries = []
+    for parameter in parameters:
+        drifts = slope_sigmas != 0 and parameter["name"] == "accel_bias_z"
+        sigma = parameter["sigma"]
+        values = [{"run": run["run"], "utc": run["ended_utc"], "sigma": sigma, "determined": True,
+                   "value": parameter["value"] + (slope_sigmas * sigma * k if drifts else 1e-6 * sigma * (k % 2))}
+                  for k, run in enumerate(runs)]
+        entries.append({"name": parameter["name"], "unit": parameter["unit"], "values": values,
+                        "limit": abs(values[-1]["value"]) + 18 * sigma if drifts else None, "warnings": []})
+    return {"serial": serial, "runs": runs, "parameters": entries}
+
+
+def coefficients(version, factor):
+    return {"version": version, "date_utc": "2026-03-01T09:00:00Z", "author": "operator",
+            "parameters": [{"name": p["name"], "unit": p["unit"], "value": factor * p["value"]} for p in parameters]}
+
+
+histories = [history("SN-0001", 0), history("SN-0002", 9), history("SN-0003", 0)]
+for one in histories:
+    json.dump(one, open(f"history-{one['serial']}.json", "w"))
+json.dump(histories, open("histories.json", "w"))
+run = summary(199, "SN-0001", 2026)
+new = coefficients(3, 1.0)
+run |= {"events": [{"utc": run["started_utc"], "kind": "transition", "text": "connecting to unlocking"}],
+        "coefficients": {"previous": coefficients(2, 0.9), "proposed": new, "read_back": new, "pushed": new,
+                         "in_force": True},
+        "result": estimate}
+json.dump(run, open("run.json", "w"))

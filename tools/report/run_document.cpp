@@ -1,0 +1,92 @@
+#include "tools/report/run_document.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace selfcal::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Expected<Json> read(const std::string& text, const std::string& source, const std::vector<const char*>& keys) {
+  Json document = Json::parse(text, nullptr, false);
+  if (!document.is_object()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: not a JSON object", source));
+  }
+  for (const char* key : keys) {
+    if (!document.contains(key)) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: \"{}\" is missing", source, key));
+    }
+  }
+  return document;
+}
+
+Json value_or_null(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found == object.end() ? Json() : *found;
+}
+
+// The last determined value before `utc`; null where there is none.
+Json last_before(const Json& values, const std::string& utc) {
+  Json last;
+  for (const Json& value : values) {
+    const bool earlier = utc.empty() || value.at("utc").get<std::string>() < utc;
+    if (earlier && value.at("determined").get<bool>()) {
+      last = value;
+    }
+  }
+  return last;
+}
+
+}  // namespace
+
+Expected<Json> read_run(const std::string& text, const std::string& source) {
+  return read(text, source, {"run", "serial", "state", "started_utc", "events", "result"});
+}
+
+Expected<Json> read_history(const std::string& text, const std::string& source) {
+  return read(text, source, {"serial", "runs", "parameters"});
+}
+
+Json run_page_document(const Json& run, const std::optional<Json>& recomputed) {
+  Json document = recomputed.value_or(Json::object());
+  const Json result = value_or_null(run, "result");
+  if (result.is_object()) {
+    for (const auto& [key, value] : result.items()) {
+      // The passes of the recomputation have the curves; all else is what the operator was told.
+      if (key != "passes" || !recomputed) {
+        document[key] = value;
+      }
+    }
+  }
+  document["kind"] = "calibration";
+  document["run"] = run;
+  document["run"].erase("result");
+  return document;
+}
+
+void add_history(Json& document, const Json& history, const std::string& utc) {
+  document["history"] = history;
+  if (!document.contains("parameters")) {
+    return;
+  }
+  for (Json& parameter : document["parameters"]) {
+    for (const Json& past : history.at("parameters")) {
+      if (past.at("name") != parameter.at("name")) {
+        continue;
+      }
+      const Json last = last_before(past.at("values"), utc);
+      if (last.is_object() && parameter.at("value").is_number()) {
+        const double sigma = std::hypot(parameter.at("sigma").get<double>(), last.at("sigma").get<double>());
+        parameter["change"] = {{"value", parameter.at("value").get<double>() - last.at("value").get<double>()},
+                               {"sigma", sigma},
+                               {"run", last.at("run")},
+                               {"utc", last.at("utc")}};
+      }
+    }
+  }
+}
+
+}  // namespace selfcal::report
