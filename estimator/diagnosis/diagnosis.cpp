@@ -5,7 +5,9 @@
 #include <span>
 
 #include "estimator/diagnosis/catalogue.hpp"
-#include "estimator/diagnosis/naming.hpp"
+#include "estimator/diagnosis/judgement.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/diagnosis/walk_check.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -13,12 +15,8 @@ namespace {
 
 // The false alarms allowed are shared out: names, the map, whiteness, size of the innovations, noise and lines.
 constexpr double share_names = 0.5, share_map = 0.15, share_white = 0.1, share_size = 0.1, share_noise = 0.15;
-// A still base stands to micrometres; a calibration that asks for more does so because something is left out.
-constexpr double largest_still_sigma = 3e-6;   // m
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
-// What is named must explain all but this share of the misfit, or what remains must be noise.
-constexpr double tolerable_share = 0.1;
 
 const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
 
@@ -28,6 +26,8 @@ const Effect& effect_called(const std::string& id) {
   const std::vector<Effect>& all = catalogue();
   return *std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.id == id; });
 }
+
+}  // namespace
 
 Finding describe(const Chosen& chosen, double rows) {
   const Effect& effect = *chosen.candidate.effect;
@@ -54,6 +54,8 @@ Finding describe(const Chosen& chosen, double rows) {
   return f;
 }
 
+namespace {
+
 Finding describe(const WalkTest& walk, double rows) {
   Finding f;
   f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
@@ -68,33 +70,6 @@ Finding describe(const WalkTest& walk, double rows) {
   f.delta_bic = walk.gain - std::log(rows);
   f.stochastic = true;
   return f;
-}
-
-// A walk goes on inside the dwells; what only jumps between them is none. Differences of the means of both halves of
-// each dwell: white noise 4 N^2/T, and (2/3) q^2 T/2 of a walk. Too small a walk is not judged.
-bool walks_inside_dwells(const ImuData& data, const CalibrationResult& calibration, const WalkTest& walk) {
-  const auto axis = static_cast<std::size_t>(walk.axis % 3);
-  const double asd = walk.axis < 3 ? calibration.gyro_arw : calibration.accel_vrw;
-  const double rate = walk.rate * map_unit(walk.axis) / std::sqrt(units::hour);
-  const std::span<const std::array<double, 3>> increments = walk.axis < 3 ? data.delta_theta : data.delta_v;
-  double seen = 0.0, white = 0.0, expected = 0.0;
-  for (const Segment& s : find_segments(data)) {
-    const auto margin = static_cast<std::size_t>(2.0 * data.sample_rate_hz);
-    if (s.rotation || s.last - s.first < 20 * margin) {
-      continue;
-    }
-    const std::size_t half = (s.last - s.first - 2 * margin) / 2;
-    double difference = 0.0;
-    for (std::size_t i = 0; i < half; ++i) {
-      difference += increments[s.first + margin + half + i][axis] - increments[s.first + margin + i][axis];
-    }
-    const double length = static_cast<double>(half) / data.sample_rate_hz;
-    difference /= length;
-    seen += difference * difference;
-    white += 2.0 * asd * asd / length;
-    expected += 2.0 / 3.0 * rate * rate * length;
-  }
-  return expected < 2.0 * white || seen > 0.3 * (white + expected);
 }
 
 // Densities, quanta and lines against what the simulation assumes. Densities are judged beyond 15 %.
@@ -127,10 +102,12 @@ void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, 
       const auto axis = static_cast<std::size_t>(3 * triad + k);
       const AxisNoise& n = noise.axes[axis];
       const double found = std::sqrt(12.0) * n.increment_sigma;
-      if (quantum > 0.0 && found > 2.0 * quantum) {
+      const double excess = n.increment_sigma * n.increment_sigma - quantum * quantum / 12.0;
+      const double log_p = log_corrected(log_normal_tail(excess / n.increment_variance_sigma), 6.0);
+      if (quantum > 0.0 && found > 2.0 * quantum && log_p < log_threshold) {
         coarse.parameters.push_back({std::string(gyro ? "gyro_" : "accel_") + axis_letters[axis],
                                      gyro ? "arcsec" : "m/s", gyro ? found / units::arcsecond : found, 0.0});
-        coarse.log_p = std::min(coarse.log_p, log_normal_tail(10.0));
+        coarse.log_p = std::min(coarse.log_p, log_p);
       }
     }
     for (Finding* f : {&level, &coarse}) {
@@ -162,6 +139,8 @@ void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, 
   }
 }
 
+}  // namespace
+
 Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted) {
   Adequacy a;
   a.nis = square / rows;
@@ -179,6 +158,8 @@ Adequacy adequacy(double square, double rows, double log_p_white, const Map& map
   return a;
 }
 
+namespace {
+
 class Diagnoser {
  public:
   Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
@@ -187,7 +168,6 @@ class Diagnoser {
   DiagnosisOutcome run();
 
  private:
-  bool calibrate_still();
   void name();
   void decide(const Naming& naming);
   void say(const std::string& words) const {
@@ -201,37 +181,13 @@ class Diagnoser {
   const std::function<void(const std::string&)>& say_;
   double log_names_;
   Diagnosis d_;
-  std::string failure_;
 };
-
-// The 24 alone, with the base's noise not widened by what is left out.
-bool Diagnoser::calibrate_still() {
-  CalibrationOptions options = options_.calibration;
-  CalibrationOutcome outcome = calibrate(data_, options);
-  if (outcome.result && !outcome.result->moored && !options.noise.position_sigma &&
-      outcome.result->position_sigma > largest_still_sigma) {
-    options.noise.position_sigma = largest_still_sigma;
-    outcome = calibrate(data_, options);
-  }
-  if (!outcome.result) {
-    failure_ = outcome.failure.message;
-    return false;
-  }
-  d_.calibration = std::move(*outcome.result);
-  return true;
-}
 
 void Diagnoser::name() {
   const RecordingContext context(data_);
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
-  PassInput input;
-  input.data = &data_;
-  input.parameters = d_.calibration.value;
-  input.C_nb = d_.calibration.C_nb_start;
-  input.noise = d_.calibration.noise;
-  input.prior.parameter_sigma = 2.0 * plausible_limit();
   say("signatures");
-  Naming naming(context, input, log_names_);
+  Naming naming(context, forward_pass(data_, d_.calibration), log_names_);
   naming.run(say_);
   decide(naming);
 }
@@ -252,7 +208,7 @@ void Diagnoser::decide(const Naming& naming) {
   }
   bool jumps = false;
   for (const WalkTest& w : naming.walks()) {
-    const bool real = walks_inside_dwells(data_, d_.calibration, w);
+    const bool real = walks_inside_dwells(data_, d_.calibration.noise, w);
     jumps = jumps || !real;
     (real ? named : d_.rejected).push_back(describe(w, naming.rows()));
   }
@@ -264,8 +220,8 @@ void Diagnoser::decide(const Naming& naming) {
   }
   d_.after.accepted = d_.after.accepted && !jumps;
   d_.unexplained = !d_.after.accepted;
-  const bool explains = d_.after.accepted || d_.after.misfit < tolerable_share * d_.before.misfit;
-  std::vector<Finding>& destination = explains ? d_.findings : d_.rejected;
+  // A name that leaves something behind is the best fitting, not the truth.
+  std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;
   destination.insert(destination.end(), named.begin(), named.end());
   judge_noise(d_.calibration, d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
   d_.value = naming.value();
@@ -307,9 +263,11 @@ DiagnosisOutcome Diagnoser::run() {
   d_.faults = find_data_faults(data_);
   d_.noise = check_noise(data_, find_segments(data_));
   say("calibration");
-  if (!calibrate_still()) {
-    return {std::nullopt, failure_};
+  CalibrationOutcome calibration = calibrate_still(data_, options_.calibration);
+  if (!calibration.result) {
+    return {std::nullopt, calibration.failure.message};
   }
+  d_.calibration = std::move(*calibration.result);
   name();
   return {std::move(d_), {}};
 }

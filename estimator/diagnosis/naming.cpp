@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/multiplicity.hpp"
+#include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -279,8 +280,10 @@ bool Naming::add_best() {
   // A walk can follow any slow curve. It is taken where it beats every equation by far; an equation whose constant is
   // still on its grid gets the benefit.
   constexpr double equation_share = 0.85;
-  if (walker != nullptr && winner != nullptr && best_equation < equation_share * best) {
-    walker = nullptr;
+  constexpr double jump_share = 0.6;   // what jumps is no walk: an equation that comes near it is tried first
+  if (walker != nullptr && winner != nullptr) {
+    const bool real = walks_inside_dwells(context_.data(), input_.noise, *walker);
+    walker = best_equation < (real ? equation_share : jump_share) * best ? nullptr : walker;
   }
   if (walker != nullptr) {
     walks_.push_back(*walker);
@@ -395,8 +398,10 @@ void Naming::run(const std::function<void(const std::string&)>& progress) {
     while (drop_weak()) {
     }
   }
+  sharpen_observation();
   while (chosen_.size() + walks_.size() < most_effects && add_best()) {
   }
+  carry_constants();
   judge();
 }
 
@@ -469,10 +474,9 @@ ParameterVector Naming::value() const {
 ParameterMatrix Naming::covariance() const {
   const int at = rows_.pass.layout.parameters();
   ParameterMatrix P = rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
-  const std::vector<int> columns = chosen_columns();
-  if (!columns.empty()) {
-    const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns);
-    P += S * evidence_.fit(columns).covariance * S.transpose();
+  if (!joint_columns_.empty()) {
+    const Eigen::MatrixXd S = rows_.shift(Eigen::all, joint_columns_);
+    P += S * joint_covariance_ * S.transpose();
   }
   return P;
 }

@@ -64,6 +64,8 @@ class Naming {
   bool add_best();
   bool drop_weak();
   bool exchange();
+  void sharpen_observation();
+  void carry_constants();
   void judge();
   double corrected(double log_p, const std::string& effect) const;
   Eigen::VectorXd final_residual() const;
@@ -85,6 +87,8 @@ class Naming {
   double square_before_ = 0.0, white_before_ = 0.0;
   Eigen::VectorXd applied_;            // sizes of chosen_ that the correction holds
   std::vector<int> applied_columns_;
+  std::vector<int> joint_columns_;     // of chosen_ and, behind them, of the logarithms of their constants
+  Eigen::MatrixXd joint_covariance_;
   Correction correction_;              // the same with the constants it was made with
 };
 

@@ -94,6 +94,7 @@ AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
   // A mean of `pieces` periodograms scatters by 1/sqrt(pieces); Hann correlates neighbouring bins: 1.5 times that.
   noise.white_sigma = 0.5 / noise.white_asd * std::sqrt(1.5 * normal.inverse()(0, 0) / pieces);
   noise.increment_sigma = std::sqrt(angle);
+  noise.increment_variance_sigma = std::sqrt(1.5 * normal.inverse()(1, 1) / pieces);
   return noise;
 }
 

@@ -21,6 +21,7 @@ struct AxisNoise {
   double white_asd = 0.0;       // as AssumedNoise
   double white_sigma = 0.0;     // of the estimate
   double increment_sigma = 0.0; // white noise of the integral: quantum/sqrt(12) where nothing else, rad or m/s
+  double increment_variance_sigma = 0.0;   // of the estimate of its square
 };
 
 struct VibrationLine {

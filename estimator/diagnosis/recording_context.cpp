@@ -70,6 +70,11 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
     c.since_turn_start_s = block.start_s - segments_[here - 2].end_s;
     c.since_turn_end_s = block.end_s - segments_[here - 2].end_s;
   }
+  const std::size_t middle = (block.first + block.last) / 2;
+  if (!data_.gimbal_outer.empty() && !data_.gimbal_inner.empty()) {
+    c.outer = data_.gimbal_outer[middle];
+    c.inner = data_.gimbal_inner[middle];
+  }
   if (has_temperature()) {
     double sum = 0.0;
     for (std::size_t i = block.first; i < block.last; ++i) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/geometry/schedule.hpp"
 #include "protocol/error.hpp"
 #include "protocol/recording/recording.hpp"
 
@@ -19,8 +20,8 @@ std::string physics_text(const diagnosis::Diagnosis& diagnosis, const diagnosis:
 std::string sim_config_text(const diagnosis::Diagnosis& diagnosis, const diagnosis::AssumedNoise& assumed,
                             const Recording& recording);
 
-// The schedule that the recording followed: its own attributes, else what the gimbal read-outs show.
-std::string schedule_text(const Recording& recording, const ImuData& data);
+// The schedule that the recording followed, at the angles that the gimbal reached (its read-outs).
+Schedule schedule_of(const Recording& recording, const ImuData& data);
 
 // physics.toml, sim.toml and schedule.toml in `folder`, which is made where it is not there.
 Expected<void> write_amendment(const std::filesystem::path& folder, const diagnosis::Diagnosis& diagnosis,

@@ -9,6 +9,7 @@
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "tools/cli/amendment.hpp"
 #include "tools/cli/command.hpp"
@@ -22,30 +23,137 @@ struct DiagnoseArguments {
   std::string recording;
   std::string physics;
   std::string amended;
+  std::string against;
+  std::string split_schedule;
+  std::string holdout;
   bool json = false;
   double false_alarm_rate = 0.01;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
   double gyro_lsb_arcsec = 0.1, accel_lsb_mps = 2e-6;
 };
 
-Expected<int> diagnose(const DiagnoseArguments& arguments) {
-  CheckPolicy policy;
-  policy.gaps_are_errors = false;
-  policy.gimbal_contradiction_is_error = false;
-  const Expected<LoadedRecording> loaded = read_recording(arguments.recording, policy);
+constexpr CheckPolicy lenient{.gaps_are_errors = false, .gimbal_contradiction_is_error = false};
+
+// A recording with the estimator's view of it; stays where it is, for the view points into it.
+struct Opened {
+  LoadedRecording loaded;
+  std::vector<double> first_temperature;
+  ImuData data;
+};
+
+Expected<std::unique_ptr<Opened>> open(const std::string& path) {
+  Expected<LoadedRecording> loaded = read_recording(path, lenient);
   if (!loaded) {
     return tl::unexpected(loaded.error());
   }
   for (const std::string& warning : loaded->warnings) {
-    fmt::print(stderr, "selfcal diagnose: warning: {}: {}\n", arguments.recording, warning);
+    fmt::print(stderr, "selfcal diagnose: warning: {}: {}\n", path, warning);
   }
+  auto opened = std::make_unique<Opened>();
+  opened->loaded = std::move(*loaded);
+  opened->data = imu_view(opened->loaded.recording, opened->first_temperature);
+  return opened;
+}
+
+diagnosis::DiagnosisOptions options_from(const DiagnoseArguments& arguments) {
   diagnosis::DiagnosisOptions options;
   options.false_alarm_rate = arguments.false_alarm_rate;
   options.assumed = {arguments.arw_deg_per_sqrt_h * units::degree_per_sqrt_hour,
                      arguments.vrw_ug_per_sqrt_hz * units::micro_g_per_sqrt_hz,
                      arguments.gyro_lsb_arcsec * units::arcsecond, arguments.accel_lsb_mps};
-  std::vector<double> first_temperature;
-  const ImuData data = imu_view(loaded->recording, first_temperature);
+  return options;
+}
+
+Expected<int> compare_with(const DiagnoseArguments& arguments, const ImuData& data,
+                           const diagnosis::DiagnosisOptions& options) {
+  const Expected<std::unique_ptr<Opened>> simulation = open(arguments.against);
+  if (!simulation) {
+    return tl::unexpected(simulation.error());
+  }
+  const diagnosis::ComparisonOutcome outcome = [&] {
+    ProgressLine line;
+    return diagnosis::compare(data, (*simulation)->data, options, [&line](const std::string& words) { line.show(words); });
+  }();
+  if (!outcome.comparison) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{} against {}: {}", arguments.recording, arguments.against, outcome.failure));
+  }
+  if (arguments.json) {
+    nlohmann::ordered_json json = comparison_json(*outcome.comparison, arguments.false_alarm_rate);
+    json["against"] = arguments.against;
+    fmt::print("{}\n", json.dump());
+  } else {
+    fmt::print("{}", comparison_text(*outcome.comparison));
+  }
+  return outcome.comparison->diagnosis.mismatch ? 1 : 0;
+}
+
+Expected<std::optional<diagnosis::Holdout>> held_out(const DiagnoseArguments& arguments,
+                                                     const diagnosis::Diagnosis& diagnosis,
+                                                     const diagnosis::DiagnosisOptions& options) {
+  if (arguments.holdout.empty()) {
+    return std::nullopt;
+  }
+  const Expected<std::unique_ptr<Opened>> second = open(arguments.holdout);
+  if (!second) {
+    return tl::unexpected(second.error());
+  }
+  diagnosis::HoldoutOutcome outcome = diagnosis::hold_out(diagnosis, (*second)->data, options);
+  if (!outcome.holdout) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.holdout, outcome.failure));
+  }
+  return std::move(outcome.holdout);
+}
+
+Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
+                           const diagnosis::DiagnosisOptions& options, const Opened& opened) {
+  Expected<void> written;
+  if (!arguments.physics.empty()) {
+    written = write_file_atomically(arguments.physics,
+                                    physics_text(diagnosis, options.assumed, opened.data.site.latitude));
+  }
+  if (written && !arguments.amended.empty()) {
+    written = write_amendment(arguments.amended, diagnosis, options.assumed, opened.loaded.recording, opened.data);
+  }
+  return written;
+}
+
+// The best experiment of the class that is hardest to split now.
+Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArguments& arguments,
+                                                              const diagnosis::Diagnosis& diagnosis,
+                                                              const Opened& opened) {
+  if (arguments.split_schedule.empty()) {
+    return std::vector<diagnosis::Split>{};
+  }
+  std::vector<diagnosis::Split> splits =
+      diagnosis::plan_splits(diagnosis, opened.data, schedule_of(opened.loaded.recording, opened.data));
+  const diagnosis::Split* hardest = nullptr;
+  for (const diagnosis::Split& s : splits) {
+    if (!s.experiments.empty() && (hardest == nullptr || s.separation_now < hardest->separation_now)) {
+      hardest = &s;
+    }
+  }
+  if (hardest == nullptr) {
+    fmt::print(stderr, "selfcal diagnose: nothing to split: {} is not written\n", arguments.split_schedule);
+    return splits;
+  }
+  const diagnosis::Experiment& best = hardest->experiments.front();
+  const std::string text =
+      fmt::format("# Splits {} from {}: {}; {:.1f} sigma predicted.\n{}", hardest->effect,
+                  fmt::join(hardest->rivals, ", "), best.words, best.separation, format_schedule(best.schedule));
+  return write_file_atomically(arguments.split_schedule, text).map([&] { return splits; });
+}
+
+Expected<int> diagnose(const DiagnoseArguments& arguments) {
+  const Expected<std::unique_ptr<Opened>> opened = open(arguments.recording);
+  if (!opened) {
+    return tl::unexpected(opened.error());
+  }
+  const ImuData& data = (*opened)->data;
+  const diagnosis::DiagnosisOptions options = options_from(arguments);
+  if (!arguments.against.empty()) {
+    return compare_with(arguments, data, options);
+  }
   const diagnosis::DiagnosisOutcome outcome = [&] {
     ProgressLine line;
     return diagnosis::diagnose(data, options, [&line](const std::string& words) { line.show(words); });
@@ -53,25 +161,39 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!outcome.diagnosis) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.recording, outcome.failure));
   }
+  const diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
+  const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
+  if (!holdout) {
+    return tl::unexpected(holdout.error());
+  }
+  const Expected<std::vector<diagnosis::Split>> splits = plan_and_write_splits(arguments, diagnosis, **opened);
+  if (!splits) {
+    return tl::unexpected(splits.error());
+  }
+  std::optional<diagnosis::EmpiricalDescription> description;
+  if (diagnosis.unexplained && diagnosis.faults.empty()) {
+    description = diagnosis::describe_empirically(data, diagnosis, arguments.false_alarm_rate);
+  }
   if (arguments.json) {
-    fmt::print("{}\n", diagnosis_json(*outcome.diagnosis, arguments.false_alarm_rate).dump());
+    nlohmann::ordered_json json = diagnosis_json(diagnosis, arguments.false_alarm_rate);
+    if (*holdout) {
+      json["holdout"] = holdout_json(**holdout);
+    }
+    if (description) {
+      json["empirical"] = empirical_json(*description);
+    }
+    if (!arguments.split_schedule.empty()) {
+      json["splits"] = splits_json(*splits);
+    }
+    fmt::print("{}\n", json.dump());
   } else {
-    fmt::print("{}", diagnosis_text(*outcome.diagnosis));
+    fmt::print("{}{}{}{}", diagnosis_text(diagnosis), description ? empirical_text(*description) : std::string(),
+               splits_text(*splits), *holdout ? holdout_text(**holdout) : std::string());
   }
-  if (!arguments.physics.empty()) {
-    const std::string text = physics_text(*outcome.diagnosis, options.assumed, data.site.latitude);
-    if (const auto written = write_file_atomically(arguments.physics, text); !written) {
-      return tl::unexpected(written.error());
-    }
+  if (const auto written = write_files(arguments, diagnosis, options, **opened); !written) {
+    return tl::unexpected(written.error());
   }
-  if (!arguments.amended.empty()) {
-    const auto written =
-        write_amendment(arguments.amended, *outcome.diagnosis, options.assumed, loaded->recording, data);
-    if (!written) {
-      return tl::unexpected(written.error());
-    }
-  }
-  return outcome.diagnosis->mismatch ? 1 : 0;
+  return diagnosis.mismatch ? 1 : 0;
 }
 
 CommandRun configure(CLI::App& app) {
@@ -81,6 +203,12 @@ CommandRun configure(CLI::App& app) {
   app.add_option("--physics", arguments->physics, "write what was named as a physics file for the simulation");
   app.add_option("--amended", arguments->amended,
                  "write physics.toml, sim.toml (with the 24 as fitted) and schedule.toml into this folder");
+  app.add_option("--against", arguments->against,
+                 "compare with this simulation of the same schedule instead of the fitted model");
+  app.add_option("--split-schedule", arguments->split_schedule,
+                 "where effects cannot be told apart: plan experiments that would, write the best one's schedule");
+  app.add_option("--holdout", arguments->holdout, "try what was named on this second recording of the same unit")
+      ->excludes("--against");
   app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of a whole recording")
       ->check(CLI::Range(1e-6, 0.2))
       ->capture_default_str();

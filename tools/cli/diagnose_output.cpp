@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -187,6 +188,156 @@ std::string diagnosis_text(const diagnosis::Diagnosis& d) {
       text += fmt::format(" {} ({:.1f} sigma)", u.effect, u.expected_z);
     }
     text += "\n";
+  }
+  return text;
+}
+
+namespace {
+
+ordered_json to_json(const diagnosis::HeldOutState& s) {
+  return {{"log_likelihood", s.log_likelihood},
+          {"nis", s.nis},
+          {"whiteness_log10_p", s.log_p_white / std::log(10.0)},
+          {"parameter_disagreement", s.parameter_disagreement}};
+}
+
+}  // namespace
+
+ordered_json comparison_json(const diagnosis::Comparison& c, double false_alarm_rate) {
+  ordered_json j = diagnosis_json(c.diagnosis, false_alarm_rate);
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+    j["parameters"][static_cast<std::size_t>(k)] = {{"name", p.name},
+                                                    {"unit", p.unit},
+                                                    {"recording", c.diagnosis.value(k) / p.si_per_unit},
+                                                    {"difference", c.difference(k) / p.si_per_unit},
+                                                    {"sigma", c.sigma(k) / p.si_per_unit}};
+  }
+  j["attitude_difference_deg"] = c.attitude_difference / units::degree;
+  return j;
+}
+
+std::string comparison_text(const diagnosis::Comparison& c) {
+  const diagnosis::Diagnosis& d = c.diagnosis;
+  std::string text = d.mismatch ? "recording and simulation differ\n" : "recording and simulation agree\n";
+  for (const Adequacy* a : {&d.before, &d.after}) {
+    text += fmt::format("{} NIS of the difference {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n",
+                        a == &d.before ? "before:" : "after: ", a->nis, a->largest_sigma,
+                        a->log_p_white / std::log(10.0));
+  }
+  if (!d.before.accepted) {
+    text += "where:\n";
+    for (std::size_t k = 0; k < std::min<std::size_t>(5, d.located.size()); ++k) {
+      text += fmt::format("  {:.1f} sigma  {}: {:.3g} {} more in the recording\n", d.located[k].significance,
+                          d.located[k].words, d.located[k].size,
+                          d.located[k].axis.starts_with("gyro") ? "deg/h" : "ug");
+    }
+  }
+  if (!d.findings.empty()) {
+    text += "the recording has more of:\n";
+    for (const Finding& f : d.findings) {
+      text += text_of(f);
+    }
+  }
+  if (d.unexplained) {
+    text += "not explained by anything in the catalogue\n";
+  }
+  text += "the 24, where they differ by 3 sigma or more:";
+  int differing = 0;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (std::abs(c.difference(k)) >= 3.0 * c.sigma(k)) {
+      const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+      text += fmt::format("\n  {} by {:.4g} +- {:.2g} {}", p.name, c.difference(k) / p.si_per_unit,
+                          c.sigma(k) / p.si_per_unit, p.unit);
+      ++differing;
+    }
+  }
+  text += differing == 0 ? " none\n" : "\n";
+  constexpr double noticeable = 0.2 * units::degree;
+  if (c.attitude_difference > noticeable) {
+    text += fmt::format("attitudes differ by up to {:.2f} deg: effects that both hold cancel only to that degree\n",
+                        c.attitude_difference / units::degree);
+  }
+  return text;
+}
+
+ordered_json holdout_json(const diagnosis::Holdout& h) {
+  return {{"before", to_json(h.before)},
+          {"after", to_json(h.after)},
+          {"gain", h.gain},
+          {"not_carried", h.not_carried}};
+}
+
+std::string holdout_text(const diagnosis::Holdout& h) {
+  std::string text = fmt::format("held-out recording: log likelihood gains {:.1f} with what was named, nothing fitted anew\n", h.gain);
+  for (const diagnosis::HeldOutState* s : {&h.before, &h.after}) {
+    text += fmt::format("  {} NIS {:.3f}, whiteness log10 p {:.1f}, the 24 against the first recording {:.2f} (1 expected)\n",
+                        s == &h.before ? "before:" : "after: ", s->nis, s->log_p_white / std::log(10.0),
+                        s->parameter_disagreement);
+  }
+  if (!h.not_carried.empty()) {
+    text += fmt::format("  not carried over: {}\n", fmt::join(h.not_carried, ", "));
+  }
+  return text;
+}
+
+ordered_json empirical_json(const diagnosis::EmpiricalDescription& d) {
+  ordered_json j = {{"share_of_misfit", d.share}, {"held_out_gain", d.held_out_gain}};
+  j["terms"] = ordered_json::array();
+  for (const diagnosis::EmpiricalTerm& t : d.terms) {
+    j["terms"].push_back({{"axis", t.axis},
+                          {"function", t.function},
+                          {"unit", t.unit},
+                          {"value", t.value},
+                          {"sigma", t.sigma},
+                          {"held_out_gain", t.held_out_gain}});
+  }
+  return j;
+}
+
+std::string empirical_text(const diagnosis::EmpiricalDescription& d) {
+  if (d.terms.empty()) {
+    return "no smooth function of gimbal angles, gravity direction, time or temperature describes what remains\n";
+  }
+  std::string text = fmt::format(
+      "a description, no explanation: smooth functions take away {:.0f} % of the misfit (held-out gain {:.1f})\n",
+      100.0 * d.share, d.held_out_gain);
+  for (const diagnosis::EmpiricalTerm& t : d.terms) {
+    text += fmt::format("  {:8} {:14} {:10.4g} +- {:.2g} {}\n", t.axis, t.function, t.value, t.sigma, t.unit);
+  }
+  return text;
+}
+
+ordered_json splits_json(const std::vector<diagnosis::Split>& splits) {
+  ordered_json all = ordered_json::array();
+  for (const diagnosis::Split& s : splits) {
+    ordered_json j = {{"effect", s.effect}, {"rivals", s.rivals}, {"contained_in", s.contain},
+                      {"separation_now", s.separation_now}};
+    j["experiments"] = ordered_json::array();
+    for (const diagnosis::Experiment& e : s.experiments) {
+      j["experiments"].push_back({{"id", e.id},
+                                  {"words", e.words},
+                                  {"separation", e.separation},
+                                  {"closest_rival", e.closest},
+                                  {"duration_s", e.schedule.duration_s()}});
+    }
+    all.push_back(std::move(j));
+  }
+  return all;
+}
+
+std::string splits_text(const std::vector<diagnosis::Split>& splits) {
+  std::string text;
+  for (const diagnosis::Split& s : splits) {
+    text += fmt::format("{} against {}: {:.1f} sigma apart now\n", s.effect, fmt::join(s.rivals, ", "), s.separation_now);
+    if (!s.contain.empty()) {
+      text += fmt::format("  nothing splits it from {}, of which it is a special case: the fewer parameters are preferred\n",
+                          fmt::join(s.contain, ", "));
+    }
+    for (const diagnosis::Experiment& e : s.experiments) {
+      text += fmt::format("  {:6.1f} sigma with this recording and one more, {:.0f} min: {} (closest rival {})\n",
+                          e.separation, e.schedule.duration_s() / 60.0, e.words, e.closest);
+    }
   }
   return text;
 }

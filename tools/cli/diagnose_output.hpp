@@ -4,12 +4,25 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "estimator/diagnosis/comparison.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/diagnosis/empirical.hpp"
+#include "estimator/diagnosis/holdout.hpp"
+#include "estimator/diagnosis/isolability.hpp"
 
 namespace selfcal::cli {
 
 std::string verdict_name(diagnosis::DiagnosisVerdict verdict);
 nlohmann::ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_alarm_rate);
 std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis);
+// The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
+nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate);
+std::string comparison_text(const diagnosis::Comparison& comparison);
+nlohmann::ordered_json empirical_json(const diagnosis::EmpiricalDescription& description);
+std::string empirical_text(const diagnosis::EmpiricalDescription& description);
+nlohmann::ordered_json splits_json(const std::vector<diagnosis::Split>& splits);
+std::string splits_text(const std::vector<diagnosis::Split>& splits);
+nlohmann::ordered_json holdout_json(const diagnosis::Holdout& holdout);
+std::string holdout_text(const diagnosis::Holdout& holdout);
 
 }  // namespace selfcal::cli

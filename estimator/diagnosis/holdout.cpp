@@ -1,0 +1,93 @@
+#include "estimator/diagnosis/holdout.hpp"
+
+#include <algorithm>
+
+#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+// The findings' equations as columns; what cannot be carried over is named.
+Correction carried(const Diagnosis& d, std::vector<std::string>& not_carried) {
+  Correction correction;
+  std::vector<double> sizes;
+  for (const ModelEffect& m : d.model) {
+    if (m.effect->sensor == nullptr) {
+      not_carried.push_back(m.effect->id);
+      continue;
+    }
+    correction.effects.push_back({m.effect, m.constant, static_cast<int>(sizes.size()), static_cast<int>(m.size.size())});
+    sizes.insert(sizes.end(), m.size.begin(), m.size.end());
+  }
+  for (const Finding& f : d.findings) {
+    if (f.stochastic) {
+      not_carried.push_back(f.effect);
+    }
+  }
+  correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
+  return correction;
+}
+
+HeldOutState state_of(const Diagnosis& d, const ImuData& data, const CalibrationResult& calibration,
+                      const NoiseModel& noise, const ParameterVector& of_first, const ParameterVector& first_sigma) {
+  PassInput input = forward_pass(data, calibration);
+  input.noise = noise;
+  const RecordingContext context(data);
+  const SignatureRows rows = SignaturePass(context, {}, false).run(input);
+  HeldOutState state;
+  state.log_likelihood = rows.pass.log_likelihood;
+  state.nis = rows.residual.squaredNorm() / static_cast<double>(rows.residual.size());
+  state.log_p_white = log_p_white(rows.residual);
+  // Half of the first's own prior is shared by both where a parameter is not seen; those do not count.
+  int seen = 0;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (d.calibration.determined[static_cast<std::size_t>(k)]) {
+      const double difference = calibration.value(k) - of_first(k);
+      state.parameter_disagreement +=
+          difference * difference / (calibration.sigma(k) * calibration.sigma(k) + first_sigma(k) * first_sigma(k));
+      ++seen;
+    }
+  }
+  state.parameter_disagreement /= std::max(1, seen);
+  return state;
+}
+
+}  // namespace
+
+HoldoutOutcome hold_out(const Diagnosis& d, const ImuData& second, const DiagnosisOptions& options) {
+  if (second.size() < 2) {
+    return {std::nullopt, "the second recording is empty"};
+  }
+  Holdout result;
+  const Correction correction = carried(d, result.not_carried);
+  for (const Candidate& c : correction.effects) {
+    if (c.effect->needs_temperature && second.temperature.empty()) {
+      return {std::nullopt, c.effect->id + " was found with a temperature channel, and the second recording has none"};
+    }
+  }
+  const CalibrationOutcome without = calibrate_still(second, options.calibration);
+  if (!without.result) {
+    return {std::nullopt, "the second recording: " + without.failure.message};
+  }
+  const RecordingContext context(second);
+  AngleVelocity theta(second.delta_theta.begin(), second.delta_theta.end());
+  AngleVelocity velocity(second.delta_v.begin(), second.delta_v.end());
+  if (correction.size.size() > 0) {
+    subtract_effects(context, forward_pass(second, *without.result), correction, theta, velocity);
+  }
+  ImuData corrected = second;
+  corrected.delta_theta = theta;
+  corrected.delta_v = velocity;
+  const CalibrationOutcome with = calibrate_still(corrected, options.calibration);
+  if (!with.result) {
+    return {std::nullopt, "the second recording, corrected: " + with.failure.message};
+  }
+  const NoiseModel& noise = with.result->noise;
+  result.before = state_of(d, second, *without.result, noise, d.calibration.value, d.calibration.sigma);
+  result.after = state_of(d, corrected, *with.result, noise, d.value, d.sigma);
+  result.gain = result.after.log_likelihood - result.before.log_likelihood;
+  return {std::move(result), {}};
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,15 @@
+// The 24 alone, as every diagnosis starts from them.
+#pragma once
+
+#include "estimator/passes/calibration.hpp"
+
+namespace selfcal::diagnosis {
+
+// Calibration in which a still base's position noise is not widened by what the model leaves out: it stands to
+// micrometres.
+CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options);
+
+// A forward pass about the calibrated recording; `data` must outlive it.
+PassInput forward_pass(const ImuData& data, const CalibrationResult& calibration);
+
+}  // namespace selfcal::diagnosis
