@@ -1,77 +1,112 @@
 // selfcal monitor: the LCM messages of all daemons within reach, live.
 #include <fmt/format.h>
+#include <poll.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <lcm/lcm-cpp.hpp>
-#include <map>
-#include <selfcal_lcm/alarm.hpp>
-#include <selfcal_lcm/estimate.hpp>
-#include <selfcal_lcm/ins_status.hpp>
-#include <selfcal_lcm/service_status.hpp>
+#include <memory>
+#include <optional>
 
 #include "tools/cli/command.hpp"
+#include "tools/cli/monitor_terminal.hpp"
+#include "tools/cli/monitor_view.hpp"
 
 namespace selfcal::cli {
 namespace {
 
 volatile sig_atomic_t ended = 0;
 
+constexpr int frame_ms = 100;
+constexpr int most_per_frame = 1000;   // messages
+
 struct Options {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   bool once = false;
 };
 
-// The latest of each INS; on a terminal the screen is drawn anew, else each message is one line.
-class Screen {
+// Keeps the latest of everything; where the output is no terminal each message is one line.
+class Listener {
  public:
-  explicit Screen(bool terminal) : terminal_(terminal) {}
+  Listener(lcm::LCM& lcm, bool lines) : lines_(lines) {
+    lcm.subscribe("SELFCAL_SERVICE", &Listener::on_service, this);
+    lcm.subscribe("SELFCAL_INS_.*", &Listener::on_ins, this);
+    lcm.subscribe("SELFCAL_ESTIMATE_.*", &Listener::on_estimate, this);
+    lcm.subscribe("SELFCAL_ALARM", &Listener::on_alarm, this);
+  }
 
-  void on_service(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::service_status* message) {
-    set("", fmt::format("selfcald {}: {} INS, {} runs in progress, up {:.0f} s", message->software,
-                        message->instruments, message->runs_in_progress, message->uptime_s));
-  }
-  void on_ins(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::ins_status* message) {
-    set(message->ins + " status",
-        fmt::format("{} {}: {}, run {}, position {}/{}, outer {:.2f} deg, inner {:.2f} deg, {:.0f} s left, pages "
-                    "{}/{}{}",
-                    message->ins, message->serial, message->state, message->run, message->position, message->positions,
-                    message->outer_deg, message->inner_deg, message->time_left_s, message->pages_pulled,
-                    message->pages_expected, message->link_up != 0 ? "" : ", LINK LOST"));
-  }
-  void on_estimate(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::estimate* message) {
-    const std::string when = message->running != 0
-                                 ? fmt::format("{:.0f} s of data, rotation ends in {:.0f} s", message->data_s,
-                                               message->finish_in_s)
-                                 : fmt::format("pass {}, {:.0f} %", message->pass_number, 100 * message->pass_fraction);
-    std::string text = fmt::format("{}: {}, {} of {} to tolerance", message->ins, when, message->tolerances_met,
-                                   message->count);
-    for (std::size_t i = 0; i < message->name.size(); ++i) {
-      text += fmt::format("{}{:<24}{:>12.5g} +- {:<10.3g} {}", terminal_ ? "\n  " : "; ", message->name[i],
-                          message->value[i], message->sigma[i], message->unit[i]);
-    }
-    set(message->ins + " zz", text);
-  }
-  void on_alarm(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::alarm* message) {
-    set(message->ins + " alarm", fmt::format("ALARM {}: run {}: {}", message->ins, message->run, message->text));
-  }
+  const MonitorState& state() const { return state_; }
+  int heard() const { return heard_; }
 
  private:
-  void set(const std::string& key, const std::string& text) {
-    lines_[key] = text;
-    if (!terminal_) {
-      fmt::print("{}\n", text);
-    } else {
-      fmt::print("\033[H\033[2J");
-      for (const auto& [unused, line] : lines_) fmt::print("{}\n", line);
+  void on_service(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::service_status* message) {
+    state_.service = *message;
+    say(*message);
+  }
+  void on_ins(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::ins_status* message) {
+    state_.instruments[message->ins].status = *message;
+    say(*message);
+  }
+  void on_estimate(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::estimate* message) {
+    state_.instruments[message->ins].estimate = *message;
+    say(*message);
+  }
+  void on_alarm(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::alarm* message) {
+    state_.take(*message);
+    say(*message);
+  }
+  template <typename Message>
+  void say(const Message& message) {
+    ++heard_;
+    if (lines_) {
+      fmt::print("{}\n", message_line(message));
+      std::fflush(stdout);
     }
-    std::fflush(stdout);
   }
 
-  bool terminal_;
-  std::map<std::string, std::string> lines_;
+  bool lines_;
+  MonitorState state_;
+  int heard_ = 0;
 };
+
+// Draws at most ten times a second, however fast messages come, and at least so often.
+Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Options& options) {
+  const bool log = options.url.starts_with("file://");
+  std::optional<MonitorTerminal> terminal;
+  if (isatty(STDOUT_FILENO) != 0) {
+    terminal.emplace();
+  }
+  std::size_t selected = 0;
+  bool over = false;   // a log has an end; what it left stays on the screen
+  while (ended == 0 && !(options.once && listener.heard() > 0) && !(over && !terminal)) {
+    if (!over && lcm.handleTimeout(frame_ms) < 0 && errno != EINTR) {
+      if (!log) {
+        return ended != 0 ? Expected<int>(0) : fail(ErrorKind::device, "LCM: receiving failed");
+      }
+      over = true;
+    }
+    if (!terminal) {
+      continue;
+    }
+    for (int more = 0; more < most_per_frame && !over && lcm.handleTimeout(0) > 0; ++more) {
+    }
+    const std::size_t count = listener.state().instruments.size();
+    for (int key = terminal->key(); key >= 0; key = terminal->key()) {
+      if (key == 'q') {
+        return 0;
+      }
+      selected = key == '\t' && count > 0 ? (selected + 1) % count : selected;
+    }
+    terminal->draw(monitor_screen(listener.state(), selected, terminal->columns(), terminal->rows()));
+    if (over) {
+      pollfd keyboard{STDIN_FILENO, POLLIN, 0};
+      poll(&keyboard, 1, frame_ms);
+    }
+  }
+  return 0;
+}
 
 Expected<int> monitor(const Options& options) {
   lcm::LCM lcm(options.url);
@@ -81,20 +116,11 @@ Expected<int> monitor(const Options& options) {
   }
   struct sigaction action {};
   action.sa_handler = [](int) { ended = 1; };
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  Screen screen(isatty(STDOUT_FILENO) != 0);
-  lcm.subscribe("SELFCAL_SERVICE", &Screen::on_service, &screen);
-  lcm.subscribe("SELFCAL_INS_.*", &Screen::on_ins, &screen);
-  lcm.subscribe("SELFCAL_ESTIMATE_.*", &Screen::on_estimate, &screen);
-  lcm.subscribe("SELFCAL_ALARM", &Screen::on_alarm, &screen);
-  int heard = 0;
-  while (ended == 0) {
-    const int result = lcm.handleTimeout(500);
-    if (result < 0) return ended != 0 ? Expected<int>(0) : fail(ErrorKind::device, "LCM: receiving failed");
-    if (result > 0 && options.once && ++heard >= 1) break;
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    sigaction(number, &action, nullptr);
   }
-  return 0;
+  const Listener listener(lcm, isatty(STDOUT_FILENO) == 0);
+  return watch(lcm, listener, options);
 }
 
 CommandRun configure(CLI::App& app) {
