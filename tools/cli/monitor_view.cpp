@@ -11,7 +11,7 @@ namespace {
 using Style = ScreenLine::Style;
 
 constexpr std::size_t most_events = 50;
-constexpr int bar_cells = 6;
+constexpr int bar_cells = 5;
 constexpr double widest_ratio = 100.0;   // sigma/tolerance at which a bar is empty
 
 std::string bar(double share, int cells) {
@@ -91,8 +91,8 @@ void add_estimate(const MonitorState::Ins& ins, std::vector<ScreenLine>& lines) 
   }
   const selfcal_lcm::estimate& e = *ins.estimate;
   lines.push_back({e.tolerances_met == e.count ? Style::good : Style::plain, "estimate  " + estimate_words(e)});
-  lines.push_back({Style::faint, fmt::format("{:<15}{:>8} {:<6} {:<9}  {:<15}{:>8} {:<6} {}", "parameter", "sigma", "unit",
-                                             "tolerance", "parameter", "sigma", "unit", "tolerance")});
+  lines.push_back({Style::faint, fmt::format("{:<15}{:>8} {:<6} {:<8}  {:<15}{:>8} {:<6} {}", "parameter", "sigma", "unit",
+                                             "target", "parameter", "sigma", "unit", "target")});
   const std::size_t half = (e.name.size() + 1) / 2;
   for (std::size_t k = 0; k < half; ++k) {
     std::string text = parameter_cell(e, k);

@@ -64,13 +64,15 @@ function correctedTable(parameters) {
   ])];
 }
 
-// The axis that the signature moves most, in all its cells.
-function addSignaturePlots(place, map) {
+// The two axes that the signature moves most, in all their cells.
+function addSignaturePlots(place, map, findings) {
   const cells = map.cells;
   const power = [0, 0, 0, 0, 0, 0];
   cells.axis.forEach((axis, k) => { power[axis] += (cells.signature[k] / cells.sigma[k]) ** 2; });
+  // An accelerometer's error shows in the gyros' cells too, through the position; the named sensors come first.
+  const named = (axis) => (findings.some((f) => f.effect.startsWith(axis < 3 ? 'gyro' : 'accel')) ? 1 : 0);
   const seen = power.map((value, axis) => ({value, axis})).filter(({value}) => value > 25)
-      .sort((a, b) => b.value - a.value).slice(0, 2);
+      .sort((a, b) => named(b.axis) - named(a.axis) || b.value - a.value).slice(0, 2);
   for (const {axis} of seen) {
     const rows = [...cells.axis.keys()].filter((k) => cells.axis[k] === axis && cells.bin[k] >= 0)
         .sort((a, b) => cells.middle_s[a] - cells.middle_s[b]);
@@ -125,7 +127,7 @@ function showDiagnosis(report) {
   if (d.undetectable_here.length > 0) {
     place.append(element('p', {class: 'note'}, 'Not detectable here at typical size: ' + d.undetectable_here.join(', ') + '.'));
   }
-  addSignaturePlots(document.getElementById('signature-plots'), d.map);
+  addSignaturePlots(document.getElementById('signature-plots'), d.map, d.findings);
   const maps = document.getElementById('misfit-maps');
   addMisfitMap(maps, d.map, 'misfit-before', 'Misfit of the 24 alone', d.map.cells.bias);
   if (d.map.cells.signature.some((value) => value !== 0)) {

@@ -55,7 +55,7 @@ function drawSide(group, plan, axes, cx, cy, radius) {
       const point = unit.map((value) => sign * value);
       if (shown(point)) {
         const [x, y] = flat(point.map((value) => 1.1 * value));
-        group.append(svgElement('text', {x, y: y + 4, 'text-anchor': 'middle', style: 'font-weight: bold'},
+        group.append(svgElement('text', {x: x - 9, y: y + 4, 'text-anchor': 'end', style: 'font-weight: bold'},
                                 (sign > 0 ? '+' : '−') + name));
       }
     }
