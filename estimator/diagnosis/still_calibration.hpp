@@ -5,8 +5,8 @@
 
 namespace selfcal::diagnosis {
 
-// Calibration in which a still base's position noise is not widened by what the model leaves out: it stands to
-// micrometres.
+// Calibration in which a still base's position noise is not widened by what the model leaves out (it stands to
+// micrometres), and in which densities that make the innovations far too small are taken back.
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options);
 
 // A forward pass about the calibrated recording; `data` must outlive it.

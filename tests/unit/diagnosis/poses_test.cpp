@@ -1,0 +1,92 @@
+// The F distribution in closed form, and a hand-turned sensor made here with a known g-sensitivity.
+#include "estimator/diagnosis/poses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace selfcal::diagnosis {
+namespace {
+
+// Two degrees in the numerator: P(F > f) = (1 + 2 f/n)^(-n/2).
+TEST(FTail, IsAPowerForTwoDegrees) {
+  for (const double n : {5.0, 30.0, 200.0}) {
+    for (const double f : {0.01, 1.0, 7.0, 400.0}) {
+      EXPECT_NEAR(log_f_tail(f, 2.0, n), -0.5 * n * std::log1p(2.0 * f / n), 1e-9 * (1.0 + n * f));
+    }
+  }
+}
+
+// One and one: F is the square of a Cauchy variable, P = 1 - 2/pi atan(sqrt(f)).
+TEST(FTail, IsCauchyForOneAndOne) {
+  for (const double f : {0.1, 1.0, 50.0}) {
+    EXPECT_NEAR(std::exp(log_f_tail(f, 1.0, 1.0)), 1.0 - 2.0 / M_PI * std::atan(std::sqrt(f)), 1e-12);
+  }
+}
+
+// 24 poses of 4 s, turned in 2 s about random axes; counts of 2e-4 rad/s and 2.4e-4 g with noise of 4 counts.
+PoseInput hand_turned(const Matrix3& G, std::uint32_t seed) {
+  constexpr double dt = 0.01, gyro_unit = 2e-4, accel_unit = 2.4e-4;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  PoseInput input;
+  input.gyro_unit = gyro_unit;
+  Vector3 u(0.0, 0.0, 1.0);
+  double t = 0.0;
+  const auto sample = [&](const Vector3& rate) {
+    u = matrix_from_rotation_vector(-rate * dt) * u;
+    t += dt;
+    const Vector3 gyro = rate / gyro_unit + Vector3(32500, 32400, 32600) + G * u;
+    const Vector3 accel = u / accel_unit + Vector3(33100, 33300, 32400);
+    input.time_s.push_back(t);
+    input.gyro.push_back({gyro.x() + 4 * normal(random), gyro.y() + 4 * normal(random), gyro.z() + 4 * normal(random)});
+    input.accel.push_back({accel.x() + 4 * normal(random), accel.y() + 4 * normal(random), accel.z() + 4 * normal(random)});
+  };
+  for (int pose = 0; pose < 24; ++pose) {
+    for (int k = 0; k < 400; ++k) {
+      sample(Vector3::Zero());
+    }
+    const Vector3 axis = Vector3(normal(random), normal(random), normal(random)).normalized();
+    for (int k = 0; k < 200; ++k) {
+      sample(axis * 0.9 * (1.0 - std::cos(2.0 * M_PI * (k + 0.5) / 200.0)));
+    }
+  }
+  return input;
+}
+
+TEST(Poses, NamesAGSensitivity) {
+  Matrix3 G;
+  G << 3.0, -8.0, 0.0, 5.0, 0.0, 2.0, 0.0, 6.0, -4.0;   // counts per g
+  const PoseDiagnosis d = diagnose_poses(hand_turned(G, 1), 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  EXPECT_EQ(d.poses, 24);
+  EXPECT_TRUE(d.accel_adequate);
+  ASSERT_EQ(d.gyro_named.size(), 1u);
+  EXPECT_EQ(d.gyro_named[0].effect, "gyro_g_sensitivity");
+  ASSERT_EQ(d.gyro_named[0].value.size(), 9u);
+  for (int k = 0; k < 9; ++k) {   // nine draws beyond 5 sigma (of 20 degrees): one seed in 2000, and the seed is fixed
+    EXPECT_LT(std::abs(d.gyro_named[0].value[static_cast<std::size_t>(k)] - G(k / 3, k % 3)),
+              5.0 * d.gyro_named[0].sigma[static_cast<std::size_t>(k)]);
+  }
+  // 5 counts over 2 s turn gravity by 2 mrad or 0.1 deg; what remains is white noise, 4 counts: 0.01 deg over a turn.
+  EXPECT_GT(d.direction_before_held_out, 3.0 * d.direction_after_held_out);
+}
+
+TEST(Poses, NamesNothingWhereNothingIs) {
+  const PoseDiagnosis d = diagnose_poses(hand_turned(Matrix3::Zero(), 2), 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  EXPECT_TRUE(d.accel_adequate);
+  EXPECT_TRUE(d.gyro_named.empty());
+}
+
+TEST(Poses, RefusesARecordingWithoutPoses) {
+  PoseInput input = hand_turned(Matrix3::Zero(), 3);
+  input.time_s.resize(3000);
+  input.gyro.resize(3000);
+  input.accel.resize(3000);
+  EXPECT_FALSE(diagnose_poses(input, 0.01).failure.empty());
+}
+
+}  // namespace
+}  // namespace selfcal::diagnosis
