@@ -73,7 +73,8 @@ TEST(Estimate, ToleranceDecidesWhatIsDetermined) {
   const auto finished =
       run_selfcal({"estimate", "--json", folder / "r.h5", "--tolerance", "gyro_scale=0.001", "--tolerance", "gyro_drift=1"});
   EXPECT_EQ(finished.status, 1);
-  for (const json& parameter : json::parse(finished.out).at("parameters")) {
+  const json document = json::parse(finished.out);
+  for (const json& parameter : document.at("parameters")) {
     const std::string name = parameter.at("name");
     if (name.starts_with("gyro_scale")) {
       EXPECT_FALSE(parameter.at("determined").get<bool>()) << name;
