@@ -51,7 +51,17 @@ struct Socket::Impl {
         raw_out(options.batch),
         vectors_out(options.batch),
         headers_out(options.batch),
-        received(options.batch) {}
+        received(options.batch) {
+    for (std::size_t i = 0; i < options.batch; ++i) {
+      vectors[i] = {&raw[i], sizeof raw[i]};
+      headers[i].msg_hdr.msg_iov = &vectors[i];
+      headers[i].msg_hdr.msg_iovlen = 1;
+      headers[i].msg_hdr.msg_control = control[i].data();
+      headers[i].msg_hdr.msg_controllen = control_bytes;
+      headers_out[i].msg_hdr.msg_iov = &vectors_out[i];
+      headers_out[i].msg_hdr.msg_iovlen = 1;
+    }
+  }
   ~Impl() {
     if (fd >= 0) {
       ::close(fd);
@@ -68,7 +78,6 @@ struct Socket::Impl {
   }
   Expected<void> configure(const SocketOptions& options);
   Expected<void> bind_to_interface(bool fd_needed);
-  void prepare(std::size_t i);
   void take(std::size_t i);
 };
 
@@ -95,8 +104,11 @@ Expected<void> Socket::Impl::configure(const SocketOptions& options) {
   if (!set(SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) && !set(SOL_SOCKET, SO_RCVBUF, &size, sizeof size)) {
     return failure("cannot set the receive buffer");
   }
-  if (!set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on) || !set(SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on)) {
-    return failure("cannot ask for time stamps and overruns");
+  if (!set(SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on)) {
+    return failure("cannot ask for overruns");
+  }
+  if (options.kernel_time && !set(SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on)) {
+    return failure("cannot ask for time stamps");
   }
   return {};
 }
@@ -132,15 +144,6 @@ Expected<void> Socket::Impl::bind_to_interface(bool fd_needed) {
   return {};
 }
 
-void Socket::Impl::prepare(std::size_t i) {
-  vectors[i] = {&raw[i], sizeof raw[i]};
-  headers[i] = {};
-  headers[i].msg_hdr.msg_iov = &vectors[i];
-  headers[i].msg_hdr.msg_iovlen = 1;
-  headers[i].msg_hdr.msg_control = control[i].data();
-  headers[i].msg_hdr.msg_controllen = control[i].size();
-}
-
 void Socket::Impl::take(std::size_t i) {
   ReceivedFrame& out = received[i];
   out.frame = from_kernel(raw[i], headers[i].msg_len);
@@ -161,6 +164,7 @@ void Socket::Impl::take(std::size_t i) {
       overrun_count = count;
     }
   }
+  header.msg_controllen = control_bytes;   // the kernel wrote what it used
 }
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -196,9 +200,6 @@ int Socket::receive_buffer_granted() const {
 
 Expected<std::span<const ReceivedFrame>> Socket::receive() {
   Impl& s = *impl_;
-  for (std::size_t i = 0; i < s.headers.size(); ++i) {
-    s.prepare(i);
-  }
   const int count =
       ::recvmmsg(s.fd, s.headers.data(), static_cast<unsigned>(s.headers.size()), MSG_DONTWAIT, nullptr);
   if (count < 0) {
@@ -219,9 +220,6 @@ Expected<std::size_t> Socket::send(std::span<const CanFrame> frames) {
   const std::size_t wanted = std::min(frames.size(), s.headers_out.size());
   for (std::size_t i = 0; i < wanted; ++i) {
     s.vectors_out[i] = {&s.raw_out[i], to_kernel(frames[i], s.raw_out[i])};
-    s.headers_out[i] = {};
-    s.headers_out[i].msg_hdr.msg_iov = &s.vectors_out[i];
-    s.headers_out[i].msg_hdr.msg_iovlen = 1;
   }
   if (wanted == 0) {
     return std::size_t{0};

@@ -28,12 +28,13 @@ struct SocketOptions {
   bool fd = true;                    // FD frames can be sent and received (needs MTU 72)
   bool error_frames = true;
   int receive_buffer_bytes = 4 << 20;   // asked for; the kernel grants up to net.core.rmem_max without privilege
-  std::size_t batch = 64;            // frames per system call
+  std::size_t batch = 256;           // frames per system call
+  bool kernel_time = false;          // ReceivedFrame::kernel_time is wanted; costs a control message per frame
 };
 
 struct ReceivedFrame {
   CanFrame frame;
-  Time kernel_time{0};               // since 1970, when the kernel got it
+  Time kernel_time{0};               // since 1970, when the kernel got it; zero unless asked for
   std::optional<BusEvent> event;     // an error frame: frame then holds its raw identifier and data
 };
 

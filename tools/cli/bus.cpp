@@ -73,6 +73,7 @@ Expected<bool> wait_for_frames(int descriptor, const StopSignals& signals, std::
 
 Expected<int> log_bus(const LogArguments& arguments) {
   can::SocketOptions options;
+  options.kernel_time = true;
   options.interface = arguments.interface;
   Expected<can::Socket> socket = can::Socket::open(options);
   if (!socket) {
