@@ -151,6 +151,7 @@ void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
   writer.put(run_id);
   writer.put(pages_expected);
   writer.put(flash::crc32c(std::span(bytes).first(8)));
+  flash_.erase(raw_ring_first_block);   // before the header names the run: pages of an earlier run of this number end here
   flash_.erase(run_block);
   flash_.program(run_block * flash_block_bytes, bytes);
   run_id_ = run_id;
@@ -161,17 +162,17 @@ void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
 }
 
 void RawStore::append(const flash::Page& page) {
-  const std::size_t block = raw_ring_first_block + written_ % raw_ring_pages;
   flash::PageBytes bytes;
   flash::encode_page(page, bytes);
-  flash_.erase(block);
-  flash_.program(block * flash_block_bytes, bytes);
+  flash_.erase(raw_ring_first_block + (written_ + 1) % raw_ring_pages);   // what follows is blank at every moment
+  flash_.program((raw_ring_first_block + written_ % raw_ring_pages) * flash_block_bytes, bytes);
   samples_ += page.samples.size();
   ++written_;
 }
 
 std::uint32_t RawStore::first_page() const {
-  return written_ > raw_ring_pages ? written_ - static_cast<std::uint32_t>(raw_ring_pages) : 0;
+  constexpr auto held = static_cast<std::uint32_t>(raw_ring_pages - 1);   // one block is blank
+  return written_ > held ? written_ - held : 0;
 }
 
 ins::DirectoryRecord RawStore::directory() const {

@@ -72,7 +72,8 @@ class CounterStore {
   Counters counters_;
 };
 
-// Raw data of the latest run. Pages go round a ring: beyond its length the oldest are lost.
+// Raw data of the latest run. Pages go round a ring: beyond its length the oldest are lost. The block after the newest
+// page is blank, so that pages of an earlier run, whatever its number was, are never taken for this one's.
 class RawStore {
  public:
   explicit RawStore(FlashMemory& flash) : flash_(flash) {}

@@ -98,18 +98,41 @@ TEST(PowerCut, CountersNeverGoBackByMoreThanTheOneUnderWay) {
   }
 }
 
+flash::Page page_of(std::uint32_t run_id, std::uint32_t sequence) {
+  flash::Page page;
+  page.run_id = run_id;
+  page.sequence = sequence;
+  page.samples.resize(flash::samples_per_page);
+  return page;
+}
+
+// A tester that lost its records may use a run's number again.
+TEST(PowerCut, PagesOfAnEarlierRunOfTheSameNumberDoNotCount) {
+  for (const std::uint32_t written : {0U, 1U, 2U}) {
+    auto flash = FlashMemory::open("", flash_bytes);
+    ASSERT_TRUE(flash);
+    RawStore raw(*flash);
+    raw.begin(7, 100);
+    for (std::uint32_t k = 0; k < 5; ++k) {
+      raw.append(page_of(7, k));
+    }
+    raw.begin(7, 100);
+    for (std::uint32_t k = 0; k < written; ++k) {
+      raw.append(page_of(7, k));
+    }
+    raw.power_on();
+    EXPECT_EQ(raw.pages_written(), written);
+  }
+}
+
 TEST(PowerCut, ATornPageIsNotOneOfTheRun) {
   auto flash = FlashMemory::open("", flash_bytes);
   ASSERT_TRUE(flash);
   RawStore raw(*flash);
   raw.begin(42, 100);
-  flash::Page page;
-  page.run_id = 42;
-  page.samples.resize(flash::samples_per_page);
-  raw.append(page);
-  page.sequence = 1;
+  raw.append(page_of(42, 0));
   flash->lose_power_after(flash_block_bytes + 2000);   // within the second page's bytes
-  EXPECT_THROW(raw.append(page), PowerLost);
+  EXPECT_THROW(raw.append(page_of(42, 1)), PowerLost);
   flash->lose_power_after(std::nullopt);
   raw.power_on();
   EXPECT_EQ(raw.pages_written(), 1U);
