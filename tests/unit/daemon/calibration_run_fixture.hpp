@@ -11,6 +11,7 @@
 
 #include "daemon/calibration_run.hpp"
 #include "tests/unit/daemon/fake_ins.hpp"
+#include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal::testing_support {
 
@@ -76,8 +77,6 @@ class Observer : public RunObserver {
 class CalibrationRunTest : public testing::Test {
  protected:
   CalibrationRunTest() {
-    std::string pattern = testing::TempDir() + "calibration_run_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
     config_.name = std::string("bench");
     config_.interface = std::string("fake0");
@@ -85,10 +84,6 @@ class CalibrationRunTest : public testing::Test {
     config_.lost_after_s = 20.0;
     schedule_ = *named_schedule("table2");
     key_ = ins_.key;
-  }
-  ~CalibrationRunTest() override {
-    run_.reset();
-    std::filesystem::remove_all(folder_);
   }
 
   void make(const RunRecord& record) {
@@ -122,7 +117,8 @@ class CalibrationRunTest : public testing::Test {
   const std::string& reason() const { return run_->record().reason; }
   bool old_set_in_force() { return ins_.in_force().version == 0; }
 
-  std::filesystem::path folder_;
+  const ScratchFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
   SimulatedTimers timers_;
   FakeIns ins_{timers_};
   FakeEstimators estimators_{timers_};

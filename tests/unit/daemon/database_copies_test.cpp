@@ -10,6 +10,7 @@
 
 #include "daemon/run_store.hpp"
 #include "daemon/state_lock.hpp"
+#include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {
 namespace {
@@ -19,11 +20,6 @@ using testing::HasSubstr;
 
 class DatabaseCopiesTest : public testing::Test {
  protected:
-  DatabaseCopiesTest() {
-    std::string pattern = testing::TempDir() + "database_copies_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~DatabaseCopiesTest() override { fs::remove_all(folder_); }
 
   void add_runs(int count) {
     const auto store = RunStore::open(database_path(folder_));
@@ -32,7 +28,8 @@ class DatabaseCopiesTest : public testing::Test {
   }
   std::size_t runs(const fs::path& database) { return (*RunStore::open(database))->runs_of_serial("")->size(); }
 
-  fs::path folder_;
+  const testing_support::ScratchFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
 };
 
 TEST_F(DatabaseCopiesTest, ABackupComesBackAndTheFormerDatabaseStays) {

@@ -8,6 +8,8 @@
 #include <chrono>
 #include <fstream>
 
+#include "tests/unit/daemon/scratch_folder.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -20,11 +22,8 @@ using testing::IsEmpty;
 class RecordingStoreTest : public testing::Test {
  protected:
   RecordingStoreTest() {
-    std::string pattern = testing::TempDir() + "recording_store_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
   }
-  ~RecordingStoreTest() override { fs::remove_all(folder_); }
 
   RunId recorded(double mib, std::chrono::hours age, State state = State::completed) {
     RunRecord run;
@@ -49,7 +48,8 @@ class RecordingStoreTest : public testing::Test {
     return ids;
   }
 
-  fs::path folder_;
+  const testing_support::ScratchFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
   std::unique_ptr<RunStore> store_;
   fs::file_time_type now_ = fs::file_time_type::clock::now();
 };

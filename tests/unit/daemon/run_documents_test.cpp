@@ -10,6 +10,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
+#include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {
 namespace {
@@ -20,11 +21,8 @@ using testing::HasSubstr;
 class RunDocumentsTest : public testing::Test {
  protected:
   RunDocumentsTest() {
-    std::string pattern = testing::TempDir() + "run_documents_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
   }
-  ~RunDocumentsTest() override { std::filesystem::remove_all(folder_); }
 
   RunRecord completed(const std::string& ended_utc, double bias_x_ug) {
     RunRecord run;
@@ -53,7 +51,8 @@ class RunDocumentsTest : public testing::Test {
   json document(const RunRecord& run) { return json::parse(*run_document(*store_, run)); }
   json history(const Limits& limits) { return json::parse(*history_document(*store_, "S1", limits)); }
 
-  std::filesystem::path folder_;
+  const testing_support::ScratchFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
   std::unique_ptr<RunStore> store_;
 };
 

@@ -7,6 +7,8 @@
 
 #include <fstream>
 
+#include "tests/unit/daemon/scratch_folder.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -14,12 +16,6 @@ using testing::HasSubstr;
 
 class RunStoreTest : public testing::Test {
  protected:
-  RunStoreTest() {
-    std::string pattern = testing::TempDir() + "run_store_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
-    file_ = folder_ / "selfcal.db";
-  }
-  ~RunStoreTest() override { std::filesystem::remove_all(folder_); }
 
   std::unique_ptr<RunStore> open() {
     auto store = RunStore::open(file_);
@@ -37,7 +33,9 @@ class RunStoreTest : public testing::Test {
     return run;
   }
 
-  std::filesystem::path folder_, file_;
+  const testing_support::ScratchFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
+  const std::filesystem::path file_ = folder_ / "selfcal.db";
 };
 
 TEST_F(RunStoreTest, ARunIsFoundAgainAfterReopening) {

@@ -12,6 +12,7 @@
 #include "estimator/geometry/units.hpp"
 #include "protocol/flash/page.hpp"
 #include "sim_ins/simulate.hpp"
+#include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {
 namespace {
@@ -58,8 +59,6 @@ std::uint32_t write_pages(const Recording& recording, const std::filesystem::pat
 class RunningEstimateTest : public testing::Test {
  protected:
   RunningEstimateTest() {
-    std::string pattern = testing::TempDir() + "running_estimate_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     schedule_ = *named_schedule("horizontal", 40.0);
     sim::SimConfig config;
     config.sample_rate_hz = rate_hz;
@@ -74,13 +73,13 @@ class RunningEstimateTest : public testing::Test {
     request_.rotation = rotation;
     request_.schedule = schedule_;
   }
-  ~RunningEstimateTest() override { std::filesystem::remove_all(folder_); }
 
   std::uint32_t pages_at(double seconds) const {
     return static_cast<std::uint32_t>(seconds * rate_hz / static_cast<double>(flash::samples_per_page));
   }
 
-  std::filesystem::path folder_;
+  const testing_support::ScratchFolder scratch_;
+  const std::filesystem::path& folder_ = scratch_.path();
   Schedule schedule_;
   Recording recording_;
   std::uint32_t pages_ = 0;

@@ -13,6 +13,7 @@
 
 #include "daemon/database_copies.hpp"
 #include "protocol/operator_api/names.hpp"
+#include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {
 namespace {
@@ -55,14 +56,8 @@ class PrivateBus {
 class ServiceTest : public testing::Test {
  protected:
   ServiceTest() {
-    std::string pattern = testing::TempDir() + "service_XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     std::ofstream(folder_ / "key") << "000102030405060708090a0b0c0d0e0f\n";
     unsetenv(operator_api::bus_variable);
-  }
-  ~ServiceTest() override {
-    service_.reset();
-    fs::remove_all(folder_);
   }
 
   void configure(const std::string& daemon_keys, const std::string& sections) {
@@ -91,7 +86,8 @@ class ServiceTest : public testing::Test {
   }
 
   PrivateBus bus_;
-  fs::path folder_;
+  const testing_support::ScratchFolder scratch_;
+  const fs::path& folder_ = scratch_.path();
   EventLoop loop_;
   std::unique_ptr<Service> service_;
 };
