@@ -94,6 +94,7 @@ function drawErrors(spec, plot) {
   for (const series of spec.series) {
     ctx.strokeStyle = cssColour(series.colour);
     ctx.lineWidth = devicePixelRatio;
+    ctx.setLineDash([]);
     ctx.beginPath();
     for (const [x, low, high] of errorBars(spec, series)) {
       const across = plot.valToPos(x, 'x', true);

@@ -54,8 +54,8 @@ function drawSide(group, plan, axes, cx, cy, radius) {
     for (const sign of [1, -1]) {
       const point = unit.map((value) => sign * value);
       if (shown(point)) {
-        const [x, y] = flat(point.map((value) => 1.1 * value));
-        group.append(svgElement('text', {x: x - 9, y: y + 4, 'text-anchor': 'end', style: 'font-weight: bold'},
+        const [x, y] = flat(point);
+        group.append(svgElement('text', {x, y: y + 19, 'text-anchor': 'middle', style: 'font-weight: bold'},
                                 (sign > 0 ? '+' : '−') + name));
       }
     }
@@ -70,7 +70,8 @@ function drawSide(group, plan, axes, cx, cy, radius) {
     if (shown(at)) {
       const [x, y] = flat(at);
       group.append(svgElement('circle', {cx: x, cy: y, r: 5, style: 'fill: var(--y)'}),
-                   svgElement('text', {x: x + 7, y: y - 6}, names.join(' ')));
+                   svgElement('text', {x: x > cx ? x - 7 : x + 7, y: y - 7, 'text-anchor': x > cx ? 'end' : 'start'},
+                              names.join(' ')));
     }
   }
 }

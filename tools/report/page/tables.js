@@ -74,6 +74,7 @@ function shareBar(share) {
 
 function showParameters(report) {
   const list = report.parameters;
+  const known = list.some((p) => p.change);
   document.getElementById('parameter-table').append(table([
     {title: 'parameter', cells: list.map((p) => p.name), class: 'left'},
     {title: 'value', cells: list.map((p) => p.value.toFixed(decimalsFor(p.sigma)))},
@@ -81,7 +82,7 @@ function showParameters(report) {
     {title: 'unit', cells: list.map((p) => unitSymbol(p.unit)), class: 'left'},
     {title: 'tolerance', cells: list.map((p) => significant(p.tolerance, 3))},
     {title: 'σ / tolerance', cells: list.map((p) => shareBar(p.sigma / p.tolerance)), class: 'left'},
-    {title: 'since the last calibration', cells: list.map(changeOf)},
+    ...(known ? [{title: 'since the last calibration', cells: list.map(changeOf)}] : []),
     {title: 'state', cells: list.map(stateOf), class: 'left'},
   ], {id: 'values'}));
   const objections = document.getElementById('objections');
