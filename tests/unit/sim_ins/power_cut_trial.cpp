@@ -82,6 +82,11 @@ class Trial {
 
   // After a cut. True where the new set is in force.
   bool come_up() {
+    // The commit is one word. With two bytes or more of it missing nothing is committed; the fourth alone may be one
+    // that programming leaves as erasure left it.
+    if (cut_.phase == committing && cut_.bytes < 3) {
+      may_be_in_force_ = false;
+    }
     cut_ = {};
     off_at_.reset();
     client_.cancel();
