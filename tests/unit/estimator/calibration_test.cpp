@@ -33,6 +33,8 @@ struct Place {
   const char* name;
   double roll_deg, pitch_deg, heading_deg, latitude_deg;
   bool moored;
+
+  friend std::ostream& operator<<(std::ostream& out, const Place& place) { return out << place.name; }
 };
 
 class AnyStart : public ::testing::TestWithParam<Place> {};

@@ -28,6 +28,11 @@ struct Case {
   Attitude attitude_deg;
   double latitude_deg;
   bool moored;
+
+  friend std::ostream& operator<<(std::ostream& out, const Case& c) {
+    return out << "roll " << c.attitude_deg.roll << " pitch " << c.attitude_deg.pitch << " heading "
+               << c.attitude_deg.heading << " latitude " << c.latitude_deg << (c.moored ? " moored" : " still");
+  }
 };
 
 // What the fit of v0 + a t + b t^2/2 under sin^2 makes of a velocity exp(i w t): |a| (1/s) and |b| (1/s^2).

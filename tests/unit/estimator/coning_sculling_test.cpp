@@ -26,6 +26,8 @@ const earth::Position site{40.0 * units::degree, 0.0, 0.0};
 struct Vibration {
   double frequency_hz;
   double bound;   // stated: of the residual, deg/h or ug
+
+  friend std::ostream& operator<<(std::ostream& out, const Vibration& v) { return out << v.frequency_hz << " Hz"; }
 };
 
 double algorithm(double b) { return (1.0 - std::cos(b)) * std::sin(b) / 6.0; }
@@ -75,7 +77,7 @@ TEST_P(Coning, ResidualDriftIsTheAlgorithms) {
   EXPECT_LT(drift.norm() / units::degree_per_hour, GetParam().bound);
 }
 
-// Half a degree and ten hertz are far beyond what a moored or parked host does; these are the stated bounds.
+// Stated bounds for a cone of 1 deg, far beyond what a moored or parked host does.
 INSTANTIATE_TEST_SUITE_P(Frequencies, Coning,
                          ::testing::Values(Vibration{5.0, 0.025}, Vibration{10.0, 0.7}, Vibration{20.0, 20.0}));
 

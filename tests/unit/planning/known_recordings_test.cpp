@@ -18,6 +18,8 @@ using nlohmann::json;
 
 struct Known {
   std::string name, row_1_cm, row_still;
+
+  friend std::ostream& operator<<(std::ostream& out, const Known& known) { return out << known.name; }
 };
 
 class KnownAccuracy : public ::testing::TestWithParam<Known> {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct LimitRow {
   std::string name, schedule;
   double dwell_s, pitch_deg, arw_deg_per_sqrt_h, vrw_ug, position_m;
   std::vector<LimitEntry> entries;
+
+  friend std::ostream& operator<<(std::ostream& out, const LimitRow& row) { return out << row.name; }
 };
 
 const std::vector<LimitRow>& limit_table();
