@@ -31,8 +31,13 @@ function coefficientTable(sets, parameters) {
   ], {id: 'coefficients'});
 }
 
+// Null where the drift was not measured.
+function driftKnown(run) {
+  return typeof run.drift_before_m === 'number' && typeof run.drift_after_m === 'number';
+}
+
 function showDrift(run) {
-  if (!(run.drift_before_m >= 0) || !(run.drift_after_m >= 0)) {
+  if (!driftKnown(run)) {
     return;
   }
   const values = [run.drift_before_m, run.drift_after_m];
@@ -58,10 +63,14 @@ function showRun(report) {
   const parts = [`Run ${run.run} of ${run.ins}, by ${run.user}, schedule ${run.schedule}, ${run.started_utc} to ${run.ended_utc || 'now'}: ${run.state}`];
   if (run.reason) parts.push(`: ${run.reason}`);
   if (run.force_reason) parts.push(`; forced: ${run.force_reason}`);
-  if (run.drift_before_m >= 0 && run.drift_after_m >= 0) {
+  if (driftKnown(run)) {
     parts.push(`; drift ${significant(run.drift_before_m, 4)} m before, ${significant(run.drift_after_m, 4)} m after`);
   }
   document.getElementById('run-words').textContent = parts.join('') + '.';
+  // With parameters they stand below their table.
+  for (const warning of report.parameters ? [] : report.warnings ?? []) {
+    document.getElementById('run-story').append(element('p', {class: 'bad'}, 'Warning: ' + warning));
+  }
   showDrift(run);
   const sets = run.coefficients;
   if (sets && (sets.previous || sets.proposed)) {

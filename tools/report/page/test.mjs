@@ -1,6 +1,6 @@
 // The pages in a real browser: node test.mjs KIND PAGE.html EXPECTED.json CHROMIUM [SCREENSHOT-FOLDER]
 // KIND calibration: EXPECTED is what `selfcal estimate --json` said of the same recording; run: the saved run;
-// plan: `selfcal plan --json`; fleet: an array of the saved histories. One line for each failure; status 1.
+// failed: a saved run without a result, whose recording is gone; plan: `selfcal plan --json`; fleet: an array of the saved histories. One line for each failure; status 1.
 // SELFCAL_FIRST_PLOT_MS: fail where the first plot takes longer (a bench: it depends on the machine).
 import {readFileSync, statSync, writeFileSync} from 'node:fs';
 import {pathToFileURL} from 'node:url';
@@ -68,6 +68,7 @@ const wanted = {
   calibration: ['convergence-accel_bias_x', 'nis', 'innovations', 'gimbal', 'allan-gyro', 'allan-accel',
                 'correlation-matrix', 'misfit-before'],
   run: ['convergence-accel_bias_x', 'navigation-drift', 'history-accel_bias_x', 'misfit-before'],
+  failed: [],
   plan: ['timeline-0', 'timeline-1', 'sphere-0', 'sphere-1', 'forecast-accel_bias_x', 'forecast-gyro_misalignment_zy'],
   fleet: ['trend-accel_bias_x', 'trend-gyro_misalignment_zy'],
 };
@@ -144,6 +145,13 @@ async function check_run(page) {
   expect(shows(drift[1], expected.drift_before_m) && shows(drift[2], expected.drift_after_m), `drift: ${drift}`);
 }
 
+async function check_failed(page) {
+  const text = await page.textContent('main');
+  expect((await page.textContent('#verdict')).includes(expected.reason), 'the reason is not told');
+  expect(text.includes('Warning: no curves') && text.includes(expected.recording), 'the missing recording is not told');
+  expect(await page.$('#navigation-drift') === null, 'a drift is shown that was not measured');
+}
+
 async function check_plan(page) {
   const rows = await rows_of(page, 'values');
   expected.parameters.forEach((parameter, k) => {
@@ -215,11 +223,13 @@ try {
     page.on('request', (request) => expect(/^(file|data|blob):/.test(request.url()), `${where}: asks for ${request.url()}`));
     await page.goto(pathToFileURL(page_file).href);
     const first_plot = await page.evaluate(() => performance.getEntriesByName('first-plot')[0]?.startTime);
-    expect(first_plot < slowest_plot_ms, `${where}: first plot after ${first_plot} ms`);
-    console.log(`${where}: first plot after ${Math.round(first_plot)} ms`);
+    expect(kind === 'failed' || first_plot < slowest_plot_ms, `${where}: first plot after ${first_plot} ms`);
+    if (kind !== 'failed') {
+      console.log(`${kind}, ${where}: first plot after ${Math.round(first_plot)} ms`);
+    }
     await check_plots(page, where);
     if (width === 1400) {
-      await {calibration: check_estimate, run: check_run, plan: check_plan, fleet: check_fleet}[kind](page);
+      await {calibration: check_estimate, run: check_run, failed: check_failed, plan: check_plan, fleet: check_fleet}[kind](page);
       if (kind === 'calibration') {
         await check_keyboard(page);
         await check_saving(page, 'nis');
