@@ -199,9 +199,10 @@ void CalibrationRun::settle(const Step& step) {
 bool CalibrationRun::session_lost(int nrc) {
   constexpr int at_most = 5;   // in one run; more often it is no accident
   const bool unlocked_before = record_.state != State::connecting && record_.state != State::unlocking;
-  const bool locked = nrc == static_cast<int>(uds::Nrc::service_not_supported_in_session) ||
-                      nrc == static_cast<int>(uds::Nrc::security_access_denied);
-  return unlocked_before && locked && ++sessions_lost_ <= at_most;
+  const bool forgot = nrc == static_cast<int>(uds::Nrc::service_not_supported_in_session) ||
+                      nrc == static_cast<int>(uds::Nrc::security_access_denied) ||
+                      nrc == static_cast<int>(uds::Nrc::request_sequence_error);   // of a transfer it knows nothing of
+  return unlocked_before && forgot && ++sessions_lost_ <= at_most;
 }
 
 // The first reason is the one that counts: what follows is its consequence.
