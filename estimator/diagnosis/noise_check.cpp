@@ -11,7 +11,15 @@
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr Eigen::Index piece = 2048;         // samples
+// Samples of a piece: the power of two next below 21 s, at most 2048; a dwell of a minute then holds two or more.
+Eigen::Index piece_length(double rate_hz) {
+  constexpr double longest_s = 21.0;
+  Eigen::Index length = 2048;
+  while (length > 256 && static_cast<double>(length) > longest_s * rate_hz) {
+    length /= 2;
+  }
+  return length;
+}
 constexpr double margin_s = 5.0;
 constexpr double lowest_hz = 0.25;           // slower: drifts of all kinds
 constexpr int most_pieces_per_dwell = 8;
@@ -25,10 +33,11 @@ struct DwellSpectra {
 
 DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis) {
   DwellSpectra result;
+  const Eigen::Index piece = piece_length(data.sample_rate_hz);
   const double dt = 1.0 / data.sample_rate_hz;
   Eigen::VectorXd window(piece);
   for (Eigen::Index i = 0; i < piece; ++i) {
-    window(i) = 1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / piece);
+    window(i) = 1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(piece));
   }
   const double scale = dt / window.squaredNorm();
   Eigen::FFT<double> fft;
@@ -64,6 +73,7 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
 
 // density = N^2 + Q^2 4 sin^2(pi f D)/D, weighted by the model itself; bins far above it are left out.
 AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
+  const auto piece = static_cast<double>(2 * density.size());
   const auto first = static_cast<Eigen::Index>(std::ceil(lowest_hz * piece * dt));
   Spectrum shape(density.size());
   for (Eigen::Index b = 0; b < density.size(); ++b) {
@@ -101,6 +111,7 @@ AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
 void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<VibrationLine>& lines) {
   const std::size_t dwells = s.dwells.size();
   const auto bins = s.dwells.front().size();
+  const auto piece = static_cast<double>(2 * bins);
   const auto first = static_cast<Eigen::Index>(std::ceil(2.0 * lowest_hz * piece / rate_hz));
   Spectrum middle(bins);
   std::vector<double> values(dwells);
@@ -137,7 +148,7 @@ NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments
   NoiseCheck check;
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const DwellSpectra s = spectra(data, segments, axis);
-    Spectrum mean = Spectrum::Zero(piece / 2);
+    Spectrum mean = Spectrum::Zero(piece_length(data.sample_rate_hz) / 2);
     check.pieces = 0;
     for (std::size_t d = 0; d < s.dwells.size(); ++d) {
       mean += s.dwells[d] * s.pieces[d];
