@@ -3,25 +3,15 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <vector>
 
+#include "daemon/calibration/calibrate_recording.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/planning/plan.hpp"
 #include "sim_ins/simulate.hpp"
 
 namespace selfcal::monte_carlo {
 namespace {
-
-ImuData view(const Recording& r) {
-  ImuData data;
-  data.site = {r.latitude_deg * units::degree, r.longitude_deg * units::degree, r.height_m};
-  data.sample_rate_hz = r.sample_rate_hz;
-  data.time_s = r.time_s;
-  data.delta_theta = r.delta_theta_rad;
-  data.delta_v = r.delta_v_mps;
-  data.gimbal_outer = r.gimbal_outer_rad;
-  data.gimbal_inner = r.gimbal_inner_rad;
-  return data;
-}
 
 struct TrueNoise {
   double gyro_arw, accel_vrw;
@@ -115,7 +105,8 @@ Trial run_trial(const Case& c, double sample_rate_hz, std::uint64_t seed, bool w
     trial.failure = recording ? errors.error().message : recording.error().message;
     return trial;
   }
-  const ImuData data = view(*recording);
+  std::vector<double> temperature;
+  const ImuData data = imu_view(*recording, temperature);
   const ParameterVector truth = Eigen::Map<const ParameterVector>(errors->data());
   const CalibrationOutcome outcome = calibrate(data, {});
   if (!outcome.result) {
