@@ -90,9 +90,14 @@ class Stage:
 
     def judge_coefficients(self, document, wanted):
         """After a power cycle, read without our C++ and without the fault."""
+        self.unit.truth_file.unlink()   # whose presence tells that the INS has started
         self.unit.start_ins()
-        version, held = witness.coefficients_in_force(self.unit.interface)
-        self.unit.kill_ins()
+        try:
+            version, held = witness.coefficients_in_force(self.unit.interface, patience_s=60.0)
+        except witness.Silence as silence:
+            return [f"the INS does not tell its coefficients after a power cycle: {silence}"]
+        finally:
+            self.unit.kill_ins()
         expected = dict.fromkeys(held, 0.0)   # the factory's
         if wanted == "new":
             expected |= {p["name"]: p["value"] for p in document["result"]["parameters"] if p["determined"]}

@@ -117,7 +117,8 @@ def main():
             trial.start()
             while (done := trial.killed_in.total()) < options.kills:
                 trial.run(min(options.kills - done, trial.draw.randint(1, 5)))
-                print(f"{trial.killed_in.total()} of {options.kills} kills, {trial.ends.total()} runs", flush=True)
+                print(f"{trial.killed_in.total()} of {options.kills} kills, {trial.ends.total()} runs, "
+                      f"{len(trial.faults)} faults", flush=True)
         finally:
             trial.unit.stop()
         trial.faults += watch.database_faults(trial.state_directory)
