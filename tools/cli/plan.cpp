@@ -165,7 +165,8 @@ Expected<void> write_page(const PlanArguments& a, report::PlannedSchedule planne
   return plan_page_writer()(schedules, installation, a.output);
 }
 
-Expected<void> write_output(const PlanArguments& a, const report::PlannedSchedule& planned, const Installation& installation) {
+Expected<void> write_output(const PlanArguments& a, const report::PlannedSchedule& planned,
+                            const Installation& installation) {
   if (is_page(a.output)) {
     return write_page(a, planned, installation);
   }
@@ -253,8 +254,10 @@ CommandRun configure(CLI::App& app) {
   app.add_option("--longest", a->longest_s, "with --optimize: no schedule beyond so many seconds")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("-o,--output", a->output, "file to write: .html or .pdf a page with plots, else the schedule as TOML, ready to run");
-  app.add_option("--compare", a->compared, "with a page: a second schedule (table2, horizontal, or a TOML file) beside it");
+  app.add_option("-o,--output", a->output,
+                 "file to write: .html or .pdf a page with plots, else the schedule as TOML, ready to run");
+  app.add_option("--compare", a->compared,
+                 "with a page: a second schedule (table2, horizontal, or a TOML file) beside it");
   app.add_flag("--json", a->json, "one JSON document on standard output");
   return [a] { return plan(*a); };
 }

@@ -109,7 +109,8 @@ Expected<Json> saved_history(const std::string& file) {
 }
 
 bool is_number(const std::string& text) {
-  return !text.empty() && text.size() < 19 && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  return !text.empty() && text.size() < 19 && std::all_of(text.begin(), text.end(), digit);
 }
 
 Expected<Json> run_of_daemon(const std::string& number) {

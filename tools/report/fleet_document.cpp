@@ -73,8 +73,10 @@ Json parameter_entry(const Json& past, double now) {
 void add_last(Json& unit, const Json& runs, const FleetOptions& options, double now) {
   Json last;
   for (const Json& run : runs) {
-    const bool in_force = run.at("state") == "completed" && !run.at("dry_run").get<bool>() && run.at("kind") == "calibration";
-    if (in_force && (last.is_null() || last.at("started_utc").get<std::string>() < run.at("started_utc").get<std::string>())) {
+    const bool in_force =
+        run.at("state") == "completed" && !run.at("dry_run").get<bool>() && run.at("kind") == "calibration";
+    const auto started = run.at("started_utc").get<std::string>();
+    if (in_force && (last.is_null() || last.at("started_utc").get<std::string>() < started)) {
       last = run;
     }
   }

@@ -73,7 +73,8 @@ int run(const std::vector<std::string>& words) {
 Expected<void> print_page(const std::string& page, const fs::path& pdf) {
   const TemporaryFolder folder;
   if (folder.path().empty()) {
-    return fail(ErrorKind::internal, fmt::format("{}: no temporary folder could be made", fs::temp_directory_path().string()));
+    return fail(ErrorKind::internal,
+                fmt::format("{}: no temporary folder could be made", fs::temp_directory_path().string()));
   }
   const fs::path html = folder.path() / "page.html";
   const fs::path printed = folder.path() / "page.pdf";
