@@ -128,7 +128,7 @@ class CalibrationRun {
   void estimate();
   void judge();
   void estimate_meanwhile();
-  void on_running_estimate(const Expected<RunningEstimate>& answer);
+  void on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s);
   bool may_end_early() const;
   void show_estimate(const ParameterVector& value, const ParameterVector& sigma);
   void foresee_finish();
@@ -167,7 +167,6 @@ class CalibrationRun {
   std::optional<RunningEstimate> running_;
   bool running_busy_ = false;
   double running_begun_s_ = 0.0;              // of data, when the last one was begun
-  SteadyTime running_begun_at_{};
   SteadyTime running_not_before_{};
   double page_s_ = 0.0;                       // of data in a full page
   bool out_of_reach_said_ = false;

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <ctime>
 #include <system_error>
 
 namespace selfcal {
@@ -44,12 +45,15 @@ void EstimateWorker::start(EstimateJob job, EstimateProgress on_progress,
   });
 }
 
-void EstimateWorker::start_running(RunningJob job, std::function<void(Expected<RunningEstimate>)> on_done) {
+void EstimateWorker::start_running(RunningJob job, RunningDone on_done) {
   launch([job = std::move(job), on_done = std::move(on_done)](Mailbox& mailbox, const std::stop_token& stop) {
     // Of this thread alone; without it the estimate is only less polite.
     setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), background_nice);
     auto answer = std::make_shared<Expected<RunningEstimate>>(job(stop));
-    mailbox.put(&Mailbox::answer, [on_done, answer] { on_done(std::move(*answer)); });
+    timespec used{};   // by this thread, which does nothing else
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    const double cpu_s = static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+    mailbox.put(&Mailbox::answer, [on_done, answer, cpu_s] { on_done(std::move(*answer), cpu_s); });
   });
 }
 

@@ -36,7 +36,7 @@ class Estimators {
   virtual void start(EstimateJob job, EstimateProgress on_progress,
                      std::function<void(Expected<Estimate>)> on_done) = 0;
   // While data still come: at a lower priority than what brings them.
-  virtual void start_running(RunningJob job, std::function<void(Expected<RunningEstimate>)> on_done) = 0;
+  virtual void start_running(RunningJob job, RunningDone on_done) = 0;
   virtual void cancel() = 0;
 };
 
@@ -47,7 +47,7 @@ class EstimateWorker : public Estimators {
 
   void start(EstimateJob job, EstimateProgress on_progress,
              std::function<void(Expected<Estimate>)> on_done) override;
-  void start_running(RunningJob job, std::function<void(Expected<RunningEstimate>)> on_done) override;
+  void start_running(RunningJob job, RunningDone on_done) override;
   void cancel() override;
 
  private:

@@ -35,6 +35,8 @@ struct RunningEstimate {
 };
 
 using RunningJob = std::function<Expected<RunningEstimate>(std::stop_token)>;
+// The answer and the processor time that it took, s.
+using RunningDone = std::function<void(Expected<RunningEstimate>, double)>;
 
 // What the rest of `schedule` gives after `data_s` of it: covariance analysis with attitude and noise as found so far.
 // Where the data so far gave less than the analysis says (a moving base), the rest is taken to give less by as much.

@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 
 // An estimate may take this part of one processor at most, whatever the pace of the data.
-constexpr int pause_per_work = 4;
+constexpr double pause_per_work = 4.0;
 // From the rotation's clock, so that the gimbal still stands when the stop arrives: what the last status frame may be
 // old, and a round trip on the operator's clock.
 constexpr double status_age_s = 1.0;
@@ -53,15 +53,16 @@ void CalibrationRun::estimate_meanwhile() {
   }
   running_busy_ = true;
   running_begun_s_ = data_s;
-  running_begun_at_ = now;
   context_.estimators.start_running(running_job(running_estimator_, pages),
-                                    [this](const Expected<RunningEstimate>& answer) { on_running_estimate(answer); });
+                                    [this](const Expected<RunningEstimate>& answer, double cpu_s) {
+                                      on_running_estimate(answer, cpu_s);
+                                    });
 }
 
-void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer) {
-  const SteadyTime now = context_.timers.now();
+void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s) {
   running_busy_ = false;
-  running_not_before_ = now + pause_per_work * (now - running_begun_at_);
+  running_not_before_ = context_.timers.now() +
+                        std::chrono::nanoseconds(static_cast<std::int64_t>(pause_per_work * cpu_s * 1e9));
   if (!answer) {   // too little as yet; what is wrong with the data the final estimate will say
     remember("estimate", fmt::format("after {:.0f} s of data: no estimate yet: {}", running_begun_s_, answer.error().message));
     return;

@@ -25,9 +25,9 @@ class FakeEstimators : public Estimators {
     ++jobs;
     timer_ = timers_.after(10s, [this, on_done] { on_done(answer); });
   }
-  void start_running(RunningJob, std::function<void(Expected<RunningEstimate>)> on_done) override {
+  void start_running(RunningJob, RunningDone on_done) override {
     timers_.cancel(timer_);
-    timer_ = timers_.after(1s, [this, on_done] { on_done(running(++running_jobs)); });
+    timer_ = timers_.after(1s, [this, on_done] { on_done(running(++running_jobs), running_cpu_s); });
   }
   void cancel() override { timers_.cancel(timer_); }
 
@@ -56,6 +56,7 @@ class FakeEstimators : public Estimators {
   int met_from = 1000;
   Forecast forecast;
   int running_jobs = 0;
+  double running_cpu_s = 1.0;
   int jobs = 0;
 
  private:

@@ -30,6 +30,15 @@ TEST_F(CalibrationRunTest, SigmaIsShownAndShrinksWhileTheGimbalTurns) {
   EXPECT_FALSE(run_->record().early_end_s >= 0);
 }
 
+// 100 s of rotation; an estimate that takes 10 s of a processor may come every 41 s (1 s of the fake's, 40 of pause).
+TEST_F(CalibrationRunTest, RunningEstimatesTakeAFifthOfAProcessorAtMost) {
+  estimators_.running_cpu_s = 10.0;
+  begin();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_GE(estimators_.running_jobs, 2);
+  EXPECT_LE(estimators_.running_jobs, 3);
+}
+
 TEST_F(CalibrationRunTest, NoRunningEstimateWhereNoneIsWanted) {
   config_.running_estimate_s = 0.0;
   begin();
