@@ -1,10 +1,12 @@
 // Generator of the blind trial. Links the virtual INS's truth and no diagnosis.
 //
-//   selfcal_blind_generate key SEED CLEAN REPEATS FILE     appends the missing cases to the key, one JSON line each
+//   selfcal_blind_generate key SEED CLEAN REPEATS FIRST FILE   appends what is missing of the first cases to the key,
+//                                                         one JSON line each
 //   selfcal_blind_generate record SEED CLEAN REPEATS KEY N FILE
 //                                                         writes the recording of case N, prints what is assumed
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -160,18 +162,20 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 0;
   blind::TrialSize size;
   int number = 0;
+  std::size_t first = 0;
   const std::string command = a.size() > 1 ? a[1] : "";
-  const bool key = command == "key" && a.size() == 6;
+  const bool key = command == "key" && a.size() == 7;
   const bool record = command == "record" && a.size() == 8;
   if ((!key && !record) || !parse(a[2], seed) || !parse(a[3], size.clean) || !parse(a[4], size.repeats) ||
-      (record && !parse(a[6], number))) {
-    fmt::print(stderr, "usage: selfcal_blind_generate key SEED CLEAN REPEATS FILE\n"
+      (record && !parse(a[6], number)) || (key && !parse(a[5], first))) {
+    fmt::print(stderr, "usage: selfcal_blind_generate key SEED CLEAN REPEATS FIRST FILE\n"
                        "       selfcal_blind_generate record SEED CLEAN REPEATS KEY NUMBER FILE\n");
     return 2;
   }
-  const auto recipes = blind::recipes(size, seed);
+  auto recipes = blind::recipes(size, seed);
   if (key) {
-    return write_key(recipes, seed, a[5]);
+    recipes.resize(std::min(recipes.size(), first));
+    return write_key(recipes, seed, a[6]);
   }
   if (number < 0 || number >= static_cast<int>(recipes.size())) {
     return complain({ErrorKind::usage, fmt::format("case {}: there are {}", number, recipes.size())});

@@ -168,6 +168,10 @@ class Score:
         named = sum(bool(names(a, False)) for _, a in weak)
         self.say(f"  6 sigma and more: detected {share(detected, len(strong))}, class right "
                  f"{share(right, len(strong))}" + (f", names in the class {sum(size) / len(size):.2f}" if size else ""))
+        for title, chosen in (("one coefficient", True), ("several coefficients", False)):
+            part = [(c, a) for c, a in strong if self.single_coefficient(c) == chosen]
+            self.say(f"    {title}: detected {share(sum(alarmed(a) for _, a in part), len(part))}, class right "
+                     f"{share(sum(self.judged(c, a) in ('right', 'class') for c, a in part), len(part))}")
         self.say(f"  below 0.6 sigma: named {share(named, len(weak))}")
         probability = [self.probability(c, a) for c, a in strong]
         if probability:
@@ -181,6 +185,11 @@ class Score:
         self.at_least("right class at 6 sigma", right, len(strong), 0.95)
         self.at_most("names below 0.6 sigma", named, len(weak), 0.01)
         self.confusion(strong)
+
+    @staticmethod
+    def single_coefficient(case):
+        skipped = ("tau_s", "reference_c", "width", "period_s", "phase", "field_north", "field_up", "field_east")
+        return sum(v != 0.0 for k, v in case["effects"][0]["values"].items() if k not in skipped) == 1
 
     def probability(self, case, answer):
         """On the true name; shared evenly over the class where the answer gives no probabilities."""
