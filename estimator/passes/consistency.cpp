@@ -73,9 +73,10 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
                      "is larger than that of the data, and the sigmas are larger than they need be.",
                      c.nis_mean);
   } else {
-    c.words = format("Innovations are as predicted (NIS %.3f) and white (p = %.2g); forward and reverse passes agree within "
-                     "%.3f sigma.",
-                     c.nis_mean, c.whiteness_p_value, c.parity_max_sigma);
+    const char* colour = c.whiteness_p_value < 1e-3 ? "nearly white" : "white";
+    c.words = format("Innovations are as predicted (NIS %.3f) and %s (p = %.2g, correlation %.2f from second to second); "
+                     "forward and reverse passes agree within %.3f sigma.",
+                     c.nis_mean, colour, c.whiteness_p_value, c.autocorrelation, c.parity_max_sigma);
   }
   return c;
 }
