@@ -85,7 +85,8 @@ double relative_density_sigma(const CalibrationResult& calibration, bool gyro) {
   return std::max(least, 1.0 / std::sqrt(21.0 * pieces));
 }
 
-// Densities, quanta and lines against what the simulation assumes. Densities are judged beyond 5 sigma.
+// Densities, quanta and lines against what the simulation assumes. Densities and quanta are judged beyond 5 sigma: their
+// sigma is that of a fit to smoothed spectra, and good to some tens of per cent itself.
 void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, const AssumedNoise& assumed, double log_threshold,
                  std::vector<Finding>& findings) {
   if (noise.pieces < 20) {
@@ -118,8 +119,9 @@ void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, 
       const AxisNoise& n = noise.axes[axis];
       const double found = std::sqrt(12.0) * n.increment_sigma;
       const double excess = n.increment_sigma * n.increment_sigma - quantum * quantum / 12.0;
-      const double log_p = log_corrected(log_normal_tail(excess / n.increment_variance_sigma), 6.0);
-      if (quantum > 0.0 && found > 2.0 * quantum && log_p < log_threshold) {
+      const double z_quantum = excess / n.increment_variance_sigma;
+      const double log_p = log_corrected(log_normal_tail(z_quantum), 6.0);
+      if (quantum > 0.0 && found > 2.0 * quantum && z_quantum > 5.0 && log_p < log_threshold) {
         coarse.parameters.push_back({std::string(gyro ? "gyro_" : "accel_") + axis_letters[axis],
                                      gyro ? "arcsec" : "m/s", gyro ? found / units::arcsecond : found, 0.0});
         coarse.log_p = std::min(coarse.log_p, log_p);
