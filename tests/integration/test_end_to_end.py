@@ -3,6 +3,7 @@ import json
 import math
 import struct
 import subprocess
+import time
 import unittest
 
 import h5py
@@ -66,9 +67,10 @@ class EndToEnd(case.OnBench):
         unit = self.bench(speed=speed, sim={"sample_rate_hz": 200.0}).start()
         log = unit.folder / "can.log"
         with open(log, "w", encoding="ascii") as output:
-            dump = subprocess.Popen(["candump", "-L", "-r", "4000000", unit.interface], stdout=output)
+            dump = subprocess.Popen(["candump", "-L", "-r", "64000000", unit.interface], stdout=output)
             try:
                 run = unit.wait_for_end(unit.start_run("--schedule", unit.short, "--dry-run"))
+                self.wait_for_stamp(log, time.time())
             finally:
                 dump.terminate()
                 dump.wait(10)
@@ -88,6 +90,16 @@ class EndToEnd(case.OnBench):
         unit.stop()
         # The schedule's 28 bytes a sample at 200 Hz, in frames of 7.
         return (last_data - stopped) * speed, data_before / (case.SHORT_S * 200 * 28 / 7)
+
+    def wait_for_stamp(self, log, moment, timeout=120.0):
+        """Until the log has come to a frame of that moment: its stamps are the kernel's, its reader may be far behind."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            lines = log.read_bytes()[-4096:].split(b"\n")
+            if len(lines) > 2 and float(lines[-2].split()[0][1:-1]) >= moment:
+                return
+            time.sleep(0.2)
+        self.fail(f"the log of the bus is more than {timeout:g} s behind")
 
     def test_can_fd(self):
         unit = self.bench(ins={"fd": True}, sim_options=["--fd"]).start()
