@@ -72,7 +72,7 @@ void CalibrationRun::judge() {
     remember("gate", objection);
   }
   if (!objections_.empty() && !record_.force_reason.empty()) {
-    warn(fmt::format("written against the gate, for: {}", record_.force_reason));
+    warn(fmt::format("written against the gate ({}), for: {}", fmt::join(objections_, "; "), record_.force_reason));
   }
   post(Event::judged);
 }
@@ -93,18 +93,20 @@ Expected<void> CalibrationRun::store_result() {
   return make_new_set();
 }
 
-// An undetermined value is never pushed: the one in force stays.
+// A value that is undetermined or physically impossible is never pushed, whatever the operator's reason: the one in
+// force stays, and the story says so.
 Expected<void> CalibrationRun::make_new_set() {
   const auto previous = context_.store.set(record_.id, SetRole::previous);
   if (!previous) return tl::unexpected(previous.error());
   if (!*previous) return fail(ErrorKind::internal, fmt::format("run {}: the set in force was not kept", record_.id));
   const auto in_force = ins::decode_coefficients(**previous);
   if (!in_force) return tl::unexpected(in_force.error());
-  CoefficientSet measured;
+  const CoefficientSet measured = coefficient_set(estimate_->result, record_.serial, utc_now());
+  std::vector<std::string_view> kept;
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    measured.value[i] = estimate_->result.value(static_cast<Eigen::Index>(i));
-    measured.determined[i] = estimate_->result.determined[i];
+    if (!measured.determined[i]) kept.push_back(sensor_parameters[i].name);
   }
+  if (!kept.empty()) remember("gate", fmt::format("never written, the value in force stays: {}", fmt::join(kept, ", ")));
   ins::Coefficients fresh;
   fresh.version = in_force->version + 1;
   fresh.date_s = std::time(nullptr);

@@ -126,8 +126,7 @@ Expected<Handle> open_handle(const std::filesystem::path& file, int flags) {
   const int result = sqlite3_open_v2(file.c_str(), &raw, flags, nullptr);
   Handle database(raw);
   if (result != SQLITE_OK) {
-    return fail(ErrorKind::device,
-                fmt::format("database {}: {}", file.string(), raw == nullptr ? "out of memory" : sqlite3_errmsg(raw)));
+    return fail(ErrorKind::device, fmt::format("database {}: {}", file.string(), sqlite::failure_words(raw)));
   }
   sqlite3_busy_timeout(raw, 2000);
   return database;

@@ -2,12 +2,25 @@
 
 #include <fmt/format.h>
 
+#include <system_error>
+
 namespace selfcal::sqlite {
+
+std::string failure_words(sqlite3* database) {
+  if (database == nullptr) return "out of memory";
+  const std::string words = sqlite3_errmsg(database);
+  const int kind = sqlite3_errcode(database) & 0xff;   // without the extension
+  const int system_error = sqlite3_system_errno(database);
+  // Elsewhere the number is that of some earlier failure.
+  const bool from_system = kind == SQLITE_CANTOPEN || kind == SQLITE_IOERR || kind == SQLITE_FULL;
+  if (!from_system || system_error == 0) return words;
+  return fmt::format("{}: {}", words, std::generic_category().message(system_error));
+}
 
 tl::unexpected<Error> database_error(sqlite3* database, std::string_view what) {
   const char* file = database == nullptr ? nullptr : sqlite3_db_filename(database, "main");
-  return fail(ErrorKind::device, fmt::format("database {}: {}: {}", file == nullptr ? "" : file, what,
-                                             database == nullptr ? "out of memory" : sqlite3_errmsg(database)));
+  return fail(ErrorKind::device,
+              fmt::format("database {}: {}: {}", file == nullptr ? "" : file, what, failure_words(database)));
 }
 
 Statement::Statement(sqlite3* database, std::string_view sql) : database_(database) {

@@ -12,6 +12,9 @@
 
 namespace selfcal::sqlite {
 
+// What SQLite says of its last failure, and what the operating system said to SQLite where that is the cause.
+std::string failure_words(sqlite3* database);
+
 // The database as an error: `what` was tried.
 tl::unexpected<Error> database_error(sqlite3* database, std::string_view what);
 

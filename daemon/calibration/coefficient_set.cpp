@@ -48,10 +48,9 @@ Expected<void> parse_parameter(const Json& entry, std::size_t k, CoefficientSet&
 
 }  // namespace
 
-CoefficientSet coefficient_set(const CalibrationResult& result, const Recording& recording,
-                               std::string computed_at_utc) {
+CoefficientSet coefficient_set(const CalibrationResult& result, std::string serial, std::string computed_at_utc) {
   CoefficientSet set;
-  set.serial = recording.serial;
+  set.serial = std::move(serial);
   set.computed_at_utc = std::move(computed_at_utc);
   for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
     set.value[k] = result.value[static_cast<Eigen::Index>(k)];

@@ -6,7 +6,6 @@
 
 #include "estimator/passes/calibration.hpp"
 #include "protocol/error.hpp"
-#include "protocol/recording/recording.hpp"
 
 namespace selfcal {
 
@@ -19,9 +18,8 @@ struct CoefficientSet {
   bool acceptable = false;                              // as acceptable(result): may be pushed without a word
 };
 
-// The time is the caller's, who has a clock.
-CoefficientSet coefficient_set(const CalibrationResult& result, const Recording& recording,
-                               std::string computed_at_utc);
+// A value outside what is physically possible counts as not determined here. The time is the caller's, who has a clock.
+CoefficientSet coefficient_set(const CalibrationResult& result, std::string serial, std::string computed_at_utc);
 
 // What the INS should hold for the parameters the recording determined, keeping `in_force` (SI) for all others: so
 // that an undetermined value is never pushed.

@@ -94,7 +94,8 @@ class Trial:
         version, held = witness.coefficients_in_force(self.unit.interface)
         new = dict(self.held)
         if document["result"]:
-            new |= {p["name"]: p["value"] for p in document["result"]["parameters"] if p["determined"]}
+            new |= {p["name"]: p["value"] for p in document["result"]["parameters"]
+                    if p["determined"] and p["plausible"]}
         same = lambda a, b: all(math.isclose(a[n], b[n], rel_tol=1e-9, abs_tol=1e-12) for n in b)  # noqa: E731
         if version > self.version and not same(held, new):
             complain(f"set {version} in force is not what was estimated")

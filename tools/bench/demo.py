@@ -82,7 +82,8 @@ def demonstrate(options, folder):
         if not after < before:
             complaints.append("the calibration did not reduce the drift")
         # What the schedule did not determine is not pushed: there the factory's zero stays.
-        estimated = {p["name"]: p["value"] if p["determined"] else 0.0 for p in run["result"]["parameters"]}
+        estimated = {p["name"]: p["value"] if p["determined"] and p["plausible"] else 0.0
+                     for p in run["result"]["parameters"]}
         version, differing = held_after_power_cycle(unit, estimated)
         if differing:
             complaints.append(f"after the power cycle {', '.join(differing)} are not what was estimated")

@@ -36,6 +36,7 @@ class FakeEstimators : public Estimators {
     estimate.result.value.setConstant(1.0);
     estimate.result.sigma.setConstant(0.1);
     estimate.result.determined.fill(true);
+    estimate.result.plausible.fill(true);
     estimate.result_json = "{}";
     return estimate;
   }

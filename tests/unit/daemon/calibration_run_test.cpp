@@ -57,6 +57,28 @@ TEST_F(CalibrationRunTest, TheGateRefusesAndAReasonOpensIt) {
   EXPECT_EQ(ins_.in_force().value[1], 1.0);
 }
 
+// The operator may overrule the limit of a type of INS, and then reads what was overruled. What no sensor can have is
+// kept out whatever the reason.
+TEST_F(CalibrationRunTest, AReasonNamesWhatItOverrulesAndPushesNothingImpossible) {
+  estimators_.answer->objections = {"gyro_drift_x implausible: 0.3 deg/h, limit 0.1",
+                                    "accel_scale_pos_x = 7000 ppm is outside the physically possible range"};
+  estimators_.answer->result.plausible[6] = false;
+  RunRecord forced;
+  forced.force_reason = std::string("after repair");
+  begin(forced);
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.in_force().value[6], 0.0);
+  EXPECT_EQ(ins_.in_force().value[3], 1.0);
+  for (const char* words :
+       {"gyro_drift_x implausible: 0.3 deg/h, limit 0.1", "accel_scale_pos_x = 7000 ppm", "after repair"}) {
+    EXPECT_THAT(observer_.warnings, testing::Contains(HasSubstr(words)));
+  }
+  std::vector<std::string> story;
+  const auto events = store_->events(run_->record().id);
+  for (const EventRecord& event : *events) story.push_back(event.text);
+  EXPECT_THAT(story, testing::Contains("never written, the value in force stays: accel_scale_pos_x"));
+}
+
 TEST_F(CalibrationRunTest, AWrongKeyEndsTheRun) {
   key_[0] = 77;
   begin();

@@ -126,6 +126,19 @@ TEST_F(RunStoreTest, SetsAreKeptByRole) {
   EXPECT_FALSE(*store->set(run, SetRole::written));
 }
 
+// SQLite's own words are the same for every cause; the system's tell the operator which one it is.
+TEST_F(RunStoreTest, AFileThatCannotBeOpenedIsNamedWithTheCause) {
+  const auto absent = RunStore::open(folder_ / "no-such-folder" / "selfcal.db");
+  ASSERT_FALSE(absent);
+  EXPECT_THAT(absent.error().message, HasSubstr("no-such-folder/selfcal.db"));
+  EXPECT_THAT(absent.error().message, HasSubstr("No such file or directory"));
+  // A file where a folder should be, because permissions do not stop a test that runs as root.
+  std::ofstream(folder_ / "state") << "x";
+  const auto below_a_file = RunStore::open(folder_ / "state" / "selfcal.db");
+  ASSERT_FALSE(below_a_file);
+  EXPECT_THAT(below_a_file.error().message, HasSubstr("Not a directory"));
+}
+
 TEST_F(RunStoreTest, ADamagedDatabaseIsRefusedAndABackupTakesItsPlace) {
   {
     auto store = open();
