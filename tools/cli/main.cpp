@@ -26,6 +26,7 @@ int parse_and_run(int argc, char** argv) {
                "5 internal.",
                "selfcal");
   app.require_subcommand(1);
+  app.set_version_flag("--version", "selfcal " SELFCAL_VERSION);
   std::map<const CLI::App*, cli::CommandRun> runs;
   for (const cli::Command& command : cli::commands()) {
     CLI::App* subcommand = app.add_subcommand(command.name, command.description);
