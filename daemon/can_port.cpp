@@ -133,6 +133,7 @@ bool CanPort::receive_batch() {
     return false;
   }
   bool status_news = false;
+  const SteadyTime now = loop_.now();   // one reading of the clock for all frames of a system call
   for (const can::ReceivedFrame& received : *batch) {
     if (received.event) {
       if (on_bus_event) on_bus_event(*received.event);
@@ -140,7 +141,7 @@ bool CanPort::receive_batch() {
     }
     if (!client_.accepts(received.frame)) {
       take_status(received.frame, status_news);
-    } else if (const auto outcome = client_.on_frame(received.frame, loop_.now())) {
+    } else if (const auto outcome = client_.on_frame(received.frame, now)) {
       deliver(*outcome);
       if (reopen_wanted_ || !trouble_.empty()) return false;
     }

@@ -18,6 +18,14 @@ namespace fs = std::filesystem;
 // The HDF5 library is not made for several threads, and every INS has an estimator's thread.
 std::mutex hdf5_mutex;
 
+// A recording that is refused takes its warnings with it: a saturated sensor is the likely cause of what is wrong.
+Error with_warnings(Error error, const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) {
+    error.message += "; " + warning;
+  }
+  return error;
+}
+
 Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimateProgress& progress,
                                 const std::stop_token& stop) {
   Estimate estimate;
@@ -34,7 +42,7 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   }
   estimate.recording = recording_path(request.folder).string();
   const auto suspect = check_recording(*recording);
-  if (!suspect) return tl::unexpected(suspect.error());
+  if (!suspect) return tl::unexpected(with_warnings(suspect.error(), estimate.warnings));
   estimate.warnings.insert(estimate.warnings.end(), suspect->begin(), suspect->end());
   const CalibrationOptions options = calibration_options(request.config);
   auto result = calibrate_recording(*recording, options, progress, stop);

@@ -60,6 +60,8 @@ struct DirectoryRecord {
   std::uint32_t pages_expected = 0;        // of the whole schedule
   std::uint64_t samples = 0;               // written so far
   bool complete = false;                   // no more will come
+
+  bool operator==(const DirectoryRecord&) const = default;
 };
 Bytes encode(const DirectoryRecord& record);
 [[nodiscard]] Expected<DirectoryRecord> decode_directory(ByteView bytes);

@@ -1,6 +1,7 @@
 #include "protocol/recording/gimbal_check.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "estimator/geometry/rotation.hpp"
@@ -62,8 +63,10 @@ std::optional<GimbalContradiction> find_gimbal_contradiction(const Recording& re
   GimbalContradiction found;
   found.first_row = k * half;
   found.last_row = (k + 2) * half;
+  // Read-outs may be kept within one turn: from 359.7 to 0.4 deg the gimbal turned by 0.7. No gimbal makes half a turn
+  // in a window.
   const auto turn = [&](const std::vector<double>& angle) {
-    return (angle[found.last_row] - angle[found.first_row]) / units::degree;
+    return std::remainder((angle[found.last_row] - angle[found.first_row]) / units::degree, 360.0);
   };
   found.outer_turn_deg = turn(recording.gimbal_outer_rad);
   found.inner_turn_deg = turn(recording.gimbal_inner_rad);

@@ -149,6 +149,9 @@ void BusNode::advance_clock(Time now) {
   }
   diagnostics_.set_instrument_time(now_s_);
   instrument_.advance(now_s_);
+  if (const auto answer = diagnostics_.take_answer()) {
+    server_.respond(*answer, now);
+  }
   note_state();
   reset_on_demand(now);
 }

@@ -37,6 +37,7 @@ void Diagnostics::power_on(Time now) {
   session_expired(now);
   seed_.reset();
   reset_wanted_ = false;
+  answer_.reset();
   pages_served_ = 0;
   // The delay survives a reset: else a reset would be the way round it.
   locked_until_ = instrument_.counters().get().wrong_keys >= free_attempts ? now + delay_after_wrong_keys : Time{0};
@@ -49,6 +50,7 @@ void Diagnostics::session_expired(Time) {
 }
 
 uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& response, Time now) {
+  const double written_before_s = instrument_.flash().ready_at_s();
   const Reply reply = options_.answer_all_with ? Reply(tl::unexpected(*options_.answer_all_with))
                                                : dispatch(request, now, response);
   if (!reply) {
@@ -57,7 +59,19 @@ uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& respon
   } else if (!reply->empty()) {
     response = *reply;
   }
-  return Answer::now;
+  const double written_at_s = instrument_.flash().ready_at_s();
+  if (written_at_s <= written_before_s) {
+    return Answer::now;
+  }
+  answer_ = Waiting{response, written_at_s};   // nothing is said to be written before it is
+  return Answer::later;
+}
+
+std::optional<uds::Bytes> Diagnostics::take_answer() {
+  if (!answer_ || now_s_ < answer_->due_s) {
+    return std::nullopt;
+  }
+  return std::exchange(answer_, std::nullopt)->response;
 }
 
 Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& response) {

@@ -23,7 +23,9 @@ class Diagnostics : public uds::RequestHandler {
  public:
   Diagnostics(Instrument& instrument, const DiagnosticOptions& options);
 
+  // `later` where the request writes to the FLASH: take_answer() has the answer once that is done.
   Answer handle(std::span<const std::uint8_t> request, uds::Bytes& response, Time now) override;
+  std::optional<uds::Bytes> take_answer();
   void session_expired(Time now) override;
 
   void power_on(Time now);                            // default session, locked
@@ -64,6 +66,12 @@ class Diagnostics : public uds::RequestHandler {
   std::optional<std::array<std::uint8_t, uds::seed_bytes>> seed_;   // given out, not yet answered: used once
   std::uint64_t seeds_given_ = 0;
   Time locked_until_{0};
+
+  struct Waiting {
+    uds::Bytes response;
+    double due_s = 0.0;              // INS time
+  };
+  std::optional<Waiting> answer_;
 
   struct Upload {
     std::uint32_t first_page = 0, bytes = 0;

@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
 #include <cstring>
+#include <functional>
 #include <utility>
 
 namespace selfcal::sim {
@@ -37,7 +40,7 @@ Expected<FlashMemory> FlashMemory::open(const std::string& path, std::size_t byt
     }
     have += static_cast<std::size_t>(got);
   }
-  memory.store(have, bytes - have);
+  memory.store(have, std::span(memory.bytes_).subspan(have));
   return memory;
 }
 
@@ -45,13 +48,19 @@ FlashMemory::FlashMemory(FlashMemory&& other) noexcept
     : bytes_(std::move(other.bytes_)),
       wear_(std::move(other.wear_)),
       fd_(std::exchange(other.fd_, -1)),
-      budget_(other.budget_) {}
+      budget_(other.budget_),
+      timings_(other.timings_),
+      now_s_(other.now_s_),
+      pending_(std::move(other.pending_)) {}
 
 FlashMemory& FlashMemory::operator=(FlashMemory&& other) noexcept {
   std::swap(bytes_, other.bytes_);
   std::swap(wear_, other.wear_);
   std::swap(fd_, other.fd_);
   std::swap(budget_, other.budget_);
+  std::swap(timings_, other.timings_);
+  std::swap(now_s_, other.now_s_);
+  std::swap(pending_, other.pending_);
   return *this;
 }
 
@@ -66,55 +75,86 @@ std::span<const std::uint8_t> FlashMemory::read(std::size_t offset, std::size_t 
   return std::span(bytes_).subspan(offset, count);
 }
 
-void FlashMemory::spend() {
+// One operation of the chip. Where the power goes in it, all before it is done, and of it what the power lasts for.
+void FlashMemory::operate(std::size_t offset, std::span<const std::uint8_t> result, double duration_s) {
+  const auto lasts = budget_ ? static_cast<std::size_t>(std::min<std::uint64_t>(*budget_, result.size())) : result.size();
+  const auto place = bytes_.begin() + static_cast<std::ptrdiff_t>(offset);
+  const double begin_s = ready_at_s();
+  pending_.push_back({offset,
+                      {place, place + static_cast<std::ptrdiff_t>(lasts)},
+                      {result.begin(), result.begin() + static_cast<std::ptrdiff_t>(lasts)},
+                      0,
+                      begin_s,
+                      begin_s + duration_s});
+  std::copy_n(result.begin(), lasts, place);
   if (budget_) {
-    if (*budget_ == 0) {
-      throw PowerLost{};
-    }
-    --*budget_;
+    *budget_ -= lasts;
+  }
+  if (lasts < result.size()) {
+    advance(ready_at_s());
+    throw PowerLost{};
   }
 }
 
 void FlashMemory::program(std::size_t offset, std::span<const std::uint8_t> bytes) {
   assert(offset + bytes.size() <= bytes_.size());
-  std::size_t done = 0;
-  try {
-    for (; done < bytes.size(); ++done) {
-      spend();
-      bytes_[offset + done] &= bytes[done];
-    }
-  } catch (const PowerLost&) {
-    store(offset, done);
-    throw;
+  while (!bytes.empty()) {   // one page of the chip after another
+    const std::size_t count = std::min(flash_program_bytes - offset % flash_program_bytes, bytes.size());
+    std::array<std::uint8_t, flash_program_bytes> result{};
+    std::transform(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count), &bytes_[offset], result.begin(),
+                   std::bit_and<>());
+    operate(offset, std::span(result).first(count), timings_.program_s);
+    offset += count;
+    bytes = bytes.subspan(count);
   }
-  store(offset, done);
 }
 
 void FlashMemory::erase(std::size_t block) {
-  const std::size_t offset = block * flash_block_bytes;
+  static const std::vector<std::uint8_t> blank(flash_block_bytes, 0xFF);
   ++wear_[block];
-  std::size_t done = 0;
-  try {
-    for (; done < flash_block_bytes; ++done) {
-      spend();
-      bytes_[offset + done] = 0xFF;
-    }
-  } catch (const PowerLost&) {
-    store(offset, done);
-    throw;
-  }
-  store(offset, done);
+  operate(block * flash_block_bytes, blank, timings_.erase_s);
 }
 
-void FlashMemory::store(std::size_t offset, std::size_t count) {
-  while (fd_ >= 0 && count > 0) {
-    const ssize_t put = ::pwrite(fd_, bytes_.data() + offset, count, static_cast<off_t>(offset));
+double FlashMemory::ready_at_s() const { return pending_.empty() ? now_s_ : pending_.back().end_s; }
+
+void FlashMemory::settle(Operation& operation, std::size_t done) {
+  store(operation.offset + operation.done, std::span(operation.after).first(done).subspan(operation.done));
+  operation.done = done;
+}
+
+void FlashMemory::advance(double now_s) {
+  now_s_ = std::max(now_s_, now_s);
+  while (!pending_.empty() && pending_.front().end_s <= now_s_) {
+    settle(pending_.front(), pending_.front().after.size());
+    pending_.pop_front();
+  }
+  if (!pending_.empty() && pending_.front().begin_s < now_s_) {
+    Operation& current = pending_.front();
+    const double part = (now_s_ - current.begin_s) / (current.end_s - current.begin_s);
+    const auto done = static_cast<std::size_t>(part * static_cast<double>(current.after.size()));
+    settle(current, std::max(done, current.done));
+  }
+}
+
+void FlashMemory::cut_power(double now_s) {
+  advance(now_s);
+  while (!pending_.empty()) {   // the latest first, should two have written to the same place
+    const Operation& operation = pending_.back();
+    std::copy(operation.before.begin() + static_cast<std::ptrdiff_t>(operation.done), operation.before.end(),
+              bytes_.begin() + static_cast<std::ptrdiff_t>(operation.offset + operation.done));
+    pending_.pop_back();
+  }
+}
+
+void FlashMemory::store(std::size_t offset, std::span<const std::uint8_t> bytes) {
+  while (fd_ >= 0 && !bytes.empty()) {
+    const ssize_t put = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (put <= 0) {   // a full disk under the simulator: the chip itself has no such failure
       fmt::print(stderr, "sim_ins: FLASH file: {}\n", std::strerror(errno));
       return;
     }
     offset += static_cast<std::size_t>(put);
-    count -= static_cast<std::size_t>(put);
+    bytes = bytes.subspan(static_cast<std::size_t>(put));
   }
 }
 

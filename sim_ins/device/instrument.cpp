@@ -63,6 +63,7 @@ Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config
   ins::Coefficients factory;
   factory.author = "factory";
   instrument->coefficients_.write_factory_if_blank(factory);
+  instrument->flash_.advance(instrument->flash_.ready_at_s());   // at the works, with all the time it takes
   return instrument;
 }
 
@@ -78,6 +79,7 @@ Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& sch
 }
 
 void Instrument::power_on(double now_s) {
+  flash_.cut_power(now_s);   // the line that resets the processor resets the chip
   imu_.reset();
   navigation_.reset();
   check_ = {};
@@ -91,7 +93,7 @@ void Instrument::power_on(double now_s) {
   run_id_ = raw_.directory().run_id;
   faults_ = coefficients_.fell_back() ? ins::fault::coefficients : std::uint8_t{0};
   state_ = ins::State::starting;
-  ready_at_s_ = now_s + start_up_s;
+  ready_at_s_ = std::max(now_s + start_up_s, flash_.ready_at_s());
 }
 
 Expected<void> Instrument::set_schedule(const ins::ScheduleRecord& schedule) {
@@ -162,6 +164,7 @@ void Instrument::flush_page(bool last) {
   page_.first_sample = samples_ - page_.samples.size();
   page_.temperature_c = last_sample_.temperature_c;
   page_.flags = static_cast<std::uint16_t>(page_.flags | (last ? flash::page_flag::last_of_run : 0));
+  flash_.advance(epoch_s_ + static_cast<double>(samples_) / config_.sample_rate_hz);
   raw_.append(page_);
   page_.samples.clear();
   page_.flags = 0;
@@ -214,6 +217,7 @@ void Instrument::advance(double now_s) {
   if (state_ == ins::State::checking) {
     navigate_until(now_s);
   }
+  flash_.advance(now_s);
 }
 
 Expected<void> Instrument::start_navigation_check(const ins::NavigationCheckRequest& request, double now_s) {

@@ -35,7 +35,7 @@ class Instrument {
                                                                     FlashMemory flash,
                                                                     const InstrumentFaults& faults);
 
-  void power_on(double now_s);                       // also after a reset: everything but FLASH is lost
+  void power_on(double now_s);                       // also after a reset: all is lost but what the FLASH had done
   void advance(double now_s);                        // everything due up to then happens
 
   // Self-calibration. Fails with what stands in its way.

@@ -143,7 +143,7 @@ std::optional<double> gimbal_failure_time(const Scenario& scenario, const Schedu
 }
 
 bool spoil_sample(const Scenario& scenario, double t, const ImuSample& before, ImuSample& sample) {
-  bool changed = false;
+  bool saturated = false;
   for (const Fault& fault : scenario.faults) {
     const auto axis = static_cast<std::size_t>(fault.value);
     if (t < fault.at_s || t >= fault.at_s + fault.for_s || axis > 2) {
@@ -153,14 +153,13 @@ bool spoil_sample(const Scenario& scenario, double t, const ImuSample& before, I
     const bool gyro = fault.kind == FaultKind::saturated_gyro || fault.kind == FaultKind::frozen_gyro;
     std::int32_t& count = gyro ? sample.delta_theta[axis] : sample.delta_v[axis];
     if (fault.kind == FaultKind::saturated_gyro || fault.kind == FaultKind::saturated_accel) {
-      changed |= std::abs(count) > limit;
+      saturated |= std::abs(count) > limit;
       count = std::clamp(count, -limit, limit);
     } else if (fault.kind == FaultKind::frozen_gyro || fault.kind == FaultKind::frozen_accel) {
       count = gyro ? before.delta_theta[axis] : before.delta_v[axis];
-      changed = true;
     }
   }
-  return changed;
+  return saturated;
 }
 
 bool FaultyBus::hits(FaultKind kind, double t, const Fault** fault) {

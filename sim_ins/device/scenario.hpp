@@ -66,7 +66,8 @@ struct Scenario {
 GimbalMotion spoil_gimbal(const Scenario& scenario, const GimbalMotion& planned);
 // When the INS notices that a move went wrong: INS time since the rotation began.
 std::optional<double> gimbal_failure_time(const Scenario& scenario, const Schedule& schedule);
-// Saturation and freezing of counts; true where something was changed.
+// Saturation and freezing of counts; true where a sensor saturated, which the INS notices. That one is frozen it does
+// not.
 bool spoil_sample(const Scenario& scenario, double t, const ImuSample& before, ImuSample& sample);
 
 // Frames on their way to the bus.

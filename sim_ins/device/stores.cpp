@@ -124,7 +124,7 @@ void CounterStore::set(std::uint32_t power_cycles, std::uint32_t wrong_keys) {
 }
 
 void RawStore::power_on() {
-  run_id_ = expected_ = written_ = 0;
+  run_id_ = expected_ = first_ = written_ = 0;
   samples_ = 0;
   complete_ = true;
   const auto bytes = flash_.read(run_block * flash_block_bytes, run_bytes);
@@ -136,13 +136,44 @@ void RawStore::power_on() {
   }
   run_id_ = run;
   expected_ = expected;
-  flash::Page page;
-  // Up to the first page that is not of this run, or not whole: the power went while it was written.
-  while (written_ < expected_ && flash::decode_page(this->page(written_), page) && page.run_id == run_id_ &&
-         page.sequence == written_) {
-    samples_ += page.samples.size();
-    ++written_;
+  find_pages();
+}
+
+std::optional<flash::Page> RawStore::page_of_run(std::size_t block) const {
+  std::optional<flash::Page> page(std::in_place);
+  if (!flash::decode_page(this->page(static_cast<std::uint32_t>(block)), *page) || page->run_id != run_id_ ||
+      page->sequence % raw_ring_pages != block) {
+    page.reset();
   }
+  return page;
+}
+
+// What is of the run is one sequence without a gap, its newest page before a blank or torn block. It leads through the
+// ring's first block, or that one is blank and the newest page is in one of the last two.
+void RawStore::find_pages() {
+  std::optional<flash::Page> newest;
+  for (const std::size_t block : {std::size_t{0}, raw_ring_pages - 1, raw_ring_pages - 2}) {
+    if (!newest) {
+      newest = page_of_run(block);
+    }
+  }
+  if (!newest) {
+    return;
+  }
+  const std::uint32_t known = newest->sequence;
+  const auto held = [&](std::uint32_t sequence) {
+    auto page = page_of_run(sequence % raw_ring_pages);
+    return page && page->sequence == sequence ? std::move(page) : std::nullopt;
+  };
+  while (auto next = held(newest->sequence + 1)) {
+    newest = std::move(next);
+  }
+  written_ = newest->sequence + 1;
+  first_ = known;
+  while (first_ > 0 && held(first_ - 1)) {
+    --first_;
+  }
+  samples_ = std::uint64_t{newest->sequence} * flash::samples_per_page + newest->samples.size();   // all others are full
 }
 
 void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
@@ -151,12 +182,14 @@ void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
   writer.put(run_id);
   writer.put(pages_expected);
   writer.put(flash::crc32c(std::span(bytes).first(8)));
-  flash_.erase(raw_ring_first_block);   // before the header names the run: pages of an earlier run of this number end here
+  for (const std::size_t block : {std::size_t{0}, raw_ring_pages - 1, raw_ring_pages - 2}) {
+    flash_.erase(raw_ring_first_block + block);   // before the header names the run
+  }
   flash_.erase(run_block);
   flash_.program(run_block * flash_block_bytes, bytes);
   run_id_ = run_id;
   expected_ = pages_expected;
-  written_ = 0;
+  first_ = written_ = 0;
   samples_ = 0;
   complete_ = false;
 }
@@ -168,11 +201,8 @@ void RawStore::append(const flash::Page& page) {
   flash_.program((raw_ring_first_block + written_ % raw_ring_pages) * flash_block_bytes, bytes);
   samples_ += page.samples.size();
   ++written_;
-}
-
-std::uint32_t RawStore::first_page() const {
-  constexpr auto held = static_cast<std::uint32_t>(raw_ring_pages - 1);   // one block is blank
-  return written_ > held ? written_ - held : 0;
+  constexpr auto most = static_cast<std::uint32_t>(raw_ring_pages - 1);   // one block is blank
+  first_ = std::max(first_, written_ - std::min(written_, most));
 }
 
 ins::DirectoryRecord RawStore::directory() const {

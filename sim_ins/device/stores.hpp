@@ -72,8 +72,9 @@ class CounterStore {
   Counters counters_;
 };
 
-// Raw data of the latest run. Pages go round a ring: beyond its length the oldest are lost. The block after the newest
-// page is blank, so that pages of an earlier run, whatever its number was, are never taken for this one's.
+// Raw data of the latest run. Pages go round a ring, page p in block p modulo its length: beyond that the oldest are
+// lost, and directory() says which are held. The block after the newest page is blank, and a run begins by blanking the
+// first block and the last two, so that pages of an earlier run, whatever its number was, are never taken for this one's.
 class RawStore {
  public:
   explicit RawStore(FlashMemory& flash) : flash_(flash) {}
@@ -85,7 +86,7 @@ class RawStore {
 
   ins::DirectoryRecord directory() const;
   std::uint32_t pages_written() const { return written_; }
-  std::uint32_t first_page() const;
+  std::uint32_t first_page() const { return first_; }    // the oldest that is held
   std::span<const std::uint8_t> page(std::uint32_t index) const;
   // Fault on demand: a bit of the page flips in the next `times` readings.
   void spoil(std::uint32_t index, int times);
@@ -93,8 +94,11 @@ class RawStore {
   void mend();                                           // one reading done
 
  private:
+  std::optional<flash::Page> page_of_run(std::size_t block) const;   // in a block of the ring, whole and of this run
+  void find_pages();
+
   FlashMemory& flash_;
-  std::uint32_t run_id_ = 0, expected_ = 0, written_ = 0;
+  std::uint32_t run_id_ = 0, expected_ = 0, first_ = 0, written_ = 0;
   std::uint64_t samples_ = 0;
   bool complete_ = true;
   std::optional<std::uint32_t> spoilt_;

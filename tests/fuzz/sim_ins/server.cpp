@@ -30,7 +30,8 @@ class Scene {
     for (std::size_t block = 0; block < sim::raw_ring_first_block; ++block) {
       unit_.flash().erase(block);
     }
-    unit_.power_on(now_);
+    now_ = std::chrono::ceil<std::chrono::milliseconds>(std::chrono::duration<double>(unit_.flash().ready_at_s()));
+    unit_.power_on(now_);   // the chip lives on from input to input, and so does its clock
     pass(1500ms);
     before_ = coefficient_blocks();
   }

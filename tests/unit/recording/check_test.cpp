@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "protocol/recording/gimbal_check.hpp"
 #include "tests/unit/recording/sample_recording.hpp"
 
 namespace selfcal {
@@ -141,6 +142,21 @@ TEST_F(GimbalCheck, SwappedAxes) {
 TEST_F(GimbalCheck, StandsStillWhileTheGyrosTurn) {
   for (double& angle : r.gimbal_inner_rad) angle = 0.0;
   EXPECT_THAT(error_of(r), HasSubstr("read-outs turned 0.0 and 0.0 deg"));
+}
+
+// A read-out that goes from 0.0 past zero to 359.4 deg has turned by -0.6.
+TEST_F(GimbalCheck, AReadOutThatPassesZeroHasNotTurnedAllTheWay) {
+  for (double& angle : r.gimbal_inner_rad) angle = 0.0;
+  const auto still = find_gimbal_contradiction(r);
+  ASSERT_TRUE(still);
+  for (std::size_t row = still->first_row + 1; row < r.size(); ++row) {
+    const double angle = r.gimbal_outer_rad[row] - 0.6 * std::numbers::pi / 180.0;
+    r.gimbal_outer_rad[row] = angle - std::floor(angle / (2.0 * std::numbers::pi)) * 2.0 * std::numbers::pi;
+  }
+  const auto wrapped = find_gimbal_contradiction(r);
+  ASSERT_TRUE(wrapped);
+  ASSERT_EQ(wrapped->first_row, still->first_row);
+  EXPECT_NEAR(wrapped->outer_turn_deg, still->outer_turn_deg - 0.6, 1e-9);
 }
 
 TEST_F(GimbalCheck, DegreesForRadians) {

@@ -126,7 +126,7 @@ class Trial {
       cut_.at.reset();
     }
     if (off_at_ && now_ >= *off_at_) {
-      within_write_ = false;
+      within_write_ = unit_.flash().busy();
       throw PowerLost{};
     }
     within_write_ = true;   // whatever throws from here on is the FLASH

@@ -125,6 +125,87 @@ TEST(PowerCut, PagesOfAnEarlierRunOfTheSameNumberDoNotCount) {
   }
 }
 
+// 98 minutes at 200 Hz fill the ring. A longer run loses its oldest pages and nothing else, and what is left outlives a
+// power cut wherever the ring's end lies, also in the erasure ahead of the newest page and in that page itself.
+TEST(PowerCut, ARunLongerThanTheRingKeepsItsNewestPages) {
+  constexpr auto ring = static_cast<std::uint32_t>(raw_ring_pages);
+  auto flash = FlashMemory::open("", flash_bytes);
+  ASSERT_TRUE(flash);
+  RawStore raw(*flash);
+  raw.begin(7, 3 * ring);
+  const auto append = [&](std::uint32_t sequence) {
+    raw.append(page_of(7, sequence));
+    flash->advance(flash->ready_at_s());
+  };
+  std::uint32_t next = 0;
+  for (const std::uint32_t written : {ring - 1, ring, ring + 100}) {
+    while (next < written) {
+      append(next++);
+    }
+    RawStore after(*flash);
+    after.power_on();
+    EXPECT_EQ(after.directory(), (ins::DirectoryRecord{7, written < ring ? 0 : written + 1 - ring, written, 3 * ring,
+                                                       std::uint64_t{written} * flash::samples_per_page, true}));
+    EXPECT_EQ(after.first_page(), raw.first_page());
+    flash::Page page;
+    for (const std::uint32_t sequence : {after.first_page(), written - 1}) {
+      ASSERT_TRUE(flash::decode_page(after.page(sequence), page));
+      EXPECT_EQ(page.sequence, sequence);
+    }
+    // The next page's write is cut in the erasure ahead of it, then in the page.
+    for (const std::uint64_t bytes : {std::uint64_t{100}, std::uint64_t{flash_block_bytes + 2000}}) {
+      auto copy = FlashMemory::open("", flash_bytes);
+      ASSERT_TRUE(copy);
+      copy->program(0, flash->read(0, flash_bytes));
+      RawStore torn(*copy);
+      torn.power_on();
+      copy->lose_power_after(bytes);
+      EXPECT_THROW(torn.append(page_of(7, written)), PowerLost);
+      copy->lose_power_after(std::nullopt);
+      torn.power_on();
+      EXPECT_EQ(torn.pages_written(), written);
+      EXPECT_EQ(torn.first_page(), written + 2 > ring ? written + 2 - ring : 0U) << written;
+    }
+  }
+}
+
+// The same number, an earlier run that went round the ring: nothing of it counts.
+TEST(PowerCut, PagesOfAnEarlierRunThatWentRoundDoNotCount) {
+  auto flash = FlashMemory::open("", flash_bytes);
+  ASSERT_TRUE(flash);
+  RawStore raw(*flash);
+  raw.begin(7, 10000);
+  for (std::uint32_t k = 0; k < raw_ring_pages + 50; ++k) {
+    raw.append(page_of(7, k));
+    flash->advance(flash->ready_at_s());
+  }
+  raw.begin(7, 10000);
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    raw.power_on();
+    EXPECT_EQ(raw.directory(), (ins::DirectoryRecord{7, 0, k, 10000, k * flash::samples_per_page, true}));
+    raw.append(page_of(7, k));
+  }
+}
+
+// A write that the power cuts in time stays half done: the erasure by as much as was done of it, the record not begun.
+TEST(PowerCut, TheClockSaysHowFarAWriteCame) {
+  auto flash = FlashMemory::open("", 2 * flash_block_bytes);
+  ASSERT_TRUE(flash);
+  const std::vector<std::uint8_t> zeros(flash_block_bytes, 0);
+  flash->program(0, zeros);
+  flash->advance(1.0);   // 16 writes of 0.8 ms are over
+  EXPECT_FALSE(flash->busy());
+  flash->erase(0);
+  flash->program(0, std::array<std::uint8_t, 2>{0x12, 0x34});
+  EXPECT_DOUBLE_EQ(flash->ready_at_s(), 1.0 + 0.045 + 0.0008);
+  EXPECT_EQ(flash->read(0, 1)[0], 0x12);   // what the INS has in RAM
+  flash->cut_power(1.0 + 0.045 / 4.0);
+  EXPECT_EQ(flash->read(0, 1)[0], 0xFF);
+  EXPECT_EQ(flash->read(1023, 1)[0], 0xFF);
+  EXPECT_EQ(flash->read(1024, 1)[0], 0x00);
+  EXPECT_FALSE(flash->busy());
+}
+
 TEST(PowerCut, ATornPageIsNotOneOfTheRun) {
   auto flash = FlashMemory::open("", flash_bytes);
   ASSERT_TRUE(flash);

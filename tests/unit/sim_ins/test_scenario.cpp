@@ -99,7 +99,7 @@ TEST(Scenario, SensorsSaturateAndFreeze) {
   EXPECT_EQ(limited.delta_theta[1], -4000);
   EXPECT_EQ(limited.delta_theta[0], 5000);
   ImuSample frozen = sample;
-  EXPECT_TRUE(spoil_sample(*scenario_of("[[fault]]\nkind='frozen_accel'\nvalue=2\n"), 0.0, before, frozen));
+  EXPECT_FALSE(spoil_sample(*scenario_of("[[fault]]\nkind='frozen_accel'\nvalue=2\n"), 0.0, before, frozen));
   EXPECT_THAT(frozen.delta_v, testing::ElementsAre(4, 5, 3));
   ImuSample untouched = sample;
   EXPECT_FALSE(spoil_sample(*scenario_of("[[fault]]\nkind='frozen_accel'\nat_s=9\n"), 0.0, before, untouched));

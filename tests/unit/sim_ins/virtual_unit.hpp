@@ -22,8 +22,9 @@ class VirtualUnit {
     boot(std::move(flash));
   }
 
-  // Nothing but the FLASH comes over. Throws PowerLost where the supply gives out meanwhile.
+  // Nothing but what the FLASH had done comes over. Throws PowerLost where the supply gives out meanwhile.
   void power_on(Time now) {
+    instrument_->flash().cut_power(seconds(now));
     boot(std::move(instrument_->flash()));
     start(now);
   }
@@ -40,6 +41,9 @@ class VirtualUnit {
     server_->on_time(now);
     diagnostics_->set_instrument_time(seconds(now));
     instrument_->advance(seconds(now));
+    if (const auto answer = diagnostics_->take_answer()) {
+      server_->respond(*answer, now);
+    }
     reset_pending_ = diagnostics_->take_reset_request() || reset_pending_;
     if (reset_pending_ && server_->idle()) {
       start(now);
