@@ -126,6 +126,7 @@ bool CalibrationRun::holds(Guard guard) const {
   switch (guard) {
     case Guard::always: return true;
     case Guard::rollback: return record_.rollback;
+    case Guard::amendment: return record_.amends != 0;
     case Guard::gimbal_turning: return ours && stock_.state == ins::State::rotating;
     case Guard::rotation_complete: return ours && (stock_.state == ins::State::complete || data_complete_);
     case Guard::gate_refused: return !objections_.empty() && record_.force_reason.empty();

@@ -126,6 +126,7 @@ class CalibrationRun {
   Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
   void note_bad_page(std::uint32_t page, const std::string& why);
   void estimate();
+  std::filesystem::path amended_recording() const;
   void judge();
   void estimate_meanwhile();
   void on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s);

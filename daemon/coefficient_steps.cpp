@@ -3,6 +3,7 @@
 
 #include <ctime>
 
+#include "daemon/amendment_job.hpp"
 #include "daemon/calibration/coefficient_set.hpp"
 #include "daemon/calibration_run.hpp"
 #include "daemon/estimate_job.hpp"
@@ -38,16 +39,24 @@ void CalibrationRun::estimate() {
   task_ = {};
   running_busy_ = false;   // what still runs is dropped
   context_.estimators.start(
-      estimate_job({folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_}),
+      record_.amends == 0
+          ? estimate_job({folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_})
+          : amendment_job({record_.amends, amended_recording(), folder_, config_}),
       [this](const CalibrationProgress& progress) { on_estimate_progress(progress); },
       [this](Expected<Estimate> answer) { on_estimate(std::move(answer)); });
+}
+
+// Empty where the store cannot say: the job's error names the file then.
+std::filesystem::path CalibrationRun::amended_recording() const {
+  const auto amended = context_.store.run(record_.amends);
+  return amended && *amended ? std::filesystem::path((*amended)->recording) : std::filesystem::path();
 }
 
 void CalibrationRun::on_estimate_progress(const CalibrationProgress& progress) {
   progress_.pass = progress.pass;
   progress_.pass_fraction = progress.fraction;
   progress_.running = false;
-  show_estimate(progress.value, progress.sigma);
+  if (record_.amends == 0) show_estimate(progress.value, progress.sigma);
   report_progress();
 }
 
@@ -58,6 +67,7 @@ void CalibrationRun::on_estimate(Expected<Estimate> answer) {
   }
   estimate_ = std::move(*answer);
   for (const std::string& warning : estimate_->warnings) warn(warning);
+  for (const std::string& note : estimate_->notes) remember("amendment", note);
   post(Event::estimate_ready);
 }
 

@@ -56,7 +56,7 @@ Expected<fs::path> backup_path(const fs::path& state_directory, const std::strin
 }
 
 Expected<fs::path> back_up_database(const fs::path& state_directory, const std::string& name) {
-  const auto target = backup_path(state_directory, name);
+  auto target = backup_path(state_directory, name);
   if (!target) return target;
   std::error_code error;
   fs::create_directories(target->parent_path(), error);
@@ -69,7 +69,7 @@ Expected<fs::path> back_up_database(const fs::path& state_directory, const std::
 }
 
 Expected<fs::path> restore_database(const fs::path& state_directory, const std::string& name) {
-  const auto backup = backup_path(state_directory, name);
+  auto backup = backup_path(state_directory, name);
   if (!backup) return backup;
   if (const auto sound = RunStore::check(*backup); !sound) return tl::unexpected(sound.error());
   const fs::path database = database_path(state_directory);

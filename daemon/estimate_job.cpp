@@ -99,6 +99,12 @@ Expected<Recording> recording_from_pages(const EstimateRequest& request, std::ve
   return recording;
 }
 
+Expected<LoadedRecording> read_kept_recording(const fs::path& path) {
+  constexpr CheckPolicy lenient{.gaps_are_errors = false, .gimbal_contradiction_is_error = false};
+  const std::lock_guard lock(hdf5_mutex);
+  return read_hdf5(path, lenient);
+}
+
 EstimateJob estimate_job(EstimateRequest request) {
   return [request = std::move(request)](const EstimateProgress& progress, std::stop_token stop) {
     return run_estimate(request, progress, stop);

@@ -1,11 +1,13 @@
 // From the pages in a run's folder to the answer: what the estimator's thread does.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "daemon/estimate_worker.hpp"
 #include "daemon/page_recording.hpp"
+#include "protocol/recording/check.hpp"
 
 namespace selfcal {
 
@@ -18,5 +20,8 @@ std::vector<std::string> gate_objections(const CalibrationResult& result, const 
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings);
 
 EstimateJob estimate_job(EstimateRequest request);
+
+// A recording that a run kept, as `selfcal diagnose` would read it.
+Expected<LoadedRecording> read_kept_recording(const std::filesystem::path& path);
 
 }  // namespace selfcal

@@ -20,6 +20,7 @@ struct Estimate {
   CalibrationResult result;
   std::vector<std::string> objections;   // of the gate, empty: acceptable
   std::vector<std::string> warnings;     // of the recording
+  std::vector<std::string> notes;        // for the story of the run
   std::string result_json;
   std::string recording;                 // path
 };

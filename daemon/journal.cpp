@@ -36,6 +36,7 @@ void write(Level level, std::string_view message, const Fields& fields) {
   if (journal_is_there()) {
     std::vector<std::string> lines = entry(level, message, fields);
     std::vector<iovec> parts;
+    parts.reserve(lines.size());
     for (std::string& line : lines) parts.push_back({line.data(), line.size()});
     if (sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) >= 0) return;
   }

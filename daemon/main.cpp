@@ -4,6 +4,7 @@
 #include <systemd/sd-daemon.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 
 #include "daemon/journal.hpp"
 #include "daemon/service.hpp"
@@ -51,9 +52,7 @@ int serve(const std::string& config_file) {
   return loop.run();
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{"selfcald: calibrates inertial navigation systems on their own gimbals"};
   std::string config_file = "/etc/selfcal/selfcald.toml";
   bool check_only = false;
@@ -72,10 +71,16 @@ int main(int argc, char** argv) {
     fmt::print("{}: well-formed, {} INS\n", config_file, config->instruments.size());
     return 0;
   }
+  return serve(config_file);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
-    return serve(config_file);
+    return run(argc, argv);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "selfcald: {}\n", error.what());
+    std::fprintf(stderr, "selfcald: %s\n", error.what());   // unlike fmt::print it cannot throw
     return static_cast<int>(ErrorKind::internal);
   }
 }

@@ -68,6 +68,11 @@ T take(Entries& options, const std::string& key, T otherwise) {
   return value;
 }
 
+void refuse_others(const Entries& options) {
+  if (options.empty()) return;
+  throw sdbus::Error(operator_api::error_unknown, fmt::format("unknown option {}", options.begin()->first));
+}
+
 }  // namespace
 
 class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::Manager1_adaptor> {
@@ -94,11 +99,19 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
     request.dry_run = take(options, "dry_run", false);
     request.stop_when_met = take(options, "stop_when_met", false);
     request.force_reason = take<std::string>(options, "force", "");
-    if (!options.empty()) {
-      throw sdbus::Error(operator_api::error_unknown, fmt::format("unknown option {}", options.begin()->first));
-    }
+    refuse_others(options);
     request.user = caller();
     return static_cast<std::uint64_t>(granted(operations_.start(request)));
+  }
+  std::uint64_t Amend(const std::uint64_t& run, const Entries& given) override {
+    Entries options = given;
+    AmendRequest request;
+    request.run = static_cast<RunId>(run);
+    request.dry_run = take(options, "dry_run", false);
+    request.force_reason = take<std::string>(options, "force", "");
+    refuse_others(options);
+    request.user = caller();
+    return static_cast<std::uint64_t>(granted(operations_.amend(request)));
   }
   void Abort(const std::string& ins, const std::string& reason) override {
     granted(operations_.abort(ins, fmt::format("aborted by {}{}{}", caller(), reason.empty() ? "" : ": ", reason)));

@@ -12,6 +12,14 @@
 
 namespace selfcal {
 
+// A run's recording is to be estimated again, with the physics that the diagnosis names in it.
+struct AmendRequest {
+  RunId run = 0;
+  bool dry_run = false;
+  std::string force_reason;
+  std::string user;
+};
+
 struct StartRequest {
   std::string ins;
   std::string schedule;       // empty: the configured one
@@ -34,6 +42,7 @@ class Operations {
  public:
   virtual ~Operations() = default;
   virtual Granted<RunId> start(const StartRequest& request) = 0;
+  virtual Granted<RunId> amend(const AmendRequest& request) = 0;
   virtual Granted<RunId> rollback(const std::string& serial, const std::string& reason, const std::string& user) = 0;
   virtual Granted<Done> abort(const std::string& ins, const std::string& reason) = 0;
   virtual Granted<std::string> show(RunId run) = 0;

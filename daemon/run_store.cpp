@@ -37,13 +37,16 @@ CREATE TABLE coefficient_sets(
                                   R"sql(
 ALTER TABLE runs ADD COLUMN stop_when_met INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE runs ADD COLUMN early_end_s REAL NOT NULL DEFAULT -1;
+)sql",
+                                  R"sql(
+ALTER TABLE runs ADD COLUMN amends INTEGER NOT NULL DEFAULT 0;
 )sql"};
 constexpr auto schema_version = static_cast<std::int64_t>(schema_steps.size());
 
 constexpr std::string_view run_columns =
     "id, ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, started_utc, ended_utc, "
     "software, exit_status, reason, abort_wanted, rotation, recording, result_json, drift_old_m, drift_new_m, "
-    "stop_when_met, early_end_s";
+    "stop_when_met, early_end_s, amends";
 
 constexpr const char* final_states = "('completed','refused','failed','aborted')";
 
@@ -84,6 +87,7 @@ RunRecord read_run(Statement& row) {
   run.drift_new_m = row.real();
   run.stop_when_met = row.integer() != 0;
   run.early_end_s = row.real();
+  run.amends = row.integer();
   return run;
 }
 
@@ -161,11 +165,12 @@ Expected<RunId> RunStore::create_run(const RunRecord& run) {
   Statement insert(database_,
                    "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
                    "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
-                   "result_json, drift_old_m, drift_new_m, stop_when_met) "
-                   "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?)");
+                   "result_json, drift_old_m, drift_new_m, stop_when_met, amends) "
+                   "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?)");
   insert.bind(run.ins).bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.user);
   insert.bind(run.schedule).bind(std::int64_t{run.dry_run}).bind(run.force_reason).bind(std::int64_t{run.rollback});
   insert.bind(run.started_utc).bind(run.software).bind(std::int64_t{run.stop_when_met});
+  insert.bind(run.amends);
   if (auto ok = insert.run(); !ok) return tl::unexpected(ok.error());
   return sqlite3_last_insert_rowid(database_);
 }

@@ -31,6 +31,7 @@ struct RunRecord {
   bool dry_run = false;
   std::string force_reason;     // empty: not forced
   bool rollback = false;        // writes a former set instead of calibrating
+  RunId amends = 0;             // estimates this run's recording again, with the physics named in it; 0: none
   bool stop_when_met = false;   // the rotation may end as soon as every tolerance is met
   std::string started_utc, ended_utc;
   std::string software;         // of the daemon

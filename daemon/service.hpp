@@ -55,6 +55,7 @@ class Service : public Operations, public RunObserver {
   const Session* session(const std::string& ins) const;
 
   Granted<RunId> start(const StartRequest& request) override;
+  Granted<RunId> amend(const AmendRequest& request) override;
   Granted<RunId> rollback(const std::string& serial, const std::string& reason, const std::string& user) override;
   Granted<Done> abort(const std::string& ins, const std::string& reason) override;
   Granted<std::string> show(RunId run) override;

@@ -99,6 +99,37 @@ Granted<RunId> Service::start(const StartRequest& request) {
   return launch(*chosen, record, request.schedule.empty() ? chosen->config.schedule : request.schedule);
 }
 
+Granted<RunId> Service::amend(const AmendRequest& request) {
+  const auto found = store_->run(request.run);
+  if (!found) return unavailable(found.error());
+  if (!*found) return refuse(operator_api::error_unknown, fmt::format("no run {}", request.run));
+  const RunRecord& amended = **found;
+  if (!is_final(amended.state)) {
+    return refuse(operator_api::error_nothing, fmt::format("run {} has not ended: {}", amended.id, words(amended.state)));
+  }
+  if (amended.recording.empty()) {
+    return refuse(operator_api::error_nothing, fmt::format("run {} has no recording (any more)", amended.id));
+  }
+  const auto runs = store_->runs_of_serial(amended.serial);
+  if (!runs) return unavailable(runs.error());
+  for (const RunRecord& later : *runs) {
+    const bool written = later.id > amended.id && later.state == State::completed && !later.dry_run;
+    if (written) {
+      return refuse(operator_api::error_nothing, fmt::format("run {} is not the latest: run {} of {} has written a set since",
+                                                             amended.id, later.id, later.started_utc));
+    }
+  }
+  Session* chosen = session(amended.ins);
+  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", amended.ins));
+  RunRecord record;
+  record.user = request.user;
+  record.serial = amended.serial;
+  record.amends = amended.id;
+  record.dry_run = request.dry_run;
+  record.force_reason = request.force_reason;
+  return launch(*chosen, record, chosen->config.schedule);
+}
+
 Granted<RunId> Service::rollback(const std::string& serial, const std::string& reason, const std::string& user) {
   if (reason.empty()) return refuse(operator_api::error_unknown, "a rollback needs a reason");
   const auto runs = store_->runs_of_serial(serial);
@@ -120,7 +151,7 @@ Granted<RunId> Service::rollback(const std::string& serial, const std::string& r
   record.serial = serial;
   record.rollback = true;
   record.force_reason = reason;
-  const auto id = launch(*chosen, record, chosen->config.schedule);
+  auto id = launch(*chosen, record, chosen->config.schedule);
   if (!id) return id;
   if (auto stored = store_->store_set(*id, SetRole::written, **previous); !stored) {
     (void)abort(last->ins, stored.error().message);

@@ -17,6 +17,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::connecting, E::begin, G::always, A::identify, S::connecting},
     {S::connecting, E::identified, G::always, A::unlock, S::unlocking},
     {S::unlocking, E::unlocked, G::rollback, A::erase_inactive_slot, S::erasing},
+    {S::unlocking, E::unlocked, G::amendment, A::estimate, S::estimating},
     {S::unlocking, E::unlocked, G::always, A::write_schedule, S::scheduling},
     {S::scheduling, E::schedule_accepted, G::always, A::start_rotation, S::starting},
     {S::starting, E::rotation_started, G::always, A::follow_rotation, S::rotating},
@@ -172,8 +173,8 @@ constexpr std::array event_names{"begin",         "identified",     "unlocked", 
                                  "set_verified",  "set_committed",  "ins_restarted",  "set_confirmed",
                                  "gimbal_stopped", "link_lost",     "recovered",      "link_gone",
                                  "step_failed",   "abort_requested"};
-constexpr std::array guard_names{"always",       "rollback", "gimbal_turning",     "rotation_complete",
-                                 "gate_refused", "dry_run",  "drift_check_wanted", "new_set_in_force",
+constexpr std::array guard_names{"always",       "rollback", "amendment",          "gimbal_turning",
+                                 "rotation_complete", "gate_refused", "dry_run",  "drift_check_wanted", "new_set_in_force",
                                  "abort_pending"};
 constexpr std::array action_names{
     "none",       "identify",          "unlock",        "write_schedule",      "start_rotation", "follow_rotation",

@@ -66,6 +66,7 @@ enum class Event {
 enum class Guard {
   always,
   rollback,              // a former set is to be put back, nothing to be measured
+  amendment,             // a kept recording is to be estimated again, nothing to be measured
   gimbal_turning,        // the INS says so, and it is this run's rotation
   rotation_complete,     // the INS says so, and it is this run's rotation
   gate_refused,          // not determined, inconsistent or implausible, and no operator's reason to write it anyway

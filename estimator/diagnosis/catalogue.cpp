@@ -17,7 +17,7 @@ std::vector<EffectParameter> matrix_parameters(const std::string& unit, double s
 }
 
 void add_matrix(Columns columns, const Vector3& v) {
-  for (int row = 0; row < 3; ++row) {
+  for (Eigen::Index row = 0; row < 3; ++row) {
     columns.block<1, 3>(row, 3 * row) += v.transpose();
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <numeric>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/judgement.hpp"
@@ -37,10 +38,8 @@ std::string schedules_differ(const ImuData& a, const ImuData& b) {
 }
 
 std::vector<int> columns_of(const Candidate& c) {
-  std::vector<int> columns;
-  for (int k = 0; k < c.count; ++k) {
-    columns.push_back(c.first + k);
-  }
+  std::vector<int> columns(static_cast<std::size_t>(c.count));
+  std::iota(columns.begin(), columns.end(), c.first);
   return columns;
 }
 

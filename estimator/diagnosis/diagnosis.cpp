@@ -115,7 +115,8 @@ void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, 
       level.log_p = log_normal_tail(z);
     }
     for (int k = 0; k < 3; ++k) {
-      const auto axis = static_cast<std::size_t>(3 * triad + k);
+      const int axis_index = 3 * triad + k;
+      const auto axis = static_cast<std::size_t>(axis_index);
       const AxisNoise& n = noise.axes[axis];
       const double found = std::sqrt(12.0) * n.increment_sigma;
       const double excess = n.increment_sigma * n.increment_sigma - quantum * quantum / 12.0;
@@ -205,7 +206,7 @@ void Diagnoser::name() {
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
   say("signatures");
   Naming naming(context, forward_pass(data_, d_.calibration), log_names_);
-  naming.run(say_);
+  naming.run(say_, options_.stop);
   decide(naming);
 }
 
@@ -242,7 +243,8 @@ void Diagnoser::decide(const Naming& naming) {
   destination.insert(destination.end(), named.begin(), named.end());
   judge_noise(d_.calibration, d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
   d_.value = naming.value();
-  d_.sigma = naming.covariance().diagonal().cwiseSqrt();
+  d_.covariance = naming.covariance();
+  d_.sigma = d_.covariance.diagonal().cwiseSqrt();
 
   for (const Suspect& s : naming.prospects()) {
     (s.expected_z < seen_z ? d_.undetectable : d_.detectable).push_back({s.effect, s.expected_z});
@@ -280,12 +282,15 @@ DiagnosisOutcome Diagnoser::run() {
   d_.faults = find_data_faults(data_);
   d_.noise = check_noise(data_, find_segments(data_));
   say("calibration");
-  CalibrationOutcome calibration = calibrate_still(data_, options_.calibration);
+  CalibrationOutcome calibration = calibrate_still(data_, options_.calibration, options_.stop);
   if (!calibration.result) {
     return {std::nullopt, calibration.failure.message};
   }
   d_.calibration = std::move(*calibration.result);
   name();
+  if (options_.stop.stop_requested()) {
+    return {std::nullopt, "stopped"};
+  }
   return {std::move(d_), {}};
 }
 

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct DiagnosisOptions {
   double false_alarm_rate = 0.01;      // of a whole recording, over all tests
   AssumedNoise assumed;                // what the simulation takes for the sensors
   CalibrationOptions calibration;
+  std::stop_token stop;                // asked for between steps: the failure is then "stopped"
 };
 
 struct FindingParameter {
@@ -82,6 +84,7 @@ struct Diagnosis {
   double mean_temperature_c = 0.0;     // of the recording; 0 without a channel
   ParameterVector value;               // of the 24 with the findings fitted too, SI
   ParameterVector sigma;
+  ParameterMatrix covariance;          // of value
 };
 
 struct DiagnosisOutcome {

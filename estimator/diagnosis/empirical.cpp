@@ -110,6 +110,7 @@ int best_column(const Evidence& evidence, int columns, const std::vector<int>& c
 EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& d, double false_alarm_rate) {
   const std::vector<Effect> all = functions(data);
   std::vector<Candidate> candidates;
+  candidates.reserve(all.size());
   for (const Effect& e : all) {
     candidates.push_back({&e, NAN, 0, 0});
   }

@@ -114,13 +114,14 @@ WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int
     const Eigen::PartialPivLU<Eigen::MatrixXd> lu(M);
     return q * b.dot(K * lu.solve(b)) - lu.matrixLU().diagonal().cwiseAbs().array().log().sum();
   };
-  constexpr double steps_per_decade = 8.0;
+  constexpr int steps_per_decade = 8, first_decade = -4, last_decade = 8;
   double best_q = 0.0;
-  for (double l = -4.0; l <= 8.0; l += 1.0 / steps_per_decade) {
-    const double value = twice_log_likelihood(std::pow(10.0, l));
+  for (int step = first_decade * steps_per_decade; step <= last_decade * steps_per_decade; ++step) {
+    const double q = std::pow(10.0, static_cast<double>(step) / steps_per_decade);
+    const double value = twice_log_likelihood(q);
     if (value > test.gain) {
       test.gain = value;
-      best_q = std::pow(10.0, l);
+      best_q = q;
     }
   }
   test.rate = std::sqrt(best_q);

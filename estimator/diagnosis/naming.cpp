@@ -387,19 +387,19 @@ void Naming::judge() {
                    [](const Chosen& a, const Chosen& b) { return a.log_p < b.log_p; });
 }
 
-void Naming::run(const std::function<void(const std::string&)>& progress) {
-  while (chosen_.size() + walks_.size() < most_effects && add_best()) {
+void Naming::run(const std::function<void(const std::string&)>& progress, const std::stop_token& stop) {
+  while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
     if (progress) {
       progress(std::to_string(chosen_.size() + walks_.size()) + " effects fitted");
     }
     drop_weak();
   }
-  for (int round = 0; round < 3 && exchange(); ++round) {
+  for (int round = 0; round < 3 && !stop.stop_requested() && exchange(); ++round) {
     while (drop_weak()) {
     }
   }
   sharpen_observation();
-  while (chosen_.size() + walks_.size() < most_effects && add_best()) {
+  while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
   }
   carry_constants();
   judge();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ class Naming {
   // `input`: forward pass about the calibrated recording. `log_threshold`: of corrected p-values.
   Naming(const RecordingContext& context, PassInput input, double log_threshold);
 
-  void run(const std::function<void(const std::string&)>& progress);
+  void run(const std::function<void(const std::string&)>& progress, const std::stop_token& stop = {});
 
   const std::vector<Chosen>& chosen() const { return chosen_; }
   const std::vector<WalkTest>& walks() const { return walks_; }

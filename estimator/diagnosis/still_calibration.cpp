@@ -9,30 +9,31 @@ namespace {
 
 // Whatever is left out makes innovations larger. Where they are far smaller than predicted the densities were taken
 // too large: lines and a coarse quantum beside little white noise do that to a spectrum.
-CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions options, CalibrationOutcome outcome) {
+CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions options, CalibrationOutcome outcome,
+                                      const std::stop_token& stop) {
   constexpr double far_below_one = 0.5;
   constexpr int rounds = 3;
   for (int round = 0; round < rounds && outcome.result && outcome.result->consistency.nis_mean < far_below_one; ++round) {
     const double scale = std::sqrt(outcome.result->consistency.nis_mean);
     options.noise.gyro_arw = scale * outcome.result->gyro_arw;
     options.noise.accel_vrw = scale * outcome.result->accel_vrw;
-    outcome = calibrate(data, options);
+    outcome = calibrate(data, options, {}, stop);
   }
   return outcome;
 }
 
 }  // namespace
 
-CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options) {
+CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop) {
   constexpr double largest_still_sigma = 3e-6;   // m: a calibration that asks for more does so because of an omission
-  CalibrationOutcome outcome = calibrate(data, options);
+  CalibrationOutcome outcome = calibrate(data, options, {}, stop);
   if (outcome.result && !outcome.result->moored && !options.noise.position_sigma &&
       outcome.result->position_sigma > largest_still_sigma) {
     options.noise.position_sigma = largest_still_sigma;
-    outcome = calibrate(data, options);
+    outcome = calibrate(data, options, {}, stop);
   }
   if (!options.noise.gyro_arw && !options.noise.accel_vrw && outcome.result && !outcome.result->moored) {
-    outcome = with_smaller_noise(data, options, std::move(outcome));
+    outcome = with_smaller_noise(data, options, std::move(outcome), stop);
   }
   return outcome;
 }

@@ -7,7 +7,7 @@ namespace selfcal::diagnosis {
 
 // Calibration in which a still base's position noise is not widened by what the model leaves out (it stands to
 // micrometres), and in which densities that make the innovations far too small are taken back.
-CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options);
+CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop = {});
 
 // A forward pass about the calibrated recording; `data` must outlive it.
 PassInput forward_pass(const ImuData& data, const CalibrationResult& calibration);

@@ -12,8 +12,6 @@
 
 namespace selfcal::cli {
 
-std::string verdict_name(diagnosis::DiagnosisVerdict verdict);
-nlohmann::ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_alarm_rate);
 std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis);
 // The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
 nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate);

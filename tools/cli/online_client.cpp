@@ -70,6 +70,9 @@ auto ManagerClient::call(Call make) -> Expected<decltype(make())> {
 Expected<std::uint64_t> ManagerClient::start(const std::string& ins, const Entries& options) {
   return call([&] { return proxy_->Start(ins, options); });
 }
+Expected<std::uint64_t> ManagerClient::amend(std::uint64_t run, const Entries& options) {
+  return call([&] { return proxy_->Amend(run, options); });
+}
 Expected<void> ManagerClient::abort(const std::string& ins, const std::string& reason) {
   return call([&] { proxy_->Abort(ins, reason); });
 }

@@ -22,6 +22,7 @@ class ManagerClient {
   ~ManagerClient();
 
   Expected<std::uint64_t> start(const std::string& ins, const Entries& options);
+  Expected<std::uint64_t> amend(std::uint64_t run, const Entries& options);
   Expected<void> abort(const std::string& ins, const std::string& reason);
   Expected<std::uint64_t> rollback(const std::string& serial, const std::string& reason);
   Expected<std::string> show(std::uint64_t run);

@@ -1,4 +1,4 @@
-// selfcal run, rollback: begin a run and follow it to its end.
+// selfcal run, amend, rollback: begin a run and follow it to its end.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -195,6 +195,42 @@ CommandRun configure_run(CLI::App& app) {
   return [options] { return run(*options); };
 }
 
+// Follows a run that is of another's making; its document says which INS.
+Expected<int> follow_begun(ManagerClient& manager, const Expected<std::uint64_t>& id, bool json) {
+  if (!id) return tl::unexpected(id.error());
+  const auto document = manager.show(*id);
+  if (!document) return tl::unexpected(document.error());
+  Follower follower(manager, nlohmann::json::parse(*document).at("ins").get<std::string>());
+  const auto ending = follower.follow(*id);
+  if (!ending) return tl::unexpected(ending.error());
+  return report(manager, *id, *ending, json);
+}
+
+struct AmendOptions {
+  std::uint64_t run = 0;
+  std::string force;
+  bool dry_run = false, json = false;
+};
+
+Expected<int> amend(const AmendOptions& options) {
+  auto manager = ManagerClient::connect();
+  if (!manager) return tl::unexpected(manager.error());
+  catch_interrupts();
+  Entries wanted;
+  if (options.dry_run) wanted["dry_run"] = true;
+  if (!options.force.empty()) wanted["force"] = options.force;
+  return follow_begun(**manager, (*manager)->amend(options.run, wanted), options.json);
+}
+
+CommandRun configure_amend(CLI::App& app) {
+  auto options = std::make_shared<AmendOptions>();
+  app.add_option("RUN", options->run, "the run whose recording it is")->required();
+  app.add_flag("--dry-run", options->dry_run, "diagnose, estimate and judge, write nothing to the INS");
+  app.add_option("--force", options->force, "write a result that the gate refuses; the reason is recorded");
+  app.add_flag("--json", options->json, "the run's document on standard output");
+  return [options] { return amend(*options); };
+}
+
 struct RollbackOptions {
   std::string serial, reason;
   bool json = false;
@@ -204,14 +240,7 @@ Expected<int> rollback(const RollbackOptions& options) {
   auto manager = ManagerClient::connect();
   if (!manager) return tl::unexpected(manager.error());
   catch_interrupts();
-  const auto id = (*manager)->rollback(options.serial, options.reason);
-  if (!id) return tl::unexpected(id.error());
-  const auto document = (*manager)->show(*id);
-  if (!document) return tl::unexpected(document.error());
-  Follower follower(**manager, nlohmann::json::parse(*document).at("ins").get<std::string>());
-  const auto ending = follower.follow(*id);
-  if (!ending) return tl::unexpected(ending.error());
-  return report(**manager, *id, *ending, options.json);
+  return follow_begun(**manager, (*manager)->rollback(options.serial, options.reason), options.json);
 }
 
 CommandRun configure_rollback(CLI::App& app) {
@@ -223,6 +252,8 @@ CommandRun configure_rollback(CLI::App& app) {
 }
 
 const CommandRegistration run_registration{{"run", "calibrate an INS through the daemon", configure_run}};
+const CommandRegistration amend_registration{
+    {"amend", "calibrate with the physics that the diagnosis names in a run's recording", configure_amend}};
 const CommandRegistration rollback_registration{
     {"rollback", "put back the set that was in force before the last calibration", configure_rollback}};
 

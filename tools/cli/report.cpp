@@ -8,6 +8,7 @@
 #include <set>
 
 #include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/calibration/diagnosis_json.hpp"
 #include "daemon/wall_clock.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"

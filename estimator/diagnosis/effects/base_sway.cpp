@@ -8,7 +8,7 @@ namespace {
 
 void columns(double t, double frequency, Columns metres) {
   const double phase = 2.0 * std::numbers::pi * frequency * t;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
     metres(axis, 2 * axis) += std::sin(phase);
     metres(axis, 2 * axis + 1) += std::cos(phase);
   }

@@ -224,6 +224,54 @@ TEST_F(CalibrationRunTest, RollbackWritesTheFormerSetWithoutTurning) {
   EXPECT_EQ(ins_.in_force().value[0], 0.0);
 }
 
+// The estimate of an amendment is the only thing that it does instead of rotating: all that follows is a calibration's.
+TEST_F(CalibrationRunTest, AmendmentEstimatesAgainAndWritesWithoutTurning) {
+  RunRecord record;
+  record.amends = 7;
+  record.serial = ins_.serial;
+  estimators_.answer->notes = {"accel_relaxation, 100 sigma"};
+  begin(record);
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 0);
+  EXPECT_EQ(estimators_.jobs, 1);
+  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+  EXPECT_GE(run_->record().drift_new_m, 0.0);
+  const auto events = *store_->events(run_->record().id);
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const EventRecord& event) {
+    return event.kind == "amendment" && event.text == "accel_relaxation, 100 sigma";
+  }));
+}
+
+TEST_F(CalibrationRunTest, AmendmentThatTheGateRefusesWritesNothing) {
+  RunRecord record;
+  record.amends = 7;
+  estimators_.answer->objections = {"nothing in the catalogue explains run 7"};
+  begin(record);
+  EXPECT_EQ(end(), State::refused);
+  EXPECT_TRUE(old_set_in_force());
+  EXPECT_THAT(reason(), HasSubstr("nothing in the catalogue explains run 7"));
+}
+
+TEST_F(CalibrationRunTest, AmendmentGoesOnAfterTheDaemonWasKilled) {
+  RunRecord record;
+  record.amends = 7;
+  begin(record);
+  ASSERT_TRUE(until(State::estimating));
+  restart_daemon();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 0);
+}
+
+TEST_F(CalibrationRunTest, AmendmentOfAnotherInsEndsBeforeAnythingIsDone) {
+  RunRecord record;
+  record.amends = 7;
+  record.serial = std::string("OTHER");
+  begin(record);
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_EQ(estimators_.jobs, 0);
+  EXPECT_TRUE(old_set_in_force());
+}
+
 // One test for each state in which something can happen to the run.
 class EachState : public CalibrationRunTest, public testing::WithParamInterface<State> {
  protected:
