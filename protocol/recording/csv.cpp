@@ -164,7 +164,7 @@ Expected<void> parse_samples(std::string_view csv, const std::string& name, Reco
     if (line.empty() && csv.empty()) {
       break;
     }
-    if (const auto row = parse_row(line, *header, name, line_number, values); !row) {
+    if (auto row = parse_row(line, *header, name, line_number, values); !row) {
       return row;
     }
     append_row(values, recording);

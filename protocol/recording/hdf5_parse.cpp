@@ -16,7 +16,7 @@ namespace {
 using hdf5::Handle;
 
 // 24 h at 2000 Hz, the most that the estimator is meant for.
-constexpr hsize_t most_rows = 24 * 3600 * 2000;
+constexpr hsize_t most_rows = hsize_t{24} * 3600 * 2000;
 constexpr hsize_t most_positions = 4096;
 constexpr hsize_t most_temperature_channels = 64;
 constexpr std::size_t longest_string = 4096;

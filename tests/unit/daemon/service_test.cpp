@@ -113,6 +113,47 @@ TEST_F(ServiceTest, AReloadTakesUpTheNewAndLeavesRunsAlone) {
   ASSERT_TRUE(run("c"));
 }
 
+TEST_F(ServiceTest, OnlyTheLatestRunThatKeptARecordingIsAmended) {
+  configure("", section("a"));
+  start();
+  const auto unknown = operations().amend({5, false, "", "ann"});
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().name, operator_api::error_unknown);
+  EXPECT_EQ(unknown.error().message, "no run 5");
+  ASSERT_TRUE(run("a"));
+  const auto unended = operations().amend({1, false, "", "ann"});
+  ASSERT_FALSE(unended);
+  EXPECT_THAT(unended.error().message, HasSubstr("run 1 has not ended"));
+
+  service_.reset();
+  auto store = *RunStore::open(database_path(folder_ / "state"));
+  auto older = **store->run(1);
+  older.serial = "S1";
+  older.state = State::refused;
+  ASSERT_TRUE(store->update_run(older));
+  auto later = older;
+  later.id = *store->create_run(later);
+  later.state = State::completed;
+  later.recording = "later.h5";
+  ASSERT_TRUE(store->update_run(later));
+  store.reset();
+  start();
+  const auto none = operations().amend({1, false, "", "ann"});
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, HasSubstr("run 1 has no recording"));
+
+  older.recording = "older.h5";
+  ASSERT_TRUE((*RunStore::open(database_path(folder_ / "state")))->update_run(older));
+  const auto overtaken = operations().amend({1, false, "", "ann"});
+  ASSERT_FALSE(overtaken);
+  EXPECT_EQ(overtaken.error().name, operator_api::error_nothing);
+  EXPECT_THAT(overtaken.error().message, HasSubstr("run 2 of"));
+  const auto amendment = operations().amend({2, true, "", "ann"});
+  ASSERT_TRUE(amendment) << amendment.error().message;
+  EXPECT_EQ(operations().record("a")->amends, 2);
+  EXPECT_TRUE(operations().record("a")->dry_run);
+}
+
 TEST_F(ServiceTest, AReloadOfAFaultyFileChangesNothing) {
   configure("", section("a"));
   start();
