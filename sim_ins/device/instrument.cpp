@@ -97,7 +97,7 @@ void Instrument::power_on(double now_s) {
 }
 
 Expected<void> Instrument::set_schedule(const ins::ScheduleRecord& schedule) {
-  if (const auto sound = check_schedule(config_.gimbal, as_schedule(schedule)); !sound) {
+  if (auto sound = check_schedule(config_.gimbal, as_schedule(schedule)); !sound) {
     return sound;
   }
   schedule_ = schedule;
