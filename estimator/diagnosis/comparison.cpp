@@ -247,6 +247,7 @@ Comparison Comparer::run() {
               : d.unexplained      ? DiagnosisVerdict::none_of_the_above
                                    : DiagnosisVerdict::adequate;
   d.value = calibration_.value;
+  d.value_as_named = calibration_.value;
   d.sigma = calibration_.sigma;
   d.calibration = calibration_;
   const std::vector<Segment> first = find_segments(recording_), second = find_segments(simulation_);

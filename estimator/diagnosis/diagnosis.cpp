@@ -15,6 +15,7 @@ namespace {
 
 // The false alarms allowed are shared out: names, the map, whiteness, size of the innovations, noise and lines.
 constexpr double share_names = 0.5, share_map = 0.15, share_white = 0.1, share_size = 0.1, share_noise = 0.15;
+constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
 
@@ -47,6 +48,7 @@ Finding describe(const Chosen& chosen, double rows) {
                             chosen.constant_sigma});
   }
   f.equivalent = chosen.equivalent;
+  f.probability = chosen.probability;
   f.log_p = chosen.log_p;
   f.significance = sigma_from_log_p(chosen.log_p);
   f.delta_bic = chosen.gain - chosen.rank * std::log(rows);
@@ -231,18 +233,24 @@ void Diagnoser::decide(const Naming& naming) {
     (real ? named : d_.rejected).push_back(describe(w, naming.rows()));
   }
   std::stable_sort(named.begin(), named.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
+  // What was named must explain: it is held to more than the clean recording was.
+  if (!named.empty() && !d_.calibration.moored) {
+    d_.after.log_p_structure = naming.log_p_structure();
+    d_.after.accepted = d_.after.accepted && d_.after.log_p_structure > std::log(rejection_rate);
+  }
   // Beside an effect of hundreds of sigma the linearisation leaves a thousandth of it: not worth a verdict.
   constexpr double numerical_share = 1e-3;
   if (!named.empty() && d_.after.misfit < numerical_share * d_.before.misfit && d_.after.largest_sigma < 4.0) {
     d_.after.accepted = true;
   }
-  d_.after.accepted = d_.after.accepted && !jumps;
+  d_.after.accepted = d_.after.accepted && !jumps && !naming.entangled();
   d_.unexplained = !d_.after.accepted;
   // A name that leaves something behind is the best fitting, not the truth.
   std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;
   destination.insert(destination.end(), named.begin(), named.end());
   judge_noise(d_.calibration, d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
   d_.value = naming.value();
+  d_.value_as_named = naming.value_as_named();
   d_.covariance = naming.covariance();
   d_.sigma = d_.covariance.diagonal().cwiseSqrt();
 

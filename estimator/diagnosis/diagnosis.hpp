@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -36,6 +37,7 @@ struct Finding {
   std::string equation, excited;
   std::vector<FindingParameter> parameters;
   std::vector<std::string> equivalent; // effects that explain the recording as well
+  std::map<std::string, double> probability;   // of every effect in this one's place, all equally likely before
   std::string experiment;              // what would tell them apart
   double significance = 0.0;           // sigma, after correction for all that was tested
   double log_p = 0.0;                  // the same, natural logarithm
@@ -62,6 +64,7 @@ struct Adequacy {
   double log_p_white = 0.0;
   double largest_sigma = 0.0;          // of the map
   double misfit = 0.0;                 // sum of squares beyond the degrees of freedom
+  double log_p_structure = 0.0;        // of biases that many dwells, rotations or times share; after the fit only
   bool accepted = false;
 };
 
@@ -82,8 +85,9 @@ struct Diagnosis {
   CalibrationResult calibration;       // of the 24 alone
   std::vector<ModelEffect> model;      // equations among the findings
   double mean_temperature_c = 0.0;     // of the recording; 0 without a channel
-  ParameterVector value;               // of the 24 with the findings fitted too, SI
-  ParameterVector sigma;
+  // Of the 24, SI: mean and sigma over all explanations that the recording leaves open; and with `model` as it is.
+  ParameterVector value, sigma;
+  ParameterVector value_as_named;
   ParameterMatrix covariance;          // of value
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
@@ -22,7 +23,9 @@ const double line_log_p = std::log(1e-4);
 std::vector<Candidate> candidates_for(const RecordingContext& context, const std::vector<InnovationLine>& lines) {
   std::vector<Candidate> all;
   for (const Effect& effect : catalogue()) {
-    if (effect.needs_temperature && !context.has_temperature()) {
+    // With a channel, temperature is what it says; without, a warm-up.
+    const bool thermal = effect.id.ends_with("_temperature");
+    if (context.has_temperature() ? thermal && !effect.needs_temperature : effect.needs_temperature) {
       continue;
     }
     for (const double constant : effect.constants) {
@@ -83,10 +86,8 @@ Naming::Naming(const RecordingContext& context, PassInput input, double log_thre
 }
 
 std::vector<int> Naming::columns_of(const Candidate& c) const {
-  std::vector<int> columns;
-  for (int k = 0; k < c.count; ++k) {
-    columns.push_back(c.first + k);
-  }
+  std::vector<int> columns(static_cast<std::size_t>(c.count));
+  std::iota(columns.begin(), columns.end(), c.first);
   return columns;
 }
 
@@ -259,7 +260,8 @@ bool Naming::add_best() {
   // A walk has one coefficient, at the edge of its range (half a chi-squared), on one of six axes.
   const WalkTest* walker = nullptr;
   std::vector<WalkTest> tests;
-  for (int axis = 0; axis < 6; ++axis) {
+  tests.reserve(walk_axes);
+  for (int axis = 0; axis < walk_axes; ++axis) {
     tests.push_back(test_walk(evidence_, pass_.map(), pass_.first_map_column(), axis, others));
   }
   for (const WalkTest& test : tests) {
@@ -401,7 +403,7 @@ void Naming::run(const std::function<void(const std::string&)>& progress, const 
   sharpen_observation();
   while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
   }
-  carry_constants();
+  average();
   judge();
 }
 
@@ -459,7 +461,7 @@ Eigen::VectorXd Naming::final_residual() const {
 double Naming::log_p_white_after() const { return diagnosis::log_p_white(final_residual()); }
 
 // Truth = estimate + shift * (size - what the correction already took out).
-ParameterVector Naming::value() const {
+ParameterVector Naming::value_as_named() const {
   const PassOutput& pass = rows_.pass;
   ParameterVector value = input_.parameters + pass.mean.segment<sensor_parameter_count>(pass.layout.parameters());
   for (const Chosen& c : chosen_) {
@@ -471,14 +473,17 @@ ParameterVector Naming::value() const {
   return value;
 }
 
+ParameterVector Naming::value() const {
+  ParameterVector value = value_as_named() + averaged_;
+  for (const Chosen& c : chosen_) {
+    value -= rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+  }
+  return value;
+}
+
 ParameterMatrix Naming::covariance() const {
   const int at = rows_.pass.layout.parameters();
-  ParameterMatrix P = rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
-  if (!joint_columns_.empty()) {
-    const Eigen::MatrixXd S = rows_.shift(Eigen::all, joint_columns_);
-    P += S * joint_covariance_ * S.transpose();
-  }
-  return P;
+  return rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
 }
 
 }  // namespace selfcal::diagnosis

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ struct Chosen {
   int rank = 0;
   double held_out = 0.0;
   std::vector<std::string> equivalent;
+  std::map<std::string, double> probability;   // of every effect in this one's place, all equally likely before
 };
 
 struct Suspect {
@@ -52,8 +54,15 @@ class Naming {
   double effective_tests() const { return effective_tests_; }
   double log_p_white_before() const { return white_before_; }
   double log_p_white_after() const;
-  // The 24 with everything fitted.
+  // Two effects chosen of which the one can stand for half of the other and more: together they describe a curve, and are no
+  // explanation of it.
+  bool entangled() const;
+  // Of the biases that dwells, rotations, times since a turn and times of the recording still show, axis by axis: the
+  // smallest p, corrected. A single one is the map's; this is what many together leave.
+  double log_p_structure() const;
+  // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value() const;
+  ParameterVector value_as_named() const;
   ParameterMatrix covariance() const;
 
  private:
@@ -66,7 +75,8 @@ class Naming {
   bool drop_weak();
   bool exchange();
   void sharpen_observation();
-  void carry_constants();
+  std::vector<int> append_derivatives();
+  void average();
   void judge();
   double corrected(double log_p, const std::string& effect) const;
   Eigen::VectorXd final_residual() const;
@@ -88,8 +98,8 @@ class Naming {
   double square_before_ = 0.0, white_before_ = 0.0;
   Eigen::VectorXd applied_;            // sizes of chosen_ that the correction holds
   std::vector<int> applied_columns_;
-  std::vector<int> joint_columns_;     // of chosen_ and, behind them, of the logarithms of their constants
-  Eigen::MatrixXd joint_covariance_;
+  ParameterVector averaged_ = ParameterVector::Zero();   // what the effects shift the 24 by, mean of all explanations
+  ParameterMatrix spread_ = ParameterMatrix::Zero();     // its covariance
   Correction correction_;              // the same with the constants it was made with
 };
 

@@ -1,4 +1,4 @@
-// What is settled once the names stand: the noise of the base, and what the constants' uncertainty adds.
+// What is settled once the names stand: the noise of the base, and whether they are an explanation.
 #include <Eigen/LU>
 #include <cmath>
 
@@ -24,8 +24,8 @@ void Naming::sharpen_observation() {
   };
   double best = log_likelihood(rows_);
   bool better = false;
-  double sigma = factor * input_.noise.observation.sigma;
-  for (; sigma > least; sigma *= factor) {
+  double sigma = input_.noise.observation.sigma;
+  while ((sigma *= factor) > least) {
     PassInput trial = input_;
     trial.noise.observation.sigma = sigma;
     const double found = log_likelihood(pass_.run(trial));
@@ -41,69 +41,62 @@ void Naming::sharpen_observation() {
   }
 }
 
-// The derivative by the logarithm of a constant is one more column: sizes, constants and the 24 get their joint
-// covariance. Its prior sigma is that of the grids, a factor of e^2.
-void Naming::carry_constants() {
-  constexpr double constant_prior = 2.0, size_prior = 300.0;
-  std::vector<Candidate> around;
-  std::vector<double> step;
+bool Naming::entangled() const {
+  constexpr double half_of_it = 0.5, counts = 3.0;   // share of a signature; sigmas from which a coefficient counts
+  std::vector<std::vector<int>> groups;
   for (const Chosen& c : chosen_) {
-    if (!std::isnan(c.candidate.constant)) {
-      // A frequency may shift the phase by an eighth of a radian over the recording.
-      const double periods = c.candidate.constant * rows_.time_s.back();
-      const double h = c.candidate.effect->id == "base_sway" ? 0.02 / periods : 0.05;
-      step.push_back(h);
-      around.push_back({c.candidate.effect, c.candidate.constant * std::exp(h), 0, 0});
-      around.push_back({c.candidate.effect, c.candidate.constant * std::exp(-h), 0, 0});
-    }
+    groups.push_back(columns_of(c.candidate));
   }
-  joint_columns_ = chosen_columns();
-  const auto sizes = static_cast<Eigen::Index>(joint_columns_.size());
-  if (sizes == 0) {
-    return;
-  }
-  if (!around.empty()) {
-    SignaturePass pass(context_, around, false);
-    const SignatureRows beside = pass.run(input_);
-    const Eigen::Index first = rows_.columns.cols();
-    const auto more = static_cast<Eigen::Index>(step.size());
-    rows_.columns.conservativeResize(Eigen::NoChange, first + more);
-    rows_.shift.conservativeResize(Eigen::NoChange, first + more);
-    std::size_t k = 0;
-    for (const Chosen& c : chosen_) {
-      if (std::isnan(c.candidate.constant)) {
-        continue;
+  // What one axis's walk does not take up another's does.
+  for (const WalkTest& w : walks_) {
+    groups.emplace_back();
+    for (std::size_t k = 0; k < pass_.map().size(); ++k) {
+      const LocatedColumn& m = pass_.map()[k];
+      const bool segment = m.kind == LocatedColumn::Kind::dwell || m.kind == LocatedColumn::Kind::rotation;
+      if (segment && m.axis / 3 == w.axis / 3) {
+        groups.back().push_back(pass_.first_map_column() + static_cast<int>(k));
       }
-      const Candidate &above = pass.candidates()[2 * k], &below = pass.candidates()[2 * k + 1];
-      const Eigen::VectorXd size = c.size / (2.0 * step[k]);
-      const auto derivative = [&](const Eigen::MatrixXd& m) -> Eigen::VectorXd {
-        return m.middleCols(above.first, above.count) * size - m.middleCols(below.first, below.count) * size;
-      };
-      const Eigen::Index at = first + static_cast<Eigen::Index>(k);
-      rows_.columns.col(at) = derivative(beside.columns);
-      rows_.shift.col(at) = derivative(beside.shift);
-      joint_columns_.push_back(static_cast<int>(at));
-      ++k;
-    }
-    evidence_ = Evidence(rows_);
-    evidence_.restore(applied_columns_, applied_);
-    for (const WalkTest& walk : walks_) {
-      evidence_.absorb(walk.columns, walk.covariance);
     }
   }
-  Eigen::MatrixXd information = evidence_.information(joint_columns_, joint_columns_);
-  information.diagonal().head(sizes).array() += 1.0 / (size_prior * size_prior);
-  information.diagonal().tail(information.rows() - sizes).array() += 1.0 / (constant_prior * constant_prior);
-  joint_covariance_ = information.inverse();
-  Eigen::Index at = 0, constant = sizes;
-  for (Chosen& c : chosen_) {
-    c.covariance = joint_covariance_.block(at, at, c.candidate.count, c.candidate.count);
-    at += c.candidate.count;
-    if (!std::isnan(c.candidate.constant)) {
-      c.constant_sigma = c.candidate.constant * std::sqrt(joint_covariance_(constant, constant));
-      ++constant;
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const Eigen::VectorXd z = chosen_[i].size.cwiseQuotient(chosen_[i].covariance.diagonal().cwiseSqrt()).cwiseAbs();
+    const double least = std::min(counts, z.maxCoeff());
+    for (std::size_t j = 0; j < groups.size(); ++j) {
+      if (j == i || (j < chosen_.size() && chosen_[j].candidate.effect == chosen_[i].candidate.effect)) {
+        continue;   // lines of a sway are several of one kind
+      }
+      const Eigen::MatrixXd other = rows_.columns(Eigen::all, groups[j]);
+      const Eigen::MatrixXd G = other.transpose() * other;
+      for (Eigen::Index k = 0; k < z.size(); ++k) {
+        const Eigen::VectorXd own = rows_.columns.col(groups[i][static_cast<std::size_t>(k)]);
+        const double share = fit_columns(G, other.transpose() * own).gain / own.squaredNorm();
+        if (z(k) >= least && share > half_of_it) {
+          return true;
+        }
+      }
     }
   }
+  return false;
+}
+
+double Naming::log_p_structure() const {
+  using Kind = LocatedColumn::Kind;
+  const std::vector<int> others = chosen_columns();
+  double smallest = 0.0;
+  int tests = 0;
+  for (const Kind kind : {Kind::dwell, Kind::rotation, Kind::after_turn, Kind::time}) {
+    for (int axis = 0; axis < 6; ++axis) {
+      std::vector<int> group;
+      for (std::size_t k = 0; k < pass_.map().size(); ++k) {
+        if (pass_.map()[k].kind == kind && pass_.map()[k].axis == axis) {
+          group.push_back(pass_.first_map_column() + static_cast<int>(k));
+        }
+      }
+      smallest = std::min(smallest, test_group(evidence_, group, others).log_p);
+      ++tests;
+    }
+  }
+  return log_corrected(smallest, tests);
 }
 
 }  // namespace selfcal::diagnosis

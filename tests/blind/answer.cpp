@@ -42,7 +42,7 @@ const char* words(diagnosis::DiagnosisVerdict verdict) {
 
 ordered_json to_json(const Finding& f) {
   ordered_json j = {{"effect", f.effect}, {"class", f.equivalent}, {"stochastic", f.stochastic},
-                    {"log_p", f.log_p}, {"held_out_gain", f.held_out_gain}};
+                    {"log_p", f.log_p}, {"held_out_gain", f.held_out_gain}, {"probability", f.probability}};
   j["parameters"] = ordered_json::object();
   for (const auto& p : f.parameters) {
     j["parameters"][p.name] = {p.value, p.sigma};
@@ -51,7 +51,8 @@ ordered_json to_json(const Finding& f) {
 }
 
 ordered_json to_json(const diagnosis::Adequacy& a) {
-  return {{"accepted", a.accepted}, {"nis", a.nis}, {"log_p_white", a.log_p_white}, {"map", a.largest_sigma}};
+  return {{"accepted", a.accepted}, {"nis", a.nis}, {"log_p_white", a.log_p_white}, {"map", a.largest_sigma},
+          {"log_p_structure", a.log_p_structure}};
 }
 
 ordered_json to_json(const Diagnosis& d) {

@@ -154,7 +154,7 @@ std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& a
   text += "\n[parameters]\n";
   for (int k = 0; k < sensor_parameter_count; ++k) {
     const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
-    text += key_value(p.name, d.value(k) / p.si_per_unit);
+    text += key_value(p.name, d.value_as_named(k) / p.si_per_unit);
   }
   return text;
 }

@@ -1,0 +1,310 @@
+// The 24 and the coefficients as means over every explanation that the recording leaves open, weighted by its
+// probability: which effect, which constant, one coefficient or all of its group, and how large they may be.
+//
+// With rows = columns * size + unit noise and size ~ N(0, V) the probability of the rows is, but for a common factor,
+//   log p = (b' A^-1 b - log|A| - log|V|) / 2,   A = T'(Z'Z)T + V^-1,   b = T'Z'r,
+// and the spread between explanations goes into sigma: a direction that only one of them leaves open does not pass
+// for known, nor for unknown (Hoeting and others, Bayesian model averaging, Statistical Science 14, 1999).
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/naming.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+// Typical sizes that coefficients may have: unknown, so each is tried.
+constexpr std::array<double, 6> scales = {1.0, 3.0, 10.0, 30.0, 100.0, 300.0};
+constexpr double constant_prior = 2.0;     // sigma of a constant's logarithm: the width of the grids
+constexpr double negligible = 25.0;        // log odds below which an explanation is left out
+
+// A share of the design: columns of the rows, combined by T, sizes ~ N(0, sigma^2).
+struct Part {
+  std::vector<int> columns;
+  Eigen::MatrixXd T;
+  Eigen::VectorXd sigma;
+  double log_prior = 0.0;
+};
+
+struct Explanation {
+  double log_p = 0.0;
+  Eigen::VectorXd mean;              // sizes of the part in question, which comes first
+  Eigen::MatrixXd covariance;
+  ParameterVector shift;             // of the 24, by all parts
+  ParameterMatrix shift_covariance;
+};
+
+// Running mean and covariance of a mixture.
+template <typename Vector, typename Matrix>
+struct Mixture {
+  double weight = 0.0;
+  Vector sum;
+  Matrix square;
+  void add(double w, const Vector& mean, const Matrix& covariance) {
+    if (weight == 0.0) {
+      sum = Vector::Zero(mean.size());
+      square = Matrix::Zero(mean.size(), mean.size());
+    }
+    weight += w;
+    sum += w * mean;
+    square += w * (covariance + mean * mean.transpose());
+  }
+  Vector mean() const { return sum / weight; }
+  Matrix covariance() const { return square / weight - mean() * mean().transpose(); }
+};
+
+class Averaging {
+ public:
+  Averaging(const Evidence& evidence, const SignatureRows& rows, const std::vector<Chosen>& chosen,
+            const std::vector<int>& first_derivative)
+      : evidence_(evidence), rows_(rows), chosen_(chosen), first_derivative_(first_derivative) {}
+
+  // All coefficients of a candidate, or one of them; `derivative`: of its first coefficient by the constant, or -1.
+  static Part part(const Candidate& c, int only, double scale, int derivative, const Eigen::VectorXd& size) {
+    Part p;
+    for (int k = 0; k < c.count; ++k) {
+      if (only < 0 || only == k) {
+        p.columns.push_back(c.first + k);
+      }
+    }
+    const auto sizes = static_cast<Eigen::Index>(p.columns.size());
+    const bool constant = derivative >= 0;
+    p.T = Eigen::MatrixXd::Identity(sizes * (constant ? 2 : 1), sizes + (constant ? 1 : 0));
+    p.sigma = Eigen::VectorXd::Constant(p.T.cols(), scale);
+    if (constant) {
+      for (int k = 0; k < c.count; ++k) {
+        if (only < 0 || only == k) {
+          const auto row = static_cast<Eigen::Index>(p.columns.size());
+          p.columns.push_back(derivative + k);
+          p.T.row(row).setZero();
+          p.T(row, sizes) = size(k);
+        }
+      }
+      p.sigma(sizes) = constant_prior;
+    }
+    return p;
+  }
+
+  // Every part that a candidate can play; together they have the prior probability exp(log_prior).
+  static std::vector<Part> parts(const Candidate& c, int derivative, const Eigen::VectorXd& size, double log_prior) {
+    std::vector<Part> all;
+    for (const double scale : scales) {
+      for (int only = -1; only < (c.count > 1 ? c.count : 0); ++only) {
+        all.push_back(part(c, only, scale, derivative, size));
+        const double share = c.count == 1 ? 1.0 : only < 0 ? 0.5 : 0.5 / c.count;
+        all.back().log_prior = log_prior + std::log(share / scales.size());
+      }
+    }
+    return all;
+  }
+
+  std::vector<Part> own_parts(std::size_t i, double log_prior) const {
+    return parts(chosen_[i].candidate, first_derivative_[i], chosen_[i].size, log_prior);
+  }
+
+  // Effect by effect the most probable part, the others at theirs.
+  void settle() {
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+      current_.push_back(part(chosen_[i].candidate, -1, scales[3], first_derivative_[i], chosen_[i].size));
+    }
+    for (int sweep = 0; sweep < (chosen_.size() > 1 ? 2 : 1); ++sweep) {
+      for (std::size_t i = 0; i < chosen_.size(); ++i) {
+        double best = -HUGE_VAL;
+        for (const Part& p : own_parts(i, 0.0)) {
+          const double found = explain(i, p, false).log_p;
+          if (found > best) {
+            best = found;
+            current_[i] = p;
+          }
+        }
+      }
+    }
+  }
+
+  // `p` in the place of chosen effect i, the others as they are.
+  Explanation explain(std::size_t i, const Part& p, bool full) const {
+    std::vector<const Part*> all = {&p};
+    for (std::size_t j = 0; j < current_.size(); ++j) {
+      if (j != i) {
+        all.push_back(&current_[j]);
+      }
+    }
+    std::vector<int> columns;
+    Eigen::Index size = 0;
+    for (const Part* q : all) {
+      columns.insert(columns.end(), q->columns.begin(), q->columns.end());
+      size += q->T.cols();
+    }
+    Eigen::MatrixXd T = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), size);
+    Eigen::VectorXd sigma(size);
+    Eigen::Index row = 0, col = 0;
+    for (const Part* q : all) {
+      T.block(row, col, q->T.rows(), q->T.cols()) = q->T;
+      sigma.segment(col, q->T.cols()) = q->sigma;
+      row += q->T.rows();
+      col += q->T.cols();
+    }
+    Eigen::MatrixXd A = T.transpose() * evidence_.information(columns, columns) * T;
+    A.diagonal() += sigma.cwiseAbs2().cwiseInverse();
+    const Eigen::VectorXd b = T.transpose() * evidence_.score(columns);
+    const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+    const Eigen::VectorXd mean = solver.solve(b);
+    Explanation e;
+    e.log_p = p.log_prior + 0.5 * b.dot(mean) - 0.5 * solver.vectorD().array().log().sum() - sigma.array().log().sum();
+    if (full) {
+      const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(size, size));
+      const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns) * T;
+      e.mean = mean.head(p.T.cols());
+      e.covariance = covariance.topLeftCorner(p.T.cols(), p.T.cols());
+      e.shift = S * mean;
+      e.shift_covariance = S * covariance * S.transpose();
+    }
+    return e;
+  }
+
+  Explanation current(std::size_t i) const { return explain(i, current_[i], true); }
+
+ private:
+  const Evidence& evidence_;
+  const SignatureRows& rows_;
+  const std::vector<Chosen>& chosen_;
+  const std::vector<int>& first_derivative_;
+  std::vector<Part> current_;
+};
+
+}  // namespace
+
+// Derivatives of the chosen effects' columns by the logarithm of their constants, as further columns; where each
+// effect's begin, or -1.
+std::vector<int> Naming::append_derivatives() {
+  std::vector<Candidate> around;
+  std::vector<double> step;
+  std::vector<int> first(chosen_.size(), -1);
+  int more = 0;
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const Candidate& c = chosen_[i].candidate;
+    if (!std::isnan(c.constant)) {
+      // A frequency may shift the phase by an eighth of a radian over the recording.
+      const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
+      step.push_back(h);
+      around.push_back({c.effect, c.constant * std::exp(h), 0, 0});
+      around.push_back({c.effect, c.constant * std::exp(-h), 0, 0});
+      first[i] = static_cast<int>(rows_.columns.cols()) + more;
+      more += c.count;
+    }
+  }
+  if (around.empty()) {
+    return first;
+  }
+  SignaturePass pass(context_, around, false);
+  const SignatureRows beside = pass.run(input_);
+  const Eigen::Index at = rows_.columns.cols();
+  rows_.columns.conservativeResize(Eigen::NoChange, at + more);
+  rows_.shift.conservativeResize(Eigen::NoChange, at + more);
+  Eigen::Index to = at;
+  for (std::size_t k = 0; k < step.size(); ++k) {
+    const Candidate &above = pass.candidates()[2 * k], &below = pass.candidates()[2 * k + 1];
+    const auto derivative = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
+      return (m.middleCols(above.first, above.count) - m.middleCols(below.first, below.count)) / (2.0 * step[k]);
+    };
+    rows_.columns.middleCols(to, above.count) = derivative(beside.columns);
+    rows_.shift.middleCols(to, above.count) = derivative(beside.shift);
+    to += above.count;
+  }
+  evidence_ = Evidence(rows_);
+  evidence_.restore(applied_columns_, applied_);
+  for (const WalkTest& walk : walks_) {
+    evidence_.absorb(walk.columns, walk.covariance);
+  }
+  return first;
+}
+
+void Naming::average() {
+  averaged_.setZero();
+  spread_.setZero();
+  if (chosen_.empty()) {
+    return;
+  }
+  const std::vector<int> first_derivative = append_derivatives();
+  const std::vector<Chosen> found = chosen_;
+  Averaging averaging(evidence_, rows_, found, first_derivative);
+  averaging.settle();
+  const Explanation best = averaging.current(0);
+  averaged_ = best.shift;
+  spread_ = best.shift_covariance;
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    Chosen& c = chosen_[i];
+    struct Tried {
+      const Candidate* candidate;
+      Part part;
+      double log_p;
+    };
+    std::vector<Tried> tried;
+    const auto try_all = [&](const Candidate& candidate, const std::vector<Part>& parts) {
+      for (const Part& p : parts) {
+        tried.push_back({&candidate, p, averaging.explain(i, p, false).log_p});
+      }
+    };
+    try_all(c.candidate, averaging.own_parts(i, 0.0));
+    for (const Candidate& rival : pass_.candidates()) {
+      const bool taken = std::any_of(found.begin(), found.end(), [&](const Chosen& x) {
+        return x.candidate.effect->id == rival.effect->id;
+      });
+      if (!taken) {
+        const auto variants = static_cast<double>(rival.effect->constants.size());
+        try_all(rival, Averaging::parts(rival, -1, {}, -std::log(variants)));
+      }
+    }
+    double top = -HUGE_VAL;
+    for (const Tried& t : tried) {
+      top = std::max(top, t.log_p);
+    }
+    Mixture<ParameterVector, ParameterMatrix> all;
+    Mixture<Eigen::VectorXd, Eigen::MatrixXd> sizes, constants;
+    c.probability.clear();
+    double total = 0.0;
+    for (const Tried& t : tried) {
+      if (t.log_p < top - negligible) {
+        continue;
+      }
+      const double weight = std::exp(t.log_p - top);
+      const Explanation e = averaging.explain(i, t.part, true);
+      all.add(weight, e.shift, e.shift_covariance);
+      c.probability[t.candidate->effect->id] += weight;
+      total += weight;
+      if (t.candidate == &c.candidate) {
+        const int count = c.candidate.count;
+        const bool has_constant = first_derivative[i] >= 0;
+        const auto here = e.mean.size() - (has_constant ? 1 : 0);
+        Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
+        Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
+        const Eigen::Index at = t.part.columns.front() - c.candidate.first;
+        mean.segment(at, here) = e.mean.head(here);
+        covariance.block(at, at, here, here) = e.covariance.topLeftCorner(here, here);
+        sizes.add(weight, mean, covariance);
+        if (has_constant) {
+          constants.add(weight, e.mean.tail(1), e.covariance.bottomRightCorner(1, 1));
+        }
+      }
+    }
+    for (auto& [name, p] : c.probability) {
+      p /= total;
+    }
+    if (sizes.weight > 0.0) {
+      c.size = sizes.mean();
+      c.covariance = sizes.covariance();
+    }
+    if (constants.weight > 0.0) {
+      c.constant_sigma = c.candidate.constant * std::sqrt(constants.covariance()(0, 0));
+    }
+    averaged_ += all.mean() - best.shift;
+    const ParameterMatrix more = all.covariance() - best.shift_covariance;
+    spread_ += more;
+    for (int k = 0; k < sensor_parameter_count; ++k) {   // averaging one effect never adds certainty about the others
+      spread_(k, k) = std::max(spread_(k, k), best.shift_covariance(k, k));
+    }
+  }
+}
+
+}  // namespace selfcal::diagnosis
