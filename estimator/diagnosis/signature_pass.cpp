@@ -92,15 +92,8 @@ class RowWriter : public PassObserver {
     displace(0.0);
     s_.topRows<3>() = -at_epoch_;   // where the pass begins the position was observed too
     Phi_ = Eigen::MatrixXd::Zero(dynamic_, dynamic_);
-    int at = StateLayout::navigation_count;
-    for (const MotionModel& motion : input.noise.observation.motion) {
-      const int p = static_cast<int>(motion.coefficients.size());
-      if (p > 0) {
-        Phi_.row(at).segment(at, p) = motion.coefficients.transpose();
-        Phi_.block(at + 1, at, p - 1, p - 1).setIdentity();
-        at += p;
-      }
-    }
+    Phi_.bottomRightCorner(dynamic_ - StateLayout::navigation_count, dynamic_ - StateLayout::navigation_count) =
+        input.noise.observation.transition(input.interval_s);
   }
 
   void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override {

@@ -1,7 +1,6 @@
 #include "estimator/passes/calibration.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
@@ -21,10 +20,7 @@ constexpr double least_duration_s = 60.0;
 constexpr double first_still_sigma = 3e-6;    // m
 constexpr double first_moored_sigma = 0.2;    // m
 constexpr double least_position_sigma = 1e-6; // m: a still base stands to micrometres
-constexpr double moored_velocity = 0.2;       // m/s
-constexpr int motion_order = 12;              // up to six spectral peaks
-constexpr int most_motion_rounds = 10;
-constexpr int motion_start_up = 100;          // epochs left out of the first fit, while the filter settles
+constexpr int motion_rounds = 2;
 constexpr double fair_nis = 10.0;             // beyond it another heading is tried
 
 ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale, double accel_angle, double gyro_scale,
@@ -37,14 +33,6 @@ ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale,
   v.segment<3>(parameter::gyro_scale).setConstant(gyro_scale);
   v.segment<6>(parameter::gyro_misalignment).setConstant(gyro_angle);
   return v;
-}
-
-Vector3 axis_nis(const PassOutput& pass) {
-  Vector3 sum = Vector3::Zero();
-  for (const Epoch& e : pass.epochs) {
-    sum += e.innovation.cwiseAbs2().cwiseQuotient(e.variance);
-  }
-  return sum / static_cast<double>(pass.epochs.size());
 }
 
 // What the passes hand on to each other, and the answer so far.
@@ -71,7 +59,6 @@ class Calibration {
   bool settle(int least_passes);
   bool fit_position_sigma();
   bool fit_base_motion();
-  PassOutput observe_motion(const ObservationModel& observation) const;
   CalibrationResult result();
   ParameterVector sigma() const {
     return last_.covariance.diagonal().segment<sensor_parameter_count>(last_.layout.parameters()).cwiseSqrt();
@@ -206,54 +193,19 @@ bool Calibration::fit_position_sigma() {
   return !stop_.stop_requested();
 }
 
-// A pass that shows the motion of the base: the parameters are taken as known from the passes so far, so that the
-// filter's settling does not pass for motion. Nothing of it goes into the answer.
-PassOutput Calibration::observe_motion(const ObservationModel& observation) const {
-  PassInput trial = input_;
-  trial.sign = next_sign_;
-  trial.noise.observation = observation;
-  const int at = last_.layout.parameters();
-  trial.prior.carried = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).eval();
-  trial.prior.velocity = moored_velocity;
-  trial.prior.attitude = 3.0 * std::sqrt(last_.covariance.diagonal().segment<3>(StateLayout::attitude).maxCoeff());
-  return run_pass(trial, {}, stop_);
-}
-
-// A moored base: an autoregressive model of its motion, fitted to what is left of the position when white noise of
-// decimetres is assumed. What drives the model was judged from a series with the filter's own noise in it, so it comes
-// out too large: drawn down, axis by axis, by what the innovations say, while the likelihood grows.
+// A moored base: its motion is fitted to the drift of the navigation with the parameters found so far, and again once
+// they are better: what they leave wrong sways with the base and passes for motion.
 bool Calibration::fit_base_motion() {
-  PassOutput seen = observe_motion(input_.noise.observation);
-  if (seen.stopped) {
-    return false;
-  }
-  const auto count = static_cast<Eigen::Index>(seen.epochs.size());
-  const Eigen::Index skip = std::min<Eigen::Index>(motion_start_up, count / 4);
-  Eigen::Matrix<double, Eigen::Dynamic, 3> series(count - skip, 3);
-  for (Eigen::Index k = skip; k < count; ++k) {
-    series.row(k - skip) = seen.epochs[static_cast<std::size_t>(k)].innovation;
-  }
-  ObservationModel& best = input_.noise.observation;
-  ObservationModel trial;
-  trial.sigma = first_still_sigma;
-  trial.motion = fit_motion(series, motion_order);
-  double best_likelihood = -HUGE_VAL;
-  for (int round = 0; round < most_motion_rounds; ++round) {
-    seen = observe_motion(trial);
-    if (seen.stopped) {
+  for (int round = 0; round < motion_rounds; ++round) {
+    if (round > 0 && !pass(next_sign_)) {
       return false;
     }
-    if (seen.log_likelihood < best_likelihood + 3.0) {
-      break;
-    }
-    best = trial;
-    best_likelihood = seen.log_likelihood;
-    const Vector3 nis = axis_nis(seen);
-    for (int axis = 0; axis < 3; ++axis) {
-      trial.motion[static_cast<std::size_t>(axis)].innovation_sigma *= std::clamp(nis(axis), 0.2, 2.0);
-    }
+    PassInput trial = input_;
+    trial.sign = next_sign_;
+    input_.noise.observation =
+        fit_motion(drift_series(trial), {input_.noise.accel_vrw, input_.noise.gyro_arw, first_still_sigma});
   }
-  return true;
+  return !stop_.stop_requested();
 }
 
 CalibrationOutcome Calibration::run() {
@@ -300,7 +252,7 @@ CalibrationResult Calibration::result() {
   r.gyro_quantum = noise_.gyro.quantum;
   r.accel_quantum = noise_.accel.quantum;
   r.moored = input_.noise.observation.state_count() > 0;
-  r.consistency = judge_innovations(last_, converged_, last_move_, r.moored);
+  r.consistency = judge_innovations(last_, converged_, last_move_);
   r.segments = summarise_segments(segments_, last_);
   r.undetermined = undetermined_directions(r.covariance, options_.tolerance);
 

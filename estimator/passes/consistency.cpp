@@ -27,8 +27,7 @@ std::string format(const char* pattern, auto... values) {
 
 }  // namespace
 
-Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma,
-                              bool fitted_motion) {
+Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma) {
   Consistency c;
   const auto n = static_cast<double>(pass.epochs.size());
   c.nis_mean = pass.nis_mean;
@@ -57,7 +56,7 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
   // The noise densities are estimates, good to some per cent, so a few per cent of NIS say nothing about the model.
   constexpr double density_margin = 0.15;
   const bool nis_high = c.nis_mean > c.nis_high + density_margin;
-  const double correlation_limit = fitted_motion ? 0.15 : 0.05;
+  constexpr double correlation_limit = 0.05;
   const bool coloured = c.whiteness_p_value < 1e-3 && std::abs(c.autocorrelation) > correlation_limit;
   if (!converged) {
     c.verdict = Verdict::not_converged;

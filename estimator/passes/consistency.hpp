@@ -7,9 +7,8 @@
 
 namespace selfcal {
 
-// Innovations of the final pass. `fitted_motion`: the observation model is itself a fit to the base's motion, and
-// leaves a little correlation.
-Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma, bool fitted_motion);
+// Innovations of the final pass.
+Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma);
 
 std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segments, const PassOutput& pass);
 

@@ -1,20 +1,16 @@
-// Coloured motion of a moored base: an autoregressive model of the position residuals.
+// Fits the motion of a moored base: a few damped oscillations, of greatest likelihood.
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-
-#include "estimator/passes/pass.hpp"
+#include "estimator/passes/drift_series.hpp"
 
 namespace selfcal {
 
-// One set of coefficients for the three axes, each with its own drive: the axes see the same swell, and a line that is
-// weak in one of them is strong in another. Least squares on forward and backward prediction errors (the modified
-// covariance method; S. L. Marple, Digital Spectral Analysis, 1987, ch. 8: unlike Burg's, without bias of frequency or
-// damping on sinusoids), each axis weighted by its own prediction error. What is slower than about a minute is taken
-// out first: it is the wander of the filter that watched, not motion of the base. Poles outside the unit circle are
-// drawn back onto radius 0.99999. series: [epochs x (north, up, east)], equally spaced in time, in m; at least 4 order
-// epochs.
-std::array<MotionModel, 3> fit_motion(const Eigen::Matrix<double, Eigen::Dynamic, 3>& series, int order);
+// Frequencies and decays are shared by the three axes (they see the same swell, and a line that is weak in one of them
+// is strong in another); sizes are each axis's own, and the white noise of the position is common. Pure lines are taken
+// one at a time where the periodogram of the innovations is highest, until what is left looks like noise, at most
+// eight; then frequencies, decays and sizes are fitted together by Fisher scoring. Periods up to 60 s: what is slower is
+// left to the wander that the filter of the navigation knows. `noise.white_sigma` is where the white noise starts.
+// Equations (M1)-(M5) of estimator/README.md.
+ObservationModel fit_motion(const DriftSeries& series, const DriftNoise& noise);
 
 }  // namespace selfcal

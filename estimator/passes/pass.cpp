@@ -8,34 +8,30 @@ namespace {
 
 constexpr double history_points = 200.0;
 
-// The dynamic part of the state: navigation errors and, behind them, the motion of the base in companion form.
+// The dynamic part of the state: navigation errors and, behind them, the oscillations of the base.
 struct DynamicModel {
   MatrixX Phi, L;
   VectorX q, drive;
   std::array<VectorX, 3> h;   // observation row of each axis
 
-  DynamicModel(const ObservationModel& observation, const ProcessNoise& noise) {
+  DynamicModel(const ObservationModel& observation, double interval_s, const ProcessNoise& noise) {
     const int d = StateLayout::navigation_count + observation.state_count();
     Phi = MatrixX::Zero(d, d);
-    L = MatrixX::Zero(d, StateLayout::navigation_count + 3);   // the last three drive the motion of each axis
-    q = VectorX::Zero(L.cols());
+    L = MatrixX::Identity(d, d);   // the motion states are driven one by one
+    q = VectorX::Zero(d);
     drive = VectorX::Zero(d);
     L.topLeftCorner<9, 9>() = noise.L;
     q.head<9>() = noise.q;
+    Phi.bottomRightCorner(observation.state_count(), observation.state_count()) = observation.transition(interval_s);
     int at = StateLayout::navigation_count;
     for (int axis = 0; axis < 3; ++axis) {
-      const MotionModel& motion = observation.motion[static_cast<std::size_t>(axis)];
       VectorX& row = h[static_cast<std::size_t>(axis)];
       row = VectorX::Zero(d);
       row(StateLayout::position + axis) = 1.0;
-      const int p = static_cast<int>(motion.coefficients.size());
-      if (p > 0) {
+      for (const Oscillation& oscillation : observation.motion[static_cast<std::size_t>(axis)].oscillations) {
         row(at) = 1.0;
-        Phi.row(at).segment(at, p) = motion.coefficients.transpose();
-        Phi.block(at + 1, at, p - 1, p - 1).setIdentity();
-        L(at, StateLayout::navigation_count + axis) = 1.0;
-        q(StateLayout::navigation_count + axis) = motion.innovation_sigma * motion.innovation_sigma;
-        at += p;
+        q.segment<2>(at).setConstant(OscillationStep(oscillation, interval_s).drive_variance);
+        at += 2;
       }
     }
   }
@@ -48,9 +44,10 @@ VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
   sigma.segment<3>(StateLayout::attitude).setConstant(input.prior.attitude);
   int at = layout.observation();
   for (const MotionModel& motion : input.noise.observation.motion) {
-    const auto p = motion.coefficients.size();
-    sigma.segment(at, p).setConstant(motion.sigma);
-    at += static_cast<int>(p);
+    for (const Oscillation& oscillation : motion.oscillations) {
+      sigma.segment<2>(at).setConstant(oscillation.sigma);
+      at += 2;
+    }
   }
   sigma.tail(layout.constant_count()) = input.prior.parameter_sigma;
   return sigma;
@@ -73,14 +70,6 @@ UdFilter make_filter(const PassInput& input, const StateLayout& layout) {
 
 }  // namespace
 
-int ObservationModel::state_count() const {
-  int count = 0;
-  for (const MotionModel& m : motion) {
-    count += static_cast<int>(m.coefficients.size());
-  }
-  return count;
-}
-
 PassOutput run_pass(const PassInput& input, const PassProgress& progress, const std::stop_token& stop,
                     PassObserver* observer) {
   PassOutput out;
@@ -89,7 +78,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   const StateLayout& layout = out.layout;
   UdFilter filter = make_filter(input, layout);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra);
-  DynamicModel model(input.noise.observation,
+  DynamicModel model(input.noise.observation, input.interval_s,
                      process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s,
                                    input.sign));
   const double noise_variance = input.noise.observation.sigma * input.noise.observation.sigma / input.interval_s;

@@ -5,7 +5,6 @@
 // datum once; a sequence of passes is a Gauss-Newton iteration (estimator/README.md, "Passes").
 #pragma once
 
-#include <array>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -13,22 +12,9 @@
 
 #include "estimator/filter/ud_filter.hpp"
 #include "estimator/navigation/interval_navigator.hpp"
+#include "estimator/passes/motion_model.hpp"
 
 namespace selfcal {
-
-// Motion of the base along one axis of n, seen once per update interval: d_k = sum a_j d_{k-j} + w_k.
-struct MotionModel {
-  VectorX coefficients;              // a_1 ... a_p; empty: none
-  double innovation_sigma = 0.0;     // of w, m
-  double sigma = 0.0;                // of d, m
-};
-
-// The position of the site is observed at every update epoch as 0 = position error + motion + white noise.
-struct ObservationModel {
-  double sigma = 1e-5;                   // white, m, for a 1 s interval
-  std::array<MotionModel, 3> motion;     // north, up, east
-  int state_count() const;
-};
 
 struct NoiseModel {
   double gyro_arw = 0.0;      // rad/s/sqrt(Hz)

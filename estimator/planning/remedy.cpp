@@ -21,11 +21,14 @@ struct Turn {
 };
 
 std::vector<std::pair<GimbalPosition, GimbalPosition>> quarter_turns() {
+  const auto at = [](int outer, int inner) {
+    return GimbalPosition{static_cast<double>(outer), static_cast<double>(inner)};
+  };
   std::vector<std::pair<GimbalPosition, GimbalPosition>> turns;
   for (const int a : quarters) {
     for (const int b : {0, 90, 180}) {
-      turns.push_back({GimbalPosition(a, b), GimbalPosition(a, b + 90)});
-      turns.push_back({GimbalPosition(b, a), GimbalPosition(b + 90, a)});
+      turns.push_back({at(a, b), at(a, b + 90)});
+      turns.push_back({at(b, a), at(b + 90, a)});
     }
   }
   return turns;
@@ -98,7 +101,7 @@ Installation installation_of(const CalibrationResult& result, const earth::Posit
   installation.accel_vrw = result.accel_vrw;
   installation.position_sigma = result.position_sigma;
   for (const MotionModel& motion : result.noise.observation.motion) {   // what of a moored base cannot be foreseen
-    installation.position_sigma = std::max(installation.position_sigma, motion.innovation_sigma);
+    installation.position_sigma = std::max(installation.position_sigma, motion.unforeseen(1.0));
   }
   installation.tolerance = tolerance;
   return installation;

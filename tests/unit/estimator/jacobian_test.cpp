@@ -133,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Motions, ErrorModel,
                                            Case{"turn_back_south", -18.0, 1.0, -75.0}),
                          [](const auto& c) { return c.param.name; });
 
-// What is observed: position error plus the motion of the base, the first of each axis's motion states.
+// What is observed: position error plus the motion of the base, the displacement of the axis's oscillation.
 TEST(Measurement, IsPositionPlusMotion) {
   struct Rows : PassObserver {
     void propagated(const Interval&, const UdFilter&) override {}
@@ -151,7 +151,7 @@ TEST(Measurement, IsPositionPlusMotion) {
   input.C_nb = still.C_nb(0.0);
   input.prior.parameter_sigma = VectorX::Constant(sensor_parameter_count, 1e-3);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    input.noise.observation.motion[axis] = {VectorX::Constant(2, 0.4), 0.01, 0.02};
+    input.noise.observation.motion[axis].oscillations = {{0.6, 60.0, 0.02}};
   }
   run_pass(input, {}, {}, &seen);
   // The observation is computed position + displacement of the base; in the filter's own coordinates both are lengths
