@@ -14,12 +14,13 @@ import bench  # noqa: E402
 import case  # noqa: E402
 import witness  # noqa: E402
 
-SPEED = 40.0
+SPEED = 20.0
 # In which a run can be found; half of the kills aim at one of them, drawn evenly, so that short ones are hit as well.
 STATES = ("connecting", "unlocking", "scheduling", "starting", "rotating", "draining", "estimating", "judging",
           "checking_old", "erasing", "writing", "verifying", "committing", "resetting", "confirming", "checking_new")
 AIMED_WITHIN_S = 0.05
-RUN_S = 8.0
+RUN_S = 8.0            # about what a run takes at this speed
+KILLS_IN_A_RUN = (1, 9)   # wanted; a run may be over before
 
 
 class Trial:
@@ -31,10 +32,27 @@ class Trial:
         self.state_directory = self.unit.folder / "state"
         self.killed_in, self.ends, self.faults = collections.Counter(), collections.Counter(), []
         self.version, self.held = 0, None
+        self.log_begin = 0   # of the run, in the service's log
 
     def start(self):
         self.unit.start()
         self.version, self.held = witness.coefficients_in_force(self.unit.interface)
+
+    # --- what the service wrote, read where it is new only: reading must not cost the processor that is tried ---------
+    def log_of_this_run(self):
+        with open(self.unit.folder / "selfcald.log", encoding="utf-8", errors="replace") as file:
+            file.seek(self.log_begin)
+            return file.read()
+
+    @staticmethod
+    def ended(run, log):
+        return re.search(rf"run {run}: ({'|'.join(watch.FINAL)}): ", log)
+
+    def wait_for_end(self, run):
+        end = time.monotonic() + 600
+        while not self.ended(run, self.log_of_this_run()) and time.monotonic() < end:
+            time.sleep(0.1)
+        return self.unit.wait_for_end(run, timeout=60)
 
     # --- kills -------------------------------------------------------------------------------------------------
     def await_instant(self, run):
@@ -44,8 +62,8 @@ class Trial:
         instant = time.monotonic() + self.draw.uniform(0.0, RUN_S)
         delay = self.draw.uniform(0.0, AIMED_WITHIN_S)
         while True:
-            log = self.unit.log("selfcald")
-            if re.search(rf"run {run}: ({'|'.join(watch.FINAL)}): ", log):
+            log = self.log_of_this_run()
+            if self.ended(run, log):
                 return False
             if aimed and f"run {run}: {wanted}: " in log:
                 time.sleep(delay)
@@ -66,12 +84,13 @@ class Trial:
     # --- runs --------------------------------------------------------------------------------------------------
     def run(self, kills):
         rotations = self.rotations()
+        self.log_begin = (self.unit.folder / "selfcald.log").stat().st_size
         run = self.unit.start_run("--schedule", self.unit.folder / "short.toml",
                                   "--force", "trial of kills")
         for _ in range(kills):
             if self.await_instant(run):
                 self.kill(run)
-        document = self.unit.wait_for_end(run, timeout=180)
+        document = self.wait_for_end(run)
         self.ends[document["state"]] += 1
         complain = lambda text: self.faults.append(f"run {run}, {document['state']}: {text}")  # noqa: E731
         if document["state"] != "completed":
@@ -110,14 +129,16 @@ def main():
     parser = argparse.ArgumentParser(prog="tests/service/kill", description=__doc__)
     parser.add_argument("kills", nargs="?", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin no run after so long; counts are printed")
     options = parser.parse_args()
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="selfcal_kill.") as folder:
         trial = Trial(folder, options.seed)
         try:
             trial.start()
-            while (done := trial.killed_in.total()) < options.kills:
-                trial.run(min(options.kills - done, trial.draw.randint(1, 5)))
+            while ((done := trial.killed_in.total()) < options.kills
+                   and time.monotonic() - began < 60 * options.minutes):
+                trial.run(min(options.kills - done, trial.draw.randint(*KILLS_IN_A_RUN)))
                 print(f"{trial.killed_in.total()} of {options.kills} kills, {trial.ends.total()} runs, "
                       f"{len(trial.faults)} faults", flush=True)
         finally:
