@@ -1,6 +1,6 @@
-"""A calibration by the service for the README's pictures: a virtual INS whose accelerometers creep after each turn, which
-the 24-parameter model leaves out. Run inside tools/vcan_run and tools/private_bus; leaves run.json and the recording that
-it names in FOLDER."""
+"""A calibration by the service for the README's pictures: of a virtual INS whose accelerometers creep after each turn,
+which the 24-parameter model leaves out. Run inside tools/vcan_run and tools/private_bus; leaves run.json and the
+recording that it names in FOLDER."""
 import sys
 from pathlib import Path
 
@@ -15,7 +15,7 @@ tau_s = 45.0
 """
 
 folder = Path(sys.argv[1])
-unit = bench.Bench(folder / "bench", seed=7, sim={"serial": "SN-0007"}, sim_options=["--fd"],
+unit = bench.Bench(folder / "bench", seed=7, speed=25.0, sim={"serial": "SN-0007"}, sim_options=["--fd"],
                    ins={"fd": True, "drift_check_s": 300.0, "schedule": "horizontal"})
 (folder / "physics.toml").write_text(PHYSICS, encoding="ascii")
 unit.start_ins("--physics", folder / "physics.toml")
