@@ -13,8 +13,10 @@
 namespace selfcal::diagnosis {
 namespace {
 
-// The false alarms allowed are shared out: names, the map, whiteness, size of the innovations, noise and lines.
-constexpr double share_names = 0.5, share_map = 0.15, share_white = 0.1, share_size = 0.1, share_noise = 0.15;
+// The false alarms allowed are shared out: names, the map's single biases and those of an axis together, whiteness, size
+// of the innovations, noise and lines.
+constexpr double share_names = 0.45, share_map = 0.1, share_structure = 0.1, share_white = 0.1, share_size = 0.1,
+                 share_noise = 0.15;
 constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
@@ -233,10 +235,11 @@ void Diagnoser::decide(const Naming& naming) {
     (real ? named : d_.rejected).push_back(describe(w, naming.rows()));
   }
   std::stable_sort(named.begin(), named.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
-  // What was named must explain: it is held to more than the clean recording was.
-  if (!named.empty() && !d_.calibration.moored) {
+  // What was named must explain: it is held to more than a recording in which nothing was found.
+  if (!d_.calibration.moored) {
     d_.after.log_p_structure = naming.log_p_structure();
-    d_.after.accepted = d_.after.accepted && d_.after.log_p_structure > std::log(rejection_rate);
+    d_.after.accepted = d_.after.accepted && d_.after.log_p_structure >
+                                                 std::log(named.empty() ? share_structure * alpha : rejection_rate);
   }
   // Beside an effect of hundreds of sigma the linearisation leaves a thousandth of it: not worth a verdict.
   constexpr double numerical_share = 1e-3;
