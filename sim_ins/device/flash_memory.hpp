@@ -2,8 +2,10 @@
 // their time: what was asked for is done one after another, and where the power goes meanwhile it stays half done.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,19 +30,20 @@ struct PowerLost {};
 
 class FlashMemory {
  public:
-  // A memory of `bytes` (whole blocks), kept in the file; a new or shorter file is filled with erased bytes. With an
-  // empty path it lives in this process only.
+  // A memory of `bytes` (whole blocks), kept in the file, which ends with the last byte that was ever programmed: what is
+  // beyond is erased. With an empty path it lives in this process only.
   [[nodiscard]] static Expected<FlashMemory> open(const std::string& path, std::size_t bytes);
   FlashMemory(FlashMemory&& other) noexcept;
   FlashMemory& operator=(FlashMemory&& other) noexcept;
   ~FlashMemory();
 
-  // What the chip will hold when it has done all that was asked of it: the INS keeps in RAM what it is writing.
+  // What the chip will hold when it has done all that was asked of it: the INS keeps in RAM what it is writing. Within
+  // one block.
   std::span<const std::uint8_t> read(std::size_t offset, std::size_t count) const;
   void program(std::size_t offset, std::span<const std::uint8_t> bytes);   // new = old AND bytes, byte after byte
   void erase(std::size_t block);
   std::uint32_t erase_count(std::size_t block) const { return wear_[block]; }
-  std::size_t size() const { return bytes_.size(); }
+  std::size_t size() const { return blocks_.size() * flash_block_bytes; }
 
   // The clock, seconds on any scale that does not go back: what is done by now is done for good.
   void advance(double now_s);
@@ -66,10 +69,15 @@ class FlashMemory {
   void operate(std::size_t offset, std::span<const std::uint8_t> result, double duration_s);
   void settle(Operation& operation, std::size_t done);
   void store(std::size_t offset, std::span<const std::uint8_t> bytes);
+  void write(std::size_t offset, std::span<const std::uint8_t> bytes) const;   // to the file
 
-  std::vector<std::uint8_t> bytes_;
+  using Block = std::array<std::uint8_t, flash_block_bytes>;
+  std::uint8_t* place(std::size_t offset);   // with a block of its own behind it
+
+  std::vector<std::unique_ptr<Block>> blocks_;   // null: erased, and never written since this process began
   std::vector<std::uint32_t> wear_;          // since this process began
   int fd_ = -1;
+  std::size_t file_bytes_ = 0;
   std::optional<std::uint64_t> budget_;
   FlashTimings timings_;
   double now_s_ = 0.0;

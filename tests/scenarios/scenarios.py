@@ -1,6 +1,7 @@
 """Runs fault scenarios on a CAN interface and judges how they end. Inside tools/vcan_run and tools/private_bus."""
 import argparse
 import collections
+import json
 import math
 import re
 import shutil
@@ -27,7 +28,7 @@ class Stage:
     """The service for all seeds of one scenario; a virtual INS, new from the factory, for each seed."""
 
     def __init__(self, scenario, folder):
-        self.scenario, self.folder, self.runs = scenario, Path(folder), 0
+        self.scenario, self.folder = scenario, Path(folder)
         self.unit = bench.Bench(
             self.folder, speed=SPEED, sim={"serial": "SCEN-0000", "sample_rate_hz": 50.0},
             ins={"drift_check_s": scenario.run.get("drift_check_s", 0.0), "request_timeout_s": 0.5,
@@ -53,12 +54,17 @@ class Stage:
 
     def calibrate(self):
         force = ["--force", FORCE] if self.scenario.run.get("force", True) else []
-        command = [bench.BIN / "selfcal", "run", self.unit.name, "--schedule", self.folder / "short.toml", *force]
+        command = [bench.BIN / "selfcal", "run", self.unit.name, "--json", "--schedule", self.folder / "short.toml",
+                   *force]
         # The INS's own clock sets the limit; this is only so that nothing hangs here.
-        subprocess.run([str(word) for word in command], capture_output=True, check=False, stdin=subprocess.DEVNULL,
-                       timeout=60 + 4 * self.scenario.at_most_s / SPEED)
-        self.runs += 1
-        return self.unit.document(self.runs)
+        done = subprocess.run([str(word) for word in command], capture_output=True, check=False, text=True,
+                              stdin=subprocess.DEVNULL, timeout=60 + 4 * self.scenario.at_most_s / SPEED)
+        if not done.stdout.startswith("{"):
+            raise RuntimeError(f"selfcal run: status {done.returncode}: {done.stderr}")
+        document = json.loads(done.stdout)
+        if done.returncode != document["exit_status"]:
+            raise RuntimeError(f"selfcal run ended with {done.returncode}, its document says {document['exit_status']}")
+        return document
 
     # --- judgement ---------------------------------------------------------------------------------------------
     def judge(self, document, sim_log):

@@ -182,8 +182,12 @@ class Scene {
   }
 
   uds::Bytes coefficient_blocks() {
-    const auto bytes = unit_.flash().read(0, 3 * sim::flash_block_bytes);   // factory, A, B
-    return {bytes.begin(), bytes.end()};
+    uds::Bytes all;
+    for (std::size_t block = 0; block < 3; ++block) {   // factory, A, B
+      const auto bytes = unit_.flash().read(block * sim::flash_block_bytes, sim::flash_block_bytes);
+      all.insert(all.end(), bytes.begin(), bytes.end());
+    }
+    return all;
   }
 
   void check() {

@@ -1,6 +1,8 @@
 // The power goes at any byte that FLASH takes: the INS always comes up with one complete valid set.
 #include <gmock/gmock.h>
 
+#include <cstdio>
+
 #include "protocol/flash/page.hpp"
 #include "sim_ins/device/stores.hpp"
 #include "sim_ins/random.hpp"
@@ -156,7 +158,9 @@ TEST(PowerCut, ARunLongerThanTheRingKeepsItsNewestPages) {
     for (const std::uint64_t bytes : {std::uint64_t{100}, std::uint64_t{flash_block_bytes + 2000}}) {
       auto copy = FlashMemory::open("", flash_bytes);
       ASSERT_TRUE(copy);
-      copy->program(0, flash->read(0, flash_bytes));
+      for (std::size_t at = 0; at < flash_bytes; at += flash_block_bytes) {
+        copy->program(at, flash->read(at, flash_block_bytes));
+      }
       RawStore torn(*copy);
       torn.power_on();
       copy->lose_power_after(bytes);
@@ -204,6 +208,35 @@ TEST(PowerCut, TheClockSaysHowFarAWriteCame) {
   EXPECT_EQ(flash->read(1023, 1)[0], 0xFF);
   EXPECT_EQ(flash->read(1024, 1)[0], 0x00);
   EXPECT_FALSE(flash->busy());
+}
+
+// Another process that opens the file finds what the chip had done, and erased bytes where nothing was ever written.
+TEST(PowerCut, TheFileHoldsWhatTheChipHadDone) {
+  const std::string path = testing::TempDir() + "flash_memory_test.bin";
+  std::remove(path.c_str());
+  constexpr std::size_t bytes = 8 * flash_block_bytes;
+  {
+    auto flash = FlashMemory::open(path, bytes);
+    ASSERT_TRUE(flash);
+    flash->program(5 * flash_block_bytes, std::array<std::uint8_t, 3>{1, 2, 3});
+    flash->program(100, std::array<std::uint8_t, 2>{4, 5});
+    flash->erase(7);
+    flash->advance(1.0);
+    flash->erase(5);
+    flash->advance(1.0 + 0.045 / 4096.0 * 1.5);   // one byte of it
+  }
+  auto again = FlashMemory::open(path, bytes);
+  ASSERT_TRUE(again);
+  std::vector<std::uint8_t> expected(bytes, 0xFF);
+  expected[100] = 4;
+  expected[101] = 5;
+  expected[5 * flash_block_bytes + 1] = 2;
+  expected[5 * flash_block_bytes + 2] = 3;
+  for (std::size_t at = 0; at < bytes; at += flash_block_bytes) {
+    EXPECT_THAT(again->read(at, flash_block_bytes),
+                testing::ElementsAreArray(std::span(expected).subspan(at, flash_block_bytes)));
+  }
+  std::remove(path.c_str());
 }
 
 TEST(PowerCut, ATornPageIsNotOneOfTheRun) {
