@@ -185,7 +185,7 @@ bool Calibration::fit_position_sigma() {
   for (double s = factor * best_sigma; s < 1.0 && s > 0.9 * least_position_sigma && attempt(s); s *= factor) {
   }
   if (best_sigma > 1.5 * least_position_sigma) {
-    for (double step = std::sqrt(3.0); step > 1.2; step = std::sqrt(step)) {
+    for (const double step : {std::pow(3.0, 0.5), std::pow(3.0, 0.25)}) {
       attempt(best_sigma * step) || attempt(best_sigma / step);
     }
   }
@@ -209,7 +209,7 @@ bool Calibration::fit_base_motion() {
 }
 
 CalibrationOutcome Calibration::run() {
-  const CalibrationOutcome stopped{std::nullopt, {"stopped"}};
+  CalibrationOutcome stopped{std::nullopt, {"stopped"}};
   if (!align()) {
     return stopped;
   }

@@ -90,6 +90,7 @@ class MotionFit {
     DriftNoise noise = noise_;
     noise.white_sigma = std::exp(theta(0));
     MotionModel motion;
+    motion.oscillations.reserve(static_cast<std::size_t>(theta.size() / per_line));
     for (Eigen::Index line = 0; line < theta.size() / per_line; ++line) {
       motion.oscillations.push_back(oscillation(theta, line, axis));
     }
@@ -179,7 +180,8 @@ void MotionFit::add_line(double omega) {
 void MotionFit::choose_decay() {
   Unknowns theta = theta_;
   Innovations tried;
-  for (double decay_s = longest_decay * length_s_; decay_s > least_decay_s; decay_s *= 0.02) {
+  double decay_s = longest_decay * length_s_;
+  while (decay_s > least_decay_s) {
     for (Eigen::Index at = 1; at < theta.size(); at += per_line) {
       theta(at + 1) = std::log(decay_s);
     }
@@ -188,6 +190,7 @@ void MotionFit::choose_decay() {
       theta_ = theta;
       now_ = tried;
     }
+    decay_s *= 0.02;
   }
 }
 

@@ -26,7 +26,7 @@ struct Options {
 using Body = Expected<int> (*)(ManagerClient&, const Options&);
 
 // Connects, then does it.
-CommandRun online(std::shared_ptr<Options> options, Body body) {
+CommandRun online(const std::shared_ptr<Options>& options, Body body) {
   return [options, body]() -> Expected<int> {
     auto manager = ManagerClient::connect();
     if (!manager) return tl::unexpected(manager.error());

@@ -149,7 +149,7 @@ Expected<Json> page_of(const std::string& subject, const ReportArguments& argume
   Json document;
   std::string serial, utc;
   if (live || saved) {
-    const Expected<Json> run = live ? run_of_daemon(subject) : saved_run(subject);
+    Expected<Json> run = live ? run_of_daemon(subject) : saved_run(subject);
     if (!run) {
       return run;
     }
@@ -165,7 +165,7 @@ Expected<Json> page_of(const std::string& subject, const ReportArguments& argume
     utc = document.value("start_time_utc", std::string());
   }
   if (!arguments.past.empty() || (live && !serial.empty())) {
-    const Expected<Json> history = arguments.past.empty() ? history_of(serial) : saved_history(arguments.past);
+    Expected<Json> history = arguments.past.empty() ? history_of(serial) : saved_history(arguments.past);
     if (!history) {
       return history;
     }

@@ -16,8 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double days_per_year = 365.2425;
 constexpr double drift_sigma = 3.0;        // a slope beyond this is a drift
-constexpr double look_ahead_years = 20.0;
-constexpr double step_years = 1.0 / 52.0;
+constexpr int look_ahead_weeks = 20 * 52;
 
 std::string utc_of_year(double year) {
   return utc_text(static_cast<std::int64_t>(std::llround(year * days_per_year * 86400.0)));
@@ -25,7 +24,8 @@ std::string utc_of_year(double year) {
 
 // First time from `from` on at which |line| + sigmas * its sigma passes the limit.
 std::optional<double> crossing(const ParameterTrend& trend, double limit, double from, double sigmas) {
-  for (double year = from; year < from + look_ahead_years; year += step_years) {
+  for (int week = 0; week < look_ahead_weeks; ++week) {
+    const double year = from + week * 7.0 / days_per_year;
     if (std::abs(trend.at(year)) + sigmas * trend.sigma_at(year) > limit) {
       return year;
     }

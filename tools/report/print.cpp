@@ -49,6 +49,7 @@ class TemporaryFolder {
 // Exit status of the program, or -1 where it cannot be started. What it says is dropped.
 int run(const std::vector<std::string>& words) {
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (const std::string& word : words) {
     arguments.push_back(const_cast<char*>(word.c_str()));   // posix_spawn does not write to them
   }
