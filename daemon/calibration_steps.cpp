@@ -166,6 +166,11 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
     const std::uint64_t samples = std::uint64_t{directory->pages_expected} * format->samples_per_page;
     if (auto kept = pages_->reserve(bytes_of_a_run(samples)); !kept) co_return senseless(kept.error().message);
   }
+  if (const auto wanted = pages_->missing(directory->pages_written, 1);
+      wanted.count > 0 && wanted.first < directory->first_page) {
+    co_return senseless(fmt::format("{}: page {} is lost: the ring of the INS holds pages {} to {}", config_.interface,
+                                    wanted.first, directory->first_page, directory->pages_written - 1));
+  }
   progress_.pages_pulled = pages_->count();
   page_s_ = format->samples_per_page / format->sample_rate_hz;
   co_return Done{};

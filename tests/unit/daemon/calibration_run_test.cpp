@@ -124,6 +124,19 @@ TEST_F(CalibrationRunTest, ALinkLostForAWhileIsSurvivedInRotation) {
   EXPECT_THAT(observer_.warnings[0], HasSubstr("link lost"));
 }
 
+// A page every 5 s, of which the INS keeps the newest one only; the link is lost for longer than two.
+TEST_F(CalibrationRunTest, PagesThatTheRingLostMeanwhileAreNamed) {
+  ins_.ring = 1;
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  timers_.run_until([&] { return ins_.pages_read.size() > 5; }, 100s);
+  ins_.dead = true;
+  timers_.after(12s, [this] { ins_.dead = false; });
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), testing::MatchesRegex(".*page 6 is lost: the ring of the INS holds pages ([78]) to [78].*"));
+  EXPECT_TRUE(old_set_in_force());
+}
+
 TEST_F(CalibrationRunTest, AnInsThatLostItsPowerInRotationEndsTheRun) {
   begin();
   ASSERT_TRUE(until(State::rotating));

@@ -115,7 +115,7 @@ Answer<Bytes> FakeIns::read(std::uint16_t did) {
     case ins::did::sample_format:
       return ins::encode(ins::SampleFormatRecord{sample_rate_hz, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
     case ins::did::raw_data_directory:
-      return ins::encode(ins::DirectoryRecord{rotation_, 0, pages_written(), pages, std::uint64_t{pages_written()} * flash::samples_per_page,
+      return ins::encode(ins::DirectoryRecord{rotation_, pages_written() - std::min(pages_written(), ring), pages_written(), pages, std::uint64_t{pages_written()} * flash::samples_per_page,
                                               state() != ins::State::rotating});
     default: return no(0x31);
   }
@@ -147,6 +147,7 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
       if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) slots_.at(1 - in_force_) = *set;
       break;
     case ins::routine::navigation_check:
+      if (start && state() == ins::State::checking) return no(0x22);
       if (start) check_started_ = timers_.now();
       if (call->action == uds::RoutineAction::result) {
         const double elapsed = check_started_ ? check_elapsed() : 0.0;

@@ -37,6 +37,7 @@ class FakeIns : public InsPort {
   std::map<std::uint32_t, int> bad_pages;   // page: so many readings with a wrong CRC
   bool loses_writes = false;            // what is written is not what is read back
   bool ignores_commit = false;
+  std::uint32_t ring = pages;           // so many of the newest pages are kept
   bool gimbal_sticks = false;           // the rotation fails half-way
 
   // Sends status frames, whose clock runs `schedule_s` in a rotation; standing but for `moving` of each second.
