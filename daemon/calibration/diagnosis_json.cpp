@@ -45,7 +45,8 @@ ordered_json to_json(const Finding& f) {
   j["evidence"] = {{"delta_bic", f.delta_bic},
                    {"p_value", std::exp(f.log_p)},
                    {"log10_p", f.log_p / std::log(10.0)},
-                   {"held_out_gain", f.held_out_gain}};
+                   {"held_out_gain", f.held_out_gain},
+                   {"probability", f.probability}};
   return j;
 }
 
