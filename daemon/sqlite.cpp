@@ -8,7 +8,7 @@ namespace selfcal::sqlite {
 
 std::string failure_words(sqlite3* database) {
   if (database == nullptr) return "out of memory";
-  const std::string words = sqlite3_errmsg(database);
+  std::string words = sqlite3_errmsg(database);
   const int kind = sqlite3_errcode(database) & 0xff;   // without the extension
   const int system_error = sqlite3_system_errno(database);
   // Elsewhere the number is that of some earlier failure.
