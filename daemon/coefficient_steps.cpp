@@ -147,9 +147,12 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
   request.compensation = ins::Slot::a;   // that is: what is in force
   const auto before = co_await client_.read_state();
   if (!before) co_return tl::unexpected(before.error());
-  auto answer =
-      co_await client_.routine(uds::RoutineAction::start, ins::routine::navigation_check, ins::encode(request));
-  if (!answer) co_return tl::unexpected(answer.error());
+  // A daemon that was restarted meanwhile finds its own check going on; the INS would refuse another one.
+  if (before->state != ins::State::checking) {
+    const auto begun =
+        co_await client_.routine(uds::RoutineAction::start, ins::routine::navigation_check, ins::encode(request));
+    if (!begun) co_return tl::unexpected(begun.error());
+  }
   const SteadyTime end = context_.timers.now() + ins_time(config_.drift_check_s + drift_margin_s) + 5s;
   while (true) {
     const auto state = co_await client_.read_state();
@@ -158,7 +161,7 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
       co_return tl::unexpected<PortError>(PortError{
           PortError::Kind::link, 0, config_.interface + ": the INS restarted in the middle of its navigation check"});
     }
-    answer = co_await client_.routine(uds::RoutineAction::result, ins::routine::navigation_check, {});
+    const auto answer = co_await client_.routine(uds::RoutineAction::result, ins::routine::navigation_check, {});
     if (!answer) co_return tl::unexpected(answer.error());
     const auto drift = ins::decode_navigation_result(*answer);
     if (!drift) co_return senseless(drift.error().message);

@@ -1,6 +1,9 @@
 #include "daemon/lcm_publisher.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <lcm/lcm-cpp.hpp>
 #include <selfcal_lcm/alarm.hpp>
@@ -21,6 +24,22 @@ constexpr std::int32_t schema = 1;
 constexpr std::int32_t estimate_schema = 2;
 constexpr std::string_view software_version = SELFCAL_VERSION;
 
+// Whether the kernel knows a way to the group of udpm://GROUP:PORT?…; true for any other provider.
+bool has_route(const std::string& url) {
+  constexpr std::string_view scheme = "udpm://";
+  if (!url.starts_with(scheme)) return true;
+  const std::string group = url.substr(scheme.size(), url.find_first_of(":?", scheme.size()) - scheme.size());
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(1);   // connecting a datagram socket sends nothing
+  if (inet_pton(AF_INET, group.c_str(), &address.sin_addr) != 1) return true;
+  const int descriptor = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (descriptor < 0) return true;
+  const bool reached = connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  close(descriptor);
+  return reached;
+}
+
 }  // namespace
 
 LcmPublisher::LcmPublisher(Timers& timers, std::string url)
@@ -31,6 +50,7 @@ LcmPublisher::~LcmPublisher() = default;
 void LcmPublisher::open() {
   tried_ = true;
   tried_at_ = timers_.now();
+  if (!has_route(url_)) return;   // LCM would write a page of advice for each attempt
   lcm_ = std::make_unique<lcm::LCM>(url_);
   if (lcm_->good()) return;
   lcm_.reset();

@@ -98,7 +98,7 @@ class Bench:
         self._wait_for(lambda: self.selfcal("status", "--json", check=False).returncode == 0, self.daemon_process,
                        "selfcald")
 
-    def _wait_for(self, ready, process, name, seconds=20.0):
+    def _wait_for(self, ready, process, name, seconds=120.0):
         end = time.monotonic() + seconds
         while not ready():
             if process.poll() is not None:
