@@ -8,6 +8,7 @@ and the passes take 0.13 ms for each second of it."""
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "bench"))
@@ -39,6 +40,17 @@ def messages(log):
             yield float(stamp[1:-1]), identifier, payload[1 + (payload[0] >> 4):]
 
 
+def await_log(log, until, patience_s=120.0):
+    """Status frames come all the time: candump has told everything up to `until` once its log has one that is later."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        lines = log.read_text(encoding="ascii").splitlines()[-2:]   # the very last may be cut in two
+        if len(lines) == 2 and float(lines[0].split()[0][1:-1]) > until:
+            return
+        time.sleep(1.0)
+    raise SystemExit(f"candump is {patience_s:g} s behind the bus")
+
+
 def main():
     dwell_s = float(sys.argv[1]) if len(sys.argv) > 1 else 15.0
     with tempfile.TemporaryDirectory(prefix="selfcal_stop.") as folder:
@@ -51,6 +63,7 @@ def main():
             try:
                 run = unit.wait_for_end(unit.start_run("--schedule", schedule, "--force", "bench"),
                                         timeout=4 * dwell_s + 500)
+                await_log(log, time.time())
             finally:
                 dump.terminate()
                 dump.wait(10)
