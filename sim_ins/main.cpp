@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <csignal>
+#include <cstdio>
 #include <fstream>
 #include <iostream>
 
@@ -175,26 +176,35 @@ Expected<int> run(Arguments& a) {
   return 0;
 }
 
-}  // namespace
-}  // namespace selfcal::sim
-
-int main(int argc, char** argv) {
+int configure_and_run(int argc, char** argv) {
   CLI::App app{"A virtual INS with its own two-axis gimbal, on a CAN interface"};
-  selfcal::sim::Arguments arguments;
-  selfcal::sim::configure(app, arguments);
+  Arguments arguments;
+  configure(app, arguments);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
+    return app.exit(e) == 0 ? 0 : static_cast<int>(ErrorKind::usage);
   }
   struct sigaction action {};
-  action.sa_handler = [](int) { selfcal::sim::stop_requested = 1; };
+  action.sa_handler = [](int) { stop_requested = 1; };
   ::sigaction(SIGTERM, &action, nullptr);
   ::sigaction(SIGINT, &action, nullptr);
-  const auto status = selfcal::sim::run(arguments);
+  const auto status = run(arguments);
   if (!status) {
     fmt::print(stderr, "sim_ins: {}\n", status.error().message);
     return static_cast<int>(status.error().kind);
   }
   return *status;
+}
+
+}  // namespace
+}  // namespace selfcal::sim
+
+int main(int argc, char** argv) {
+  try {
+    return selfcal::sim::configure_and_run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "sim_ins: %s\n", error.what());   // unlike fmt::print it cannot throw
+    return static_cast<int>(selfcal::ErrorKind::internal);
+  }
 }
