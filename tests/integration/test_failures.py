@@ -33,7 +33,8 @@ class Failures(case.OnBench):
 
     def test_power_lost_in_transfer(self):
         # At 1000 Hz pages fill half the bus's time, so one is on its way at most moments.
-        unit = self.bench(sim={"sample_rate_hz": 1000.0}, speed=100.0).start()
+        # Slow enough that whoever looks now and then sees the rotation: it takes 7 s.
+        unit = self.bench(sim={"sample_rate_hz": 1000.0}, speed=10.0).start()
         run = self.rotating(unit, pages=30)
         unit.kill_ins()
         self.assert_failed(unit, run, case.DEVICE_TROUBLE, unit.interface)

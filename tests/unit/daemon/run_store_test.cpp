@@ -76,7 +76,7 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   ASSERT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
   EXPECT_EQ(sqlite3_exec(raw,
                          "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
-                         "PRAGMA user_version=1",
+                         "ALTER TABLE runs DROP COLUMN amends; PRAGMA user_version=1",
                          nullptr, nullptr, nullptr),
             SQLITE_OK);
   sqlite3_close(raw);
@@ -86,6 +86,7 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   EXPECT_EQ(found->user, "ann");
   EXPECT_FALSE(found->stop_when_met);
   EXPECT_EQ(found->early_end_s, -1.0);
+  EXPECT_EQ(found->amends, 0);
   run.stop_when_met = true;
   EXPECT_TRUE(store->run(*store->create_run(run)).value()->stop_when_met);
 }
