@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -11,7 +10,7 @@
 #include "daemon/calibration/diagnosis_json.hpp"
 #include "daemon/calibration/result_json.hpp"
 #include "daemon/estimate_job.hpp"
-#include "protocol/recording/hdf5.hpp"
+#include "estimator/passes/consistency.hpp"
 
 namespace selfcal {
 namespace {
@@ -31,15 +30,10 @@ Expected<void> keep_copy(const fs::path& from, const fs::path& to) {
 // As in the catalogue's own tests: the verdict is the diagnosis's, on what remains after the fit.
 CalibrationResult amended_result(const diagnosis::Diagnosis& diagnosis, const CalibrationOptions& options) {
   CalibrationResult result = diagnosis.calibration;
-  const ParameterVector limit = plausible_limit();
   result.value = diagnosis.value;
   result.sigma = diagnosis.sigma;
   result.covariance = diagnosis.covariance;
-  for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
-    const auto row = static_cast<Eigen::Index>(k);
-    result.determined[k] = result.sigma[row] <= options.tolerance[row];
-    result.plausible[k] = std::abs(result.value[row]) <= limit[row];
-  }
+  judge_parameters(result, options.tolerance);
   Consistency& consistency = result.consistency;
   consistency.verdict = diagnosis.after.accepted ? Verdict::consistent : Verdict::inconsistent;
   consistency.nis_mean = diagnosis.after.nis;

@@ -78,7 +78,7 @@ Expected<std::string> run_document(const RunStore& store, const RunRecord& run) 
   }
   // What the gate refused, or a dry run found, was proposed and never sent.
   sets["pushed"] = sets["read_back"].is_null() ? ordered_json() : sets["proposed"];
-  sets["in_force"] = run.state == State::completed && !run.dry_run;
+  sets["in_force"] = wrote_its_set(run);
   document["result"] = run.result_json.empty() ? ordered_json() : ordered_json::parse(run.result_json, nullptr, false);
   return document.dump();
 }

@@ -45,6 +45,9 @@ struct RunRecord {
   double early_end_s = -1.0;    // of data, where the rotation was ended before its schedule; -1: it was not
 };
 
+// Its coefficients went into force.
+inline bool wrote_its_set(const RunRecord& run) { return run.state == State::completed && !run.dry_run; }
+
 struct EventRecord {
   std::string utc;
   std::string kind;             // transition, warning, operator, ...

@@ -113,8 +113,7 @@ Granted<RunId> Service::amend(const AmendRequest& request) {
   const auto runs = store_->runs_of_serial(amended.serial);
   if (!runs) return unavailable(runs.error());
   for (const RunRecord& later : *runs) {
-    const bool written = later.id > amended.id && later.state == State::completed && !later.dry_run;
-    if (written) {
+    if (later.id > amended.id && wrote_its_set(later)) {
       return refuse(operator_api::error_nothing, fmt::format("run {} is not the latest: run {} of {} has written a set since",
                                                              amended.id, later.id, later.started_utc));
     }
@@ -136,7 +135,7 @@ Granted<RunId> Service::rollback(const std::string& serial, const std::string& r
   if (!runs) return unavailable(runs.error());
   const RunRecord* last = nullptr;
   for (const RunRecord& run : *runs) {
-    if (!serial.empty() && run.state == State::completed && !run.dry_run) last = &run;
+    if (!serial.empty() && wrote_its_set(run)) last = &run;
   }
   if (last == nullptr) {
     return refuse(operator_api::error_nothing, fmt::format("no completed calibration of \"{}\" is known", serial));

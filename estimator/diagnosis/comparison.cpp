@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
-#include <numeric>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/judgement.hpp"
@@ -35,12 +34,6 @@ std::string schedules_differ(const ImuData& a, const ImuData& b) {
     }
   }
   return {};
-}
-
-std::vector<int> columns_of(const Candidate& c) {
-  std::vector<int> columns(static_cast<std::size_t>(c.count));
-  std::iota(columns.begin(), columns.end(), c.first);
-  return columns;
 }
 
 class Comparer {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
@@ -83,12 +82,6 @@ Naming::Naming(const RecordingContext& context, PassInput input, double log_thre
       same->expected_z = std::max(same->expected_z, prospect.expected_z);
     }
   }
-}
-
-std::vector<int> Naming::columns_of(const Candidate& c) const {
-  std::vector<int> columns(static_cast<std::size_t>(c.count));
-  std::iota(columns.begin(), columns.end(), c.first);
-  return columns;
 }
 
 std::vector<int> Naming::chosen_columns(std::size_t without) const {

@@ -66,7 +66,6 @@ class Naming {
   ParameterMatrix covariance() const;
 
  private:
-  std::vector<int> columns_of(const Candidate& candidate) const;
   std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
   void refit();
   void relinearise();

@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/signature_pass.hpp"
 
 #include <array>
+#include <numeric>
 
 #include "estimator/geometry/units.hpp"
 
@@ -225,6 +226,12 @@ void SignaturePass::set_constant(int first, double constant) {
   for (Candidate& candidate : candidates_) {
     candidate.constant = candidate.first == first ? constant : candidate.constant;
   }
+}
+
+std::vector<int> columns_of(const Candidate& candidate) {
+  std::vector<int> columns(static_cast<std::size_t>(candidate.count));
+  std::iota(columns.begin(), columns.end(), candidate.first);
+  return columns;
 }
 
 SignatureRows SignaturePass::run(const PassInput& input) {

@@ -21,6 +21,8 @@ struct Candidate {
   int first = 0, count = 0;    // columns
 };
 
+std::vector<int> columns_of(const Candidate& candidate);
+
 // Where a sensor's bias is off, for the map: the columns behind those of the candidates.
 struct LocatedColumn {
   enum class Kind { dwell, rotation, after_turn, time } kind = Kind::dwell;

@@ -239,12 +239,7 @@ CalibrationResult Calibration::result() {
   r.sigma = sigma();
   const int at = last_.layout.parameters();
   r.covariance = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
-  const ParameterVector limit = plausible_limit();
-  for (int i = 0; i < sensor_parameter_count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    r.determined[k] = r.sigma(i) <= options_.tolerance(i);
-    r.plausible[k] = std::abs(r.value(i)) <= limit(i);
-  }
+  judge_parameters(r, options_.tolerance);
   r.gyro_arw = input_.noise.gyro_arw;
   r.accel_vrw = input_.noise.accel_vrw;
   r.position_sigma = input_.noise.observation.sigma;
@@ -254,7 +249,6 @@ CalibrationResult Calibration::result() {
   r.moored = input_.noise.observation.state_count() > 0;
   r.consistency = judge_innovations(last_, converged_, last_move_);
   r.segments = summarise_segments(segments_, last_);
-  r.undetermined = undetermined_directions(r.covariance, options_.tolerance);
 
   r.C_nb_start = last_.C_nb;
   r.attitude_sigma = last_.covariance.diagonal().segment<3>(StateLayout::attitude).cwiseSqrt();

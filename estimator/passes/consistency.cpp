@@ -128,4 +128,14 @@ std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix
   return found;
 }
 
+void judge_parameters(CalibrationResult& result, const ParameterVector& tolerance) {
+  const ParameterVector limit = plausible_limit();
+  for (int i = 0; i < sensor_parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    result.determined[k] = result.sigma(i) <= tolerance(i);
+    result.plausible[k] = std::abs(result.value(i)) <= limit(i);
+  }
+  result.undetermined = undetermined_directions(result.covariance, tolerance);
+}
+
 }  // namespace selfcal

@@ -16,4 +16,7 @@ std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segme
 std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix& covariance,
                                                            const ParameterVector& tolerance);
 
+// What follows from value, sigma and covariance: which parameters are determined and possible, which directions are open.
+void judge_parameters(CalibrationResult& result, const ParameterVector& tolerance);
+
 }  // namespace selfcal

@@ -32,14 +32,6 @@ std::vector<Candidate> candidates(const diagnosis::RecordingContext& context, bo
   return list;
 }
 
-std::vector<int> columns_of(const Candidate& c) {
-  std::vector<int> columns;
-  for (int k = 0; k < c.count; ++k) {
-    columns.push_back(c.first + k);
-  }
-  return columns;
-}
-
 std::vector<std::string> by_bic(const diagnosis::SignaturePass& pass, const diagnosis::Evidence& evidence) {
   std::vector<std::string> names;
   std::vector<int> taken;
