@@ -134,6 +134,7 @@ bool CalibrationRun::holds(Guard guard) const {
     case Guard::drift_check_wanted: return config_.drift_check_s > 0 && !record_.rollback;
     case Guard::new_set_in_force: return !new_set_.empty() && in_force_ == new_set_;
     case Guard::abort_pending: return record_.abort_wanted;
+    case Guard::failure_pending: return !record_.abort_wanted;
   }
   return false;
 }
@@ -181,6 +182,7 @@ Task<CalibrationRun::Step> CalibrationRun::step(Action action) {
     case Action::commit: return commit();
     case Action::reset_ins: return reset_ins();
     case Action::read_in_force: return read_in_force();
+    case Action::end_check: return end_check();
     case Action::stop_gimbal: return stop_gimbal();
     default: return recover_link();
   }

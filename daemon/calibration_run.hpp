@@ -111,6 +111,7 @@ class CalibrationRun {
   Task<Step> commit();
   Task<Step> reset_ins();
   Task<Step> read_in_force();
+  Task<Step> end_check();
   Task<Step> stop_gimbal();
   Task<Step> recover_link();
 
@@ -123,6 +124,7 @@ class CalibrationRun {
   Task<Answer<Done>> open_pages();
   Task<Answer<Done>> pull(std::uint32_t end);  // what is missing below `end`, once
   Task<Answer<Done>> bring_to_rest();
+  Task<Answer<Done>> stop_check();            // whoever began it; without one nothing is done
   Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
   void note_bad_page(std::uint32_t page, const std::string& why);
   void estimate();

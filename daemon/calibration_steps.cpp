@@ -101,6 +101,11 @@ Task<CalibrationRun::Step> CalibrationRun::identify() {
 Task<CalibrationRun::Step> CalibrationRun::unlock() {
   const auto unlocked = co_await client_.unlock(key_);
   if (!unlocked) co_return tl::unexpected(unlocked.error());
+  // This run has begun none: left by a service that is gone, or by another tester. The INS would refuse to rotate.
+  if (stock_.state == ins::State::checking) {
+    warn("the INS is in a navigation check that is not this run's: it is ended first");
+  }
+  if (auto ended = co_await stop_check(); !ended) co_return tl::unexpected(ended.error());
   co_return Event::unlocked;
 }
 

@@ -19,9 +19,18 @@ using namespace std::chrono_literals;
 constexpr double reset_limit_s = 60.0;       // of the INS's clock
 constexpr auto reset_patience = 5s;          // of ours, beyond that
 constexpr double drift_margin_s = 60.0;      // beyond the length of the drift check, of the INS's clock
+constexpr double check_stop_limit_s = 30.0;  // of the INS's clock, after it agreed to stop its check
 
 tl::unexpected<PortError> senseless(std::string message) {
   return tl::unexpected<PortError>(PortError{PortError::Kind::protocol, 0, std::move(message)});
+}
+
+// A routine that cannot be stopped ends by itself; any other refusal is a failure, or a lost session.
+bool cannot_be_stopped(const PortError& error) {
+  return error.kind == PortError::Kind::negative &&
+         (error.nrc == static_cast<std::uint8_t>(uds::Nrc::sub_function_not_supported) ||
+          error.nrc == static_cast<std::uint8_t>(uds::Nrc::request_out_of_range) ||
+          error.nrc == static_cast<std::uint8_t>(uds::Nrc::conditions_not_correct));
 }
 
 int exit_status(State state, int failure) {
@@ -179,6 +188,30 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
                      record_.drift_new_m, record_.drift_old_m));
   }
   co_return Event::drift_measured;
+}
+
+Task<Answer<Done>> CalibrationRun::stop_check() {
+  const auto state = co_await client_.read_state();
+  if (!state) co_return tl::unexpected(state.error());
+  if (state->state != ins::State::checking) co_return Done{};
+  double limit_s = check_stop_limit_s;
+  const auto stopped = co_await client_.routine(uds::RoutineAction::stop, ins::routine::navigation_check, {});
+  if (!stopped) {
+    if (!cannot_be_stopped(stopped.error())) co_return tl::unexpected(stopped.error());
+    limit_s = config_.drift_check_s + drift_margin_s;
+    warn(fmt::format("{}: the end of the navigation check is waited for, {:.0f} s of the INS's clock at most",
+                     stopped.error().message, limit_s));
+  }
+  if (auto ended = co_await await_state(ins::State::checking, limit_s, "the navigation check goes on"); !ended) {
+    co_return tl::unexpected(ended.error());
+  }
+  remember("ins", stopped ? "navigation check stopped" : "navigation check over");
+  co_return Done{};
+}
+
+Task<CalibrationRun::Step> CalibrationRun::end_check() {
+  if (auto ended = co_await stop_check(); !ended) co_return tl::unexpected(ended.error());
+  co_return Event::check_ended;
 }
 
 Task<CalibrationRun::Step> CalibrationRun::erase_inactive_slot() {

@@ -55,6 +55,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::resetting, E::link_lost, G::always, A::recover_link, S::resetting},
     {S::confirming, E::link_lost, G::always, A::recover_link, S::confirming},
     {S::checking_new, E::link_lost, G::always, A::recover_link, S::checking_new},
+    {S::ending_check, E::link_lost, G::always, A::recover_link, S::ending_check},
     {S::stopping, E::link_lost, G::always, A::recover_link, S::stopping},
 
     {S::connecting, E::recovered, G::always, A::identify, S::connecting},
@@ -80,6 +81,10 @@ constexpr auto table = std::to_array<Transition>({
     {S::resetting, E::recovered, G::always, A::reset_ins, S::resetting},
     {S::confirming, E::recovered, G::always, A::read_in_force, S::confirming},
     {S::checking_new, E::recovered, G::always, A::measure_drift_new, S::checking_new},
+    {S::ending_check, E::recovered, G::always, A::end_check, S::ending_check},
+    {S::ending_check, E::check_ended, G::failure_pending, A::conclude, S::failed},
+    {S::ending_check, E::check_ended, G::new_set_in_force, A::conclude, S::completed},
+    {S::ending_check, E::check_ended, G::always, A::conclude, S::aborted},
     {S::stopping, E::recovered, G::always, A::stop_gimbal, S::stopping},
     {S::stopping, E::gimbal_stopped, G::abort_pending, A::conclude, S::aborted},
     {S::stopping, E::gimbal_stopped, G::always, A::conclude, S::failed},
@@ -93,7 +98,8 @@ constexpr auto table = std::to_array<Transition>({
     {S::draining, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::estimating, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::judging, E::abort_requested, G::always, A::conclude, S::aborted},
-    {S::checking_old, E::abort_requested, G::always, A::conclude, S::aborted},
+    // An INS that goes on checking would refuse the next run.
+    {S::checking_old, E::abort_requested, G::always, A::end_check, S::ending_check},
     {S::erasing, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::writing, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::verifying, E::abort_requested, G::always, A::conclude, S::aborted},
@@ -101,7 +107,8 @@ constexpr auto table = std::to_array<Transition>({
     {S::committing, E::abort_requested, G::always, A::decline_abort, S::committing},
     {S::resetting, E::abort_requested, G::always, A::decline_abort, S::resetting},
     {S::confirming, E::abort_requested, G::always, A::decline_abort, S::confirming},
-    {S::checking_new, E::abort_requested, G::always, A::conclude, S::completed},
+    {S::checking_new, E::abort_requested, G::always, A::end_check, S::ending_check},
+    {S::ending_check, E::abort_requested, G::always, A::decline_abort, S::ending_check},
     {S::stopping, E::abort_requested, G::always, A::decline_abort, S::stopping},
 
     {S::connecting, E::step_failed, G::always, A::conclude, S::failed},
@@ -113,14 +120,15 @@ constexpr auto table = std::to_array<Transition>({
     {S::draining, E::step_failed, G::always, A::conclude, S::failed},
     {S::estimating, E::step_failed, G::always, A::conclude, S::failed},
     {S::judging, E::step_failed, G::always, A::conclude, S::failed},
-    {S::checking_old, E::step_failed, G::always, A::conclude, S::failed},
+    {S::checking_old, E::step_failed, G::always, A::end_check, S::ending_check},
     {S::erasing, E::step_failed, G::always, A::conclude, S::failed},
     {S::writing, E::step_failed, G::always, A::conclude, S::failed},
     {S::verifying, E::step_failed, G::always, A::conclude, S::failed},
     {S::committing, E::step_failed, G::always, A::conclude, S::failed},
     {S::resetting, E::step_failed, G::always, A::conclude, S::failed},
     {S::confirming, E::step_failed, G::always, A::conclude, S::failed},
-    {S::checking_new, E::step_failed, G::always, A::conclude, S::failed},
+    {S::checking_new, E::step_failed, G::always, A::end_check, S::ending_check},
+    {S::ending_check, E::step_failed, G::always, A::conclude, S::failed},
     {S::stopping, E::step_failed, G::always, A::conclude, S::failed},
 
     {S::connecting, E::link_gone, G::always, A::conclude, S::failed},
@@ -138,13 +146,14 @@ constexpr auto table = std::to_array<Transition>({
     {S::resetting, E::link_gone, G::always, A::conclude, S::failed},
     {S::confirming, E::link_gone, G::always, A::conclude, S::failed},
     {S::checking_new, E::link_gone, G::always, A::conclude, S::failed},
+    {S::ending_check, E::link_gone, G::always, A::conclude, S::failed},
     {S::stopping, E::link_gone, G::always, A::conclude, S::failed},
 });
 
 constexpr std::array state_names{"connecting", "unlocking",  "scheduling", "starting",   "rotating",  "ending_early", "draining",
                                  "estimating", "judging",    "checking_old", "erasing",  "writing",   "verifying",
-                                 "committing", "resetting",  "confirming", "checking_new", "stopping", "completed",
-                                 "refused",    "failed",     "aborted"};
+                                 "committing", "resetting",  "confirming", "checking_new", "ending_check", "stopping",
+                                 "completed",  "refused",    "failed",     "aborted"};
 constexpr std::array state_words{"looking for the INS",
                                  "unlocking the INS",
                                  "writing the schedule",
@@ -162,6 +171,7 @@ constexpr std::array state_words{"looking for the INS",
                                  "power-cycling the INS",
                                  "reading what is in force",
                                  "measuring the drift with the new coefficients",
+                                 "ending the navigation check of the INS",
                                  "stopping the gimbal",
                                  "completed",
                                  "refused: nothing was written",
@@ -171,21 +181,21 @@ constexpr std::array event_names{"begin",         "identified",     "unlocked", 
                                  "rotation_started", "tolerances_met", "rotation_ended", "pages_complete", "estimate_ready",
                                  "judged",        "drift_measured", "slot_erased",    "set_written",
                                  "set_verified",  "set_committed",  "ins_restarted",  "set_confirmed",
-                                 "gimbal_stopped", "link_lost",     "recovered",      "link_gone",
-                                 "step_failed",   "abort_requested"};
+                                 "gimbal_stopped", "check_ended",   "link_lost",      "recovered",
+                                 "link_gone",     "step_failed",    "abort_requested"};
 constexpr std::array guard_names{"always",       "rollback", "amendment",          "gimbal_turning",
                                  "rotation_complete", "gate_refused", "dry_run",  "drift_check_wanted", "new_set_in_force",
-                                 "abort_pending"};
+                                 "abort_pending", "failure_pending"};
 constexpr std::array action_names{
     "none",       "identify",          "unlock",        "write_schedule",      "start_rotation", "follow_rotation",
     "end_rotation_early", "pull_last_pages", "estimate",     "judge",         "measure_drift_old",   "erase_inactive_slot", "write_set",
-    "read_back",  "commit",            "reset_ins",     "read_in_force",       "measure_drift_new", "stop_gimbal",
+    "read_back",  "commit",            "reset_ins",     "read_in_force",       "measure_drift_new", "end_check", "stop_gimbal",
     "recover_link", "decline_abort",   "conclude"};
 
 static_assert(state_names.size() == static_cast<std::size_t>(State::aborted) + 1);
 static_assert(state_words.size() == state_names.size());
 static_assert(event_names.size() == static_cast<std::size_t>(Event::abort_requested) + 1);
-static_assert(guard_names.size() == static_cast<std::size_t>(Guard::abort_pending) + 1);
+static_assert(guard_names.size() == static_cast<std::size_t>(Guard::failure_pending) + 1);
 static_assert(action_names.size() == static_cast<std::size_t>(Action::conclude) + 1);
 
 }  // namespace

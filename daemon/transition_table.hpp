@@ -30,6 +30,7 @@ enum class State {
   resetting,       // power cycle
   confirming,      // read what is in force
   checking_new,    // free-inertial drift with the new set
+  ending_check,    // navigation check to be ended on the INS before the run ends
   stopping,        // gimbal to be stopped before the run ends
   completed,       // end: done (also a dry run)
   refused,         // end: the answer is no, nothing was written
@@ -56,6 +57,7 @@ enum class Event {
   ins_restarted,
   set_confirmed,
   gimbal_stopped,
+  check_ended,
   link_lost,         // no answer, or the interface went down
   recovered,         // identified and unlocked again
   link_gone,         // not recovered within the stated time
@@ -73,7 +75,8 @@ enum class Guard {
   dry_run,
   drift_check_wanted,
   new_set_in_force,      // slot in force holds this run's set
-  abort_pending,         // the gimbal is being stopped because an operator asked
+  abort_pending,         // an operator asked for this end
+  failure_pending,       // nobody asked for it: a step failed
 };
 
 enum class Action {
@@ -95,6 +98,7 @@ enum class Action {
   reset_ins,
   read_in_force,
   measure_drift_new,
+  end_check,
   stop_gimbal,
   recover_link,
   decline_abort,

@@ -60,6 +60,22 @@ class Restarts(case.OnBench):
         rotations = [e for e in document["events"] if e["text"].startswith("rotating")]
         self.assertEqual(len(rotations), 1, "never a second rotation on top of the first")
 
+    def test_an_abort_in_the_navigation_check_leaves_an_ins_that_obeys(self):
+        """The check would take minutes; the service is killed within it, then within its end, and run again at once."""
+        unit = self.bench(ins={"drift_check_s": 3600.0}).start()
+        run = unit.start_run("--schedule", unit.short, "--force", "test")
+        unit.wait_until(lambda s: s["state"] == "checking_old", "navigation check")
+        unit.kill_daemon()
+        unit.start_daemon()
+        unit.selfcal("abort", unit.name, "--reason", "test")
+        unit.kill_daemon()
+        unit.start_daemon()
+        document = unit.wait_for_end(run, timeout=60)
+        self.assertEqual(document["state"], "aborted", document)
+        self.assert_old_coefficients(unit)
+        after = unit.start_run("--schedule", unit.short, "--force", "test", "--dry-run")
+        self.assertEqual(unit.wait_for_end(after, timeout=60)["state"], "completed")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -324,6 +324,7 @@ TEST_P(EachState, AnAbortIsSafe) {
   run_->abort("test");
   const State ended = end();
   EXPECT_NE(ins_.state(), ins::State::rotating);
+  EXPECT_NE(ins_.state(), ins::State::checking);
   EXPECT_EQ(ended, committed() ? State::completed : State::aborted) << reason();
   EXPECT_EQ(ins_.in_force().version, committed() ? 1u : 0u);
 }

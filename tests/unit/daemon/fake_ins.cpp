@@ -129,6 +129,7 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
   switch (call->routine) {
     case ins::routine::self_calibration:
       if (start) {
+        if (state() == ins::State::checking) return no(0x22);
         ++starts;
         if (state() == ins::State::rotating) ++second_starts;
         turning_ = true;
@@ -142,12 +143,20 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
         resting_ = ins::State::aborted;
       }
       break;
-    case ins::routine::erase_inactive: inactive_.assign(ins::coefficients_bytes, 0xFF); break;
+    case ins::routine::erase_inactive:
+      if (state() == ins::State::checking) return no(0x22);
+      inactive_.assign(ins::coefficients_bytes, 0xFF);
+      break;
     case ins::routine::commit_coefficients:
       if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) slots_.at(1 - in_force_) = *set;
       break;
     case ins::routine::navigation_check:
       if (start && state() == ins::State::checking) return no(0x22);
+      if (call->action == uds::RoutineAction::stop) {
+        if (refuses_check_stop) return no(*refuses_check_stop);
+        ++check_stops;
+        check_started_.reset();
+      }
       if (start) check_started_ = timers_.now();
       if (call->action == uds::RoutineAction::result) {
         const double elapsed = check_started_ ? check_elapsed() : 0.0;

@@ -39,6 +39,9 @@ class FakeIns : public InsPort {
   bool ignores_commit = false;
   std::uint32_t ring = pages;           // so many of the newest pages are kept
   bool gimbal_sticks = false;           // the rotation fails half-way
+  std::optional<std::uint8_t> refuses_check_stop;   // with this NRC
+
+  void begin_check() { check_started_ = timers_.now(); }   // as another tester would
 
   // Sends status frames, whose clock runs `schedule_s` in a rotation; standing but for `moving` of each second.
   void send_status(double schedule_s);
@@ -48,11 +51,13 @@ class FakeIns : public InsPort {
   std::string serial = "FAKE-1";
   static constexpr std::uint32_t pages = 20;
   static constexpr double rotation_s = 100.0;
+  static constexpr double check_s = 30.0;
   double sample_rate_hz = 1.0;          // so that the pages hold about as many seconds as a schedule
 
   int starts = 0;                       // rotations commanded
   int second_starts = 0;                // of them, on top of one that was not over
   int stops = 0;
+  int check_stops = 0;
   std::vector<std::uint32_t> pages_read;
 
  private:
@@ -61,7 +66,6 @@ class FakeIns : public InsPort {
   Answer<Bytes> read(std::uint16_t did);
   tl::unexpected<PortError> no(std::uint8_t nrc);
   Bytes page(std::uint32_t number);
-  static constexpr double check_s = 30.0;
   double since_start() const;
   double check_elapsed() const;
 

@@ -48,6 +48,15 @@ TEST(TransitionTable, TheGimbalIsStoppedBeforeARunEnds) {
   }
 }
 
+// Likewise for a navigation check, which the INS would go on with for minutes, and refuse the next run meanwhile.
+TEST(TransitionTable, ANavigationCheckIsEndedBeforeARunEnds) {
+  for (const Transition& row : transition_table()) {
+    if (row.state != State::checking_old && row.state != State::checking_new) continue;
+    const bool over = row.event == Event::drift_measured;
+    EXPECT_EQ(is_final(row.next) && !over, row.event == Event::link_gone) << name(row.state) << " " << name(row.event);
+  }
+}
+
 // Rotation is commanded from one place only, and never upon recovery.
 TEST(TransitionTable, NoSecondRotationOnTopOfAFirst) {
   int starts = 0;
