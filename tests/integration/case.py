@@ -42,6 +42,7 @@ class OnBench(unittest.TestCase):
         self.assertEqual(len(lines), 1, text)
         for word in words:
             self.assertRegex(lines[0].lower(), word)
+        print(f"{self._testMethodName}: {lines[0]}", flush=True)
 
     def assert_old_coefficients(self, unit):
         """The factory's set, version 0, is what a virtual INS has from birth."""
