@@ -134,8 +134,9 @@ std::optional<Time> Server::next_deadline() const {
 }
 
 void Server::run_session_timer(bool run, Time now) {
-  session_until_.reset();
-  if (run) {
+  if (!run) {
+    session_until_.reset();
+  } else if (!session_until_) {   // whoever asks again and again must not wind it up
     session_until_ = now + timings_.s3;
   }
 }

@@ -49,7 +49,8 @@ class Server {
   bool responding_later() const { return later_; }
   bool idle() const { return !later_ && !transport_.sending(); }   // everything is out: a reset may happen
 
-  void run_session_timer(bool run, Time now);   // on in every session but the default one
+  // On in every session but the default one; may be told over and over, only requests renew it.
+  void run_session_timer(bool run, Time now);
   void reset();                                 // as after power-on
 
  private:
