@@ -79,13 +79,16 @@ void CalibrationRun::abort(const std::string& reason) {
   record_.abort_wanted = true;
   remember("operator", reason);
   if (record_.reason.empty()) record_.reason = reason;
-  post(Event::abort_requested);
+  // At once, so that it is stored before the operator is told: a daemon that is killed now must not forget it. What the
+  // step had to say meanwhile is dropped with the step.
+  context_.timers.cancel(event_timer_);
+  event_timer_ = 0;
+  pending_.reset();
+  fire(Event::abort_requested);
 }
 
-// Events are taken up by the loop, never from inside the step that raised them: firing one ends the step.
+// What a step raises is taken up by the loop, never from inside the step: firing an event ends it.
 void CalibrationRun::post(Event event) {
-  // An abort outranks what the step had to say; the step is broken off anyway.
-  if (pending_ && *pending_ == Event::abort_requested) return;
   pending_ = event;
   context_.timers.cancel(event_timer_);
   event_timer_ = context_.timers.after(0ns, [this] {

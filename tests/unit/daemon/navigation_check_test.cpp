@@ -64,6 +64,17 @@ TEST_P(EitherCheck, ADaemonKilledWhileEndingItEndsItAfterItsRestart) {
   EXPECT_EQ(ins_.in_force().version, version());
 }
 
+// The operator was told that the run is being aborted: the next daemon knows it too.
+TEST_P(EitherCheck, AnAbortIsKeptByADaemonThatIsKilledRightAfterIt) {
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  wait(5s);
+  run_->abort("test");
+  restart_daemon();
+  EXPECT_EQ(end(), expected()) << reason();
+  EXPECT_EQ(ins_.check_stops, 1);
+}
+
 TEST_P(EitherCheck, AnInsThatRestartsWhileItIsEndedHasNoneAnyMore) {
   begin();
   ASSERT_TRUE(until(GetParam()));
@@ -127,7 +138,7 @@ TEST_P(EitherCheck, AFailureWithinItIsTheRunsReasonAndTheNextRunEndsTheCheck) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Run, EitherCheck, testing::Values(State::checking_old, State::checking_new),
-                         [](const testing::TestParamInfo<State>& info) { return std::string(name(info.param)); });
+                         [](const auto& either) { return std::string(name(either.param)); });
 
 TEST_F(NavigationCheckTest, OneLeftByAnotherIsSaidAndEndedBeforeTheRotation) {
   ins_.begin_check();
