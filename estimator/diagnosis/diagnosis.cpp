@@ -5,8 +5,10 @@
 #include <span>
 
 #include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/dwell_lines.hpp"
 #include "estimator/diagnosis/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/diagnosis/velocity_noise.hpp"
 #include "estimator/diagnosis/walk_check.hpp"
 #include "estimator/geometry/units.hpp"
 
@@ -190,6 +192,7 @@ class Diagnoser {
   DiagnosisOutcome run();
 
  private:
+  ImuData quiet_dwells();
   void name();
   void decide(const Naming& naming);
   void say(const std::string& words) const {
@@ -202,14 +205,35 @@ class Diagnoser {
   const DiagnosisOptions& options_;
   const std::function<void(const std::string&)>& say_;
   double log_names_;
+  AngleVelocity theta_, velocity_;   // increments without the dwells' lines
+  bool beats_ = false;               // the accelerometers' quantum colours the innovations
   Diagnosis d_;
 };
 
+// White noise of the accelerometers' integral is modelled; lines that alias into the filter beside it are taken out.
+ImuData Diagnoser::quiet_dwells() {
+  PassInput input = forward_pass(data_, d_.calibration);
+  if (d_.calibration.moored || !fit_velocity_noise(input, d_.noise)) {
+    return data_;
+  }
+  theta_.assign(data_.delta_theta.begin(), data_.delta_theta.end());
+  velocity_.assign(data_.delta_v.begin(), data_.delta_v.end());
+  const std::vector<VibrationLine> lines = subtract_dwell_lines(data_, find_segments(data_), theta_, velocity_);
+  d_.noise.lines.insert(d_.noise.lines.end(), lines.begin(), lines.end());
+  ImuData quiet = data_;
+  quiet.delta_theta = theta_;
+  quiet.delta_v = velocity_;
+  return quiet;
+}
+
 void Diagnoser::name() {
-  const RecordingContext context(data_);
+  const ImuData data = quiet_dwells();
+  const RecordingContext context(data);
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
+  PassInput input = forward_pass(data, d_.calibration);
+  beats_ = fit_velocity_noise(input, d_.noise);
   say("signatures");
-  Naming naming(context, forward_pass(data_, d_.calibration), log_names_);
+  Naming naming(context, input, log_names_);
   naming.run(say_, options_.stop);
   decide(naming);
 }
@@ -219,9 +243,11 @@ void Diagnoser::decide(const Naming& naming) {
   const Map after = naming.map_after();
   d_.located = naming.map_before().places;
   d_.remaining = after.places;
-  d_.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha,
-                       d_.calibration.moored);
-  d_.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha,
+  // Beats of a quantum drift in frequency and leave a comb that no line takes out: named as quantum and lines, and no
+  // question of whiteness any more.
+  d_.before = adequacy(naming.square_before(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_before(),
+                       naming.map_before(), alpha, d_.calibration.moored);
+  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after, alpha,
                       d_.calibration.moored);
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
@@ -246,7 +272,8 @@ void Diagnoser::decide(const Naming& naming) {
   if (!named.empty() && d_.after.misfit < numerical_share * d_.before.misfit && d_.after.largest_sigma < 4.0) {
     d_.after.accepted = true;
   }
-  d_.after.accepted = d_.after.accepted && !jumps && !naming.entangled();
+  const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
+  d_.after.accepted = d_.after.accepted && !jumps && itself && !naming.entangled();
   d_.unexplained = !d_.after.accepted;
   // A name that leaves something behind is the best fitting, not the truth.
   std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;

@@ -15,6 +15,7 @@ constexpr std::size_t most_effects = 6;
 constexpr int walk_axes = 6;
 constexpr int most_relinearisations = 4;
 constexpr double converged_sigma = 0.1;
+constexpr int steps = 3;   // of a constant to either side
 // Effects whose odds against the best are better than 1:100 stay in its class.
 const double class_log_odds = std::log(100.0);
 const double line_log_p = std::log(1e-4);
@@ -175,56 +176,72 @@ void Naming::relinearise() {
   }
 }
 
+// Gain of a chosen effect with its constant `steps` steps of the logarithm to either side.
+std::vector<double> Naming::gains_around(const Chosen& chosen, double step) {
+  std::vector<Candidate> grid;
+  for (int k = -steps; k <= steps; ++k) {
+    grid.push_back({chosen.candidate.effect, chosen.candidate.constant * std::exp(k * step), 0, 0});
+  }
+  const std::size_t own = grid.size();
+  for (const Chosen& c : chosen_) {
+    if (&c != &chosen) {
+      grid.push_back(c.candidate);
+    }
+  }
+  const std::size_t applied = grid.size();   // what the recording's correction took out comes back first
+  grid.insert(grid.end(), correction_.effects.begin(), correction_.effects.end());
+  SignaturePass pass(context_, grid, false);
+  const SignatureRows rows = pass.run(input_);
+  Evidence evidence(rows);
+  const auto columns_between = [&](std::size_t from, std::size_t to) {
+    std::vector<int> all;
+    for (std::size_t i = from; i < to; ++i) {
+      const std::vector<int> columns = columns_of(pass.candidates()[i]);
+      all.insert(all.end(), columns.begin(), columns.end());
+    }
+    return all;
+  };
+  const std::vector<int> others = columns_between(own, applied);
+  if (applied < grid.size()) {
+    evidence.restore(columns_between(applied, grid.size()), correction_.size);
+  }
+  std::vector<double> gain;
+  for (std::size_t i = 0; i < own; ++i) {
+    gain.push_back(test_group(evidence, columns_of(pass.candidates()[i]), others).gain);
+  }
+  return gain;
+}
+
 // Takes the constant to the top of the likelihood: a parabola through the gain over its logarithm, on a grid that
 // closes in.
 void Naming::refine_constant(Chosen& chosen) {
   if (std::isnan(chosen.candidate.constant)) {
     return;
   }
-  constexpr int steps = 3;   // to either side
+  // The catalogue's grid may be wide: the top is followed along it, and by a factor of 2 beyond. A frequency has none.
+  const std::vector<double>& all = chosen.candidate.effect->constants;
+  const double least = all.empty() ? HUGE_VAL : 0.5 * *std::min_element(all.begin(), all.end());
+  const double most = all.empty() ? 0.0 : 2.0 * *std::max_element(all.begin(), all.end());
   // A frequency comes from a spectrum: it lies within half a bin.
   const double bin = 1.0 / (chosen.candidate.constant * rows_.time_s.back());
   const double coarse = chosen.candidate.effect->id == "base_sway" ? 0.25 * bin : 0.2;
+  constexpr int most_moves = 8;
   for (const double step : {coarse, 0.2 * coarse}) {
-    std::vector<Candidate> grid;
-    for (int k = -steps; k <= steps; ++k) {
-      grid.push_back({chosen.candidate.effect, chosen.candidate.constant * std::exp(k * step), 0, 0});
-    }
-    const std::size_t own = grid.size();
-    for (const Chosen& c : chosen_) {
-      if (&c != &chosen) {
-        grid.push_back(c.candidate);
+    for (int move = 0; move < most_moves; ++move) {
+      const std::vector<double> gain = gains_around(chosen, step);
+      const auto top = std::max_element(gain.begin(), gain.end()) - gain.begin();
+      const auto middle = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(top, 1, 2 * steps - 1));
+      const double curvature = gain[middle - 1] - 2.0 * gain[middle] + gain[middle + 1];
+      const double slope = 0.5 * (gain[middle + 1] - gain[middle - 1]);
+      const double offset = curvature < 0.0 ? std::clamp(-slope / curvature, -1.0, 1.0) : 0.0;
+      chosen.candidate.constant *= std::exp((static_cast<double>(middle) - steps + offset) * step);
+      // gain = -2 log likelihood: sigma^2 = -2 / (second derivative).
+      chosen.constant_sigma = curvature < 0.0 ? chosen.candidate.constant * step * std::sqrt(-2.0 / curvature) : 0.0;
+      const bool at_edge = top == 0 || top == 2 * steps;
+      if (!at_edge || chosen.candidate.constant < least || chosen.candidate.constant > most) {
+        break;
       }
     }
-    const std::size_t applied = grid.size();   // what the recording's correction took out comes back first
-    grid.insert(grid.end(), correction_.effects.begin(), correction_.effects.end());
-    SignaturePass pass(context_, grid, false);
-    const SignatureRows rows = pass.run(input_);
-    Evidence evidence(rows);
-    const auto columns_between = [&](std::size_t from, std::size_t to) {
-      std::vector<int> all;
-      for (std::size_t i = from; i < to; ++i) {
-        const std::vector<int> columns = columns_of(pass.candidates()[i]);
-        all.insert(all.end(), columns.begin(), columns.end());
-      }
-      return all;
-    };
-    const std::vector<int> others = columns_between(own, applied);
-    if (applied < grid.size()) {
-      evidence.restore(columns_between(applied, grid.size()), correction_.size);
-    }
-    std::vector<double> gain;
-    for (std::size_t i = 0; i < own; ++i) {
-      gain.push_back(test_group(evidence, columns_of(pass.candidates()[i]), others).gain);
-    }
-    const auto top = std::max_element(gain.begin(), gain.end()) - gain.begin();
-    const auto middle = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(top, 1, 2 * steps - 1));
-    const double curvature = gain[middle - 1] - 2.0 * gain[middle] + gain[middle + 1];
-    const double slope = 0.5 * (gain[middle + 1] - gain[middle - 1]);
-    const double offset = curvature < 0.0 ? std::clamp(-slope / curvature, -1.0, 1.0) : 0.0;
-    chosen.candidate.constant = grid[middle].constant * std::exp(offset * step);
-    // gain = -2 log likelihood: sigma^2 = -2 / (second derivative).
-    chosen.constant_sigma = curvature < 0.0 ? chosen.candidate.constant * step * std::sqrt(-2.0 / curvature) : 0.0;
   }
   pass_.set_constant(chosen.candidate.first, chosen.candidate.constant);
 }
@@ -397,6 +414,7 @@ void Naming::run(const std::function<void(const std::string&)>& progress, const 
   while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
   }
   average();
+  test_likenesses();
   judge();
 }
 

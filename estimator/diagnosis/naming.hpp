@@ -15,6 +15,7 @@ namespace selfcal::diagnosis {
 struct Chosen {
   Candidate candidate;                 // columns as in the naming's candidates
   double constant_sigma = 0.0;         // of the candidate's constant, from the curvature of the likelihood
+  int derivative = -1;                 // first column of its derivative by the constant's logarithm, once averaged
   Eigen::VectorXd size;                // fitted, in typical sizes
   Eigen::MatrixXd covariance;
   double log_p = 0.0;                  // given the others, corrected for variants and effects
@@ -60,6 +61,9 @@ class Naming {
   // Of the biases that dwells, rotations, times since a turn and times of the recording still show, axis by axis: the
   // smallest p, corrected. A single one is the map's; this is what many together leave.
   double log_p_structure() const;
+  // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts with
+  // the attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some.
+  double log_p_likeness() const { return log_p_likeness_; }
   // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value() const;
   ParameterVector value_as_named() const;
@@ -69,12 +73,16 @@ class Naming {
   std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
   void refit();
   void relinearise();
+  std::vector<double> gains_around(const Chosen& chosen, double step);
   void refine_constant(Chosen& chosen);
   bool add_best();
   bool drop_weak();
   bool exchange();
   void sharpen_observation();
-  std::vector<int> append_derivatives();
+  int append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine);
+  void append_derivatives();
+  void test_likenesses();
+  double test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside);
   void average();
   void judge();
   double corrected(double log_p, const std::string& effect) const;
@@ -99,6 +107,7 @@ class Naming {
   std::vector<int> applied_columns_;
   ParameterVector averaged_ = ParameterVector::Zero();   // what the effects shift the 24 by, mean of all explanations
   ParameterMatrix spread_ = ParameterMatrix::Zero();     // its covariance
+  double log_p_likeness_ = 0.0;
   Correction correction_;              // the same with the constants it was made with
 };
 

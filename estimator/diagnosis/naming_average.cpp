@@ -56,9 +56,14 @@ struct Mixture {
 
 class Averaging {
  public:
-  Averaging(const Evidence& evidence, const SignatureRows& rows, const std::vector<Chosen>& chosen,
-            const std::vector<int>& first_derivative)
-      : evidence_(evidence), rows_(rows), chosen_(chosen), first_derivative_(first_derivative) {}
+  Averaging(const Evidence& evidence, const SignatureRows& rows, const std::vector<Chosen>& chosen)
+      : evidence_(evidence), rows_(rows), chosen_(chosen) {}
+
+  const Chosen& chosen(std::size_t i) const { return chosen_[i]; }
+  bool names(const Effect& effect) const {
+    return std::any_of(chosen_.begin(), chosen_.end(),
+                       [&](const Chosen& x) { return x.candidate.effect->id == effect.id; });
+  }
 
   // All coefficients of a candidate, or one of them; `derivative`: of its first coefficient by the constant, or -1.
   static Part part(const Candidate& c, int only, double scale, int derivative, const Eigen::VectorXd& size) {
@@ -100,13 +105,13 @@ class Averaging {
   }
 
   std::vector<Part> own_parts(std::size_t i, double log_prior) const {
-    return parts(chosen_[i].candidate, first_derivative_[i], chosen_[i].size, log_prior);
+    return parts(chosen_[i].candidate, chosen_[i].derivative, chosen_[i].size, log_prior);
   }
 
   // Effect by effect the most probable part, the others at theirs.
   void settle() {
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
-      current_.push_back(part(chosen_[i].candidate, -1, scales[3], first_derivative_[i], chosen_[i].size));
+      current_.push_back(part(chosen_[i].candidate, -1, scales[3], chosen_[i].derivative, chosen_[i].size));
     }
     for (int sweep = 0; sweep < (chosen_.size() > 1 ? 2 : 1); ++sweep) {
       for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -169,55 +174,115 @@ class Averaging {
   const Evidence& evidence_;
   const SignatureRows& rows_;
   const std::vector<Chosen>& chosen_;
-  const std::vector<int>& first_derivative_;
   std::vector<Part> current_;
 };
 
-}  // namespace
+// A candidate's part in the place of a chosen effect.
+struct Tried {
+  const Candidate* candidate;
+  Part part;
+  double log_p;
+};
 
-// Derivatives of the chosen effects' columns by the logarithm of their constants, as further columns; where each
-// effect's begin, or -1.
-std::vector<int> Naming::append_derivatives() {
-  std::vector<Candidate> around;
-  std::vector<double> step;
-  std::vector<int> first(chosen_.size(), -1);
-  int more = 0;
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const Candidate& c = chosen_[i].candidate;
-    if (!std::isnan(c.constant)) {
-      // A frequency may shift the phase by an eighth of a radian over the recording.
-      const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
-      step.push_back(h);
-      around.push_back({c.effect, c.constant * std::exp(h), 0, 0});
-      around.push_back({c.effect, c.constant * std::exp(-h), 0, 0});
-      first[i] = static_cast<int>(rows_.columns.cols()) + more;
-      more += c.count;
+std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std::vector<Candidate>& candidates) {
+  std::vector<Tried> tried;
+  const auto with = [&](const Candidate& candidate, const std::vector<Part>& parts) {
+    for (const Part& p : parts) {
+      tried.push_back({&candidate, p, averaging.explain(i, p, false).log_p});
+    }
+  };
+  with(averaging.chosen(i).candidate, averaging.own_parts(i, 0.0));
+  for (const Candidate& rival : candidates) {
+    if (!averaging.names(*rival.effect)) {
+      const auto variants = static_cast<double>(rival.effect->constants.size());
+      with(rival, Averaging::parts(rival, -1, {}, -std::log(variants)));
     }
   }
-  if (around.empty()) {
-    return first;
+  return tried;
+}
+
+// What the explanations in the place of one chosen effect say together.
+struct PlaceAverage {
+  Mixture<ParameterVector, ParameterMatrix> shift;        // of the 24, by all effects
+  Mixture<Eigen::VectorXd, Eigen::MatrixXd> sizes, constants;   // of the effect itself
+  std::map<std::string, double> probability;
+
+  // Sizes of the coefficients that the part leaves out are zero.
+  void add_own(double weight, const Explanation& e, const Part& part, const Chosen& own) {
+    const int count = own.candidate.count;
+    const bool has_constant = own.derivative >= 0;
+    const auto here = e.mean.size() - (has_constant ? 1 : 0);
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
+    const Eigen::Index at = part.columns.front() - own.candidate.first;
+    mean.segment(at, here) = e.mean.head(here);
+    covariance.block(at, at, here, here) = e.covariance.topLeftCorner(here, here);
+    sizes.add(weight, mean, covariance);
+    if (has_constant) {
+      constants.add(weight, e.mean.tail(1), e.covariance.bottomRightCorner(1, 1));
+    }
   }
-  SignaturePass pass(context_, around, false);
+};
+
+PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std::vector<Candidate>& candidates) {
+  const std::vector<Tried> tried = try_all(averaging, i, candidates);
+  double top = -HUGE_VAL;
+  for (const Tried& t : tried) {
+    top = std::max(top, t.log_p);
+  }
+  PlaceAverage place;
+  for (const Tried& t : tried) {
+    if (t.log_p < top - negligible) {
+      continue;
+    }
+    const double weight = std::exp(t.log_p - top);
+    const Explanation e = averaging.explain(i, t.part, true);
+    place.shift.add(weight, e.shift, e.shift_covariance);
+    place.probability[t.candidate->effect->id] += weight;
+    if (t.candidate == &averaging.chosen(i).candidate) {
+      place.add_own(weight, e, t.part, averaging.chosen(i));
+    }
+  }
+  for (auto& [name, p] : place.probability) {
+    p /= place.shift.weight;
+  }
+  return place;
+}
+
+}  // namespace
+
+// Further columns beside those of the rows: those of `more` combined by `combine` (one row each of what is appended).
+// Returns where they begin.
+int Naming::append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine) {
+  SignaturePass pass(context_, more, false);
   const SignatureRows beside = pass.run(input_);
   const Eigen::Index at = rows_.columns.cols();
-  rows_.columns.conservativeResize(Eigen::NoChange, at + more);
-  rows_.shift.conservativeResize(Eigen::NoChange, at + more);
-  Eigen::Index to = at;
-  for (std::size_t k = 0; k < step.size(); ++k) {
-    const Candidate &above = pass.candidates()[2 * k], &below = pass.candidates()[2 * k + 1];
-    const auto derivative = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
-      return (m.middleCols(above.first, above.count) - m.middleCols(below.first, below.count)) / (2.0 * step[k]);
-    };
-    rows_.columns.middleCols(to, above.count) = derivative(beside.columns);
-    rows_.shift.middleCols(to, above.count) = derivative(beside.shift);
-    to += above.count;
-  }
+  rows_.columns.conservativeResize(Eigen::NoChange, at + combine.rows());
+  rows_.shift.conservativeResize(Eigen::NoChange, at + combine.rows());
+  rows_.columns.rightCols(combine.rows()) = beside.columns * combine.transpose();
+  rows_.shift.rightCols(combine.rows()) = beside.shift * combine.transpose();
   evidence_ = Evidence(rows_);
   evidence_.restore(applied_columns_, applied_);
   for (const WalkTest& walk : walks_) {
     evidence_.absorb(walk.columns, walk.covariance);
   }
-  return first;
+  return static_cast<int>(at);
+}
+
+// Derivatives of the chosen effects' columns by the logarithm of their constants, as further columns.
+void Naming::append_derivatives() {
+  for (Chosen& chosen : chosen_) {
+    const Candidate& c = chosen.candidate;
+    if (std::isnan(c.constant)) {
+      continue;
+    }
+    // A frequency may shift the phase by an eighth of a radian over the recording.
+    const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
+    Eigen::MatrixXd difference(c.count, 2 * c.count);
+    difference << Eigen::MatrixXd::Identity(c.count, c.count), -Eigen::MatrixXd::Identity(c.count, c.count);
+    chosen.derivative = append_columns({{c.effect, c.constant * std::exp(h), 0, 0}, {c.effect, c.constant * std::exp(-h), 0, 0}},
+                                       difference / (2.0 * h));
+  }
 }
 
 void Naming::average() {
@@ -226,81 +291,26 @@ void Naming::average() {
   if (chosen_.empty()) {
     return;
   }
-  const std::vector<int> first_derivative = append_derivatives();
+  append_derivatives();
   const std::vector<Chosen> found = chosen_;
-  Averaging averaging(evidence_, rows_, found, first_derivative);
+  Averaging averaging(evidence_, rows_, found);
   averaging.settle();
   const Explanation best = averaging.current(0);
   averaged_ = best.shift;
   spread_ = best.shift_covariance;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const PlaceAverage place = average_place(averaging, i, pass_.candidates());
     Chosen& c = chosen_[i];
-    struct Tried {
-      const Candidate* candidate;
-      Part part;
-      double log_p;
-    };
-    std::vector<Tried> tried;
-    const auto try_all = [&](const Candidate& candidate, const std::vector<Part>& parts) {
-      for (const Part& p : parts) {
-        tried.push_back({&candidate, p, averaging.explain(i, p, false).log_p});
-      }
-    };
-    try_all(c.candidate, averaging.own_parts(i, 0.0));
-    for (const Candidate& rival : pass_.candidates()) {
-      const bool taken = std::any_of(found.begin(), found.end(), [&](const Chosen& x) {
-        return x.candidate.effect->id == rival.effect->id;
-      });
-      if (!taken) {
-        const auto variants = static_cast<double>(rival.effect->constants.size());
-        try_all(rival, Averaging::parts(rival, -1, {}, -std::log(variants)));
-      }
+    c.probability = place.probability;
+    if (place.sizes.weight > 0.0) {
+      c.size = place.sizes.mean();
+      c.covariance = place.sizes.covariance();
     }
-    double top = -HUGE_VAL;
-    for (const Tried& t : tried) {
-      top = std::max(top, t.log_p);
+    if (place.constants.weight > 0.0) {
+      c.constant_sigma = c.candidate.constant * std::sqrt(place.constants.covariance()(0, 0));
     }
-    Mixture<ParameterVector, ParameterMatrix> all;
-    Mixture<Eigen::VectorXd, Eigen::MatrixXd> sizes, constants;
-    c.probability.clear();
-    double total = 0.0;
-    for (const Tried& t : tried) {
-      if (t.log_p < top - negligible) {
-        continue;
-      }
-      const double weight = std::exp(t.log_p - top);
-      const Explanation e = averaging.explain(i, t.part, true);
-      all.add(weight, e.shift, e.shift_covariance);
-      c.probability[t.candidate->effect->id] += weight;
-      total += weight;
-      if (t.candidate == &c.candidate) {
-        const int count = c.candidate.count;
-        const bool has_constant = first_derivative[i] >= 0;
-        const auto here = e.mean.size() - (has_constant ? 1 : 0);
-        Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
-        Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
-        const Eigen::Index at = t.part.columns.front() - c.candidate.first;
-        mean.segment(at, here) = e.mean.head(here);
-        covariance.block(at, at, here, here) = e.covariance.topLeftCorner(here, here);
-        sizes.add(weight, mean, covariance);
-        if (has_constant) {
-          constants.add(weight, e.mean.tail(1), e.covariance.bottomRightCorner(1, 1));
-        }
-      }
-    }
-    for (auto& [name, p] : c.probability) {
-      p /= total;
-    }
-    if (sizes.weight > 0.0) {
-      c.size = sizes.mean();
-      c.covariance = sizes.covariance();
-    }
-    if (constants.weight > 0.0) {
-      c.constant_sigma = c.candidate.constant * std::sqrt(constants.covariance()(0, 0));
-    }
-    averaged_ += all.mean() - best.shift;
-    const ParameterMatrix more = all.covariance() - best.shift_covariance;
-    spread_ += more;
+    averaged_ += place.shift.mean() - best.shift;
+    spread_ += place.shift.covariance() - best.shift_covariance;
     for (int k = 0; k < sensor_parameter_count; ++k) {   // averaging one effect never adds certainty about the others
       spread_(k, k) = std::max(spread_(k, k), best.shift_covariance(k, k));
     }

@@ -1,10 +1,49 @@
 // What is settled once the names stand: the noise of the base, and whether they are an explanation.
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
+#include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/naming.hpp"
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
+namespace {
+
+// Warm-ups on the axes of an effect that is a drift in time or follows temperature; null for others.
+const Effect* slow_curves_of(const Effect& effect) {
+  const std::string id = effect.id == "gyro_drift_ramp"   ? "gyro_temperature"
+                         : effect.id == "accel_bias_ramp" ? "accel_temperature"
+                                                          : effect.id;
+  const std::vector<Effect>& all = catalogue();
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Effect& e) {
+    return e.id == id && id.ends_with("_temperature") && !e.needs_temperature;
+  });
+  return found == all.end() ? nullptr : &*found;
+}
+
+// Gyro drift with sine and cosine of either gimbal angle: no member of the catalogue, for it is no physics.
+void gimbal_columns(const EffectContext& c, double /*constant*/, Columns /*velocity*/, Columns angle) {
+  const std::array<double, 4> functions = {std::sin(c.outer), std::cos(c.outer), std::sin(c.inner), std::cos(c.inner)};
+  for (std::size_t k = 0; k < functions.size(); ++k) {
+    add_axes(angle.middleCols<3>(static_cast<Eigen::Index>(3 * k)), Vector3::Constant(functions[k] * c.dt));
+  }
+}
+
+const Effect& gimbal_functions() {
+  static const Effect effect = [] {
+    Effect e;
+    for (int k = 0; k < 4; ++k) {
+      const std::vector<EffectParameter> axes = axis_parameters("deg/h", units::degree_per_hour, 0.01);
+      e.parameters.insert(e.parameters.end(), axes.begin(), axes.end());
+    }
+    e.sensor = gimbal_columns;
+    return e;
+  }();
+  return effect;
+}
+
+}  // namespace
 
 // The calibration took part of what was left out for motion of the base. With the effects fitted its white noise is
 // the one of the greatest likelihood, down to a micrometre, by factors of 3.
@@ -77,6 +116,61 @@ bool Naming::entangled() const {
     }
   }
   return false;
+}
+
+// Of columns on the axes of a chosen effect, one by one, given all that is chosen and its constants: the smallest p,
+// corrected for `tests_per_axis` independent ones.
+double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside) {
+  constexpr double counts = 3.0;            // sigmas from which a coefficient counts
+  constexpr double tests_per_axis = 3.0;    // four functions of the gimbal angles; warm-ups are alike: two
+  std::vector<int> others = chosen_columns();
+  for (const Chosen& c : chosen_) {
+    for (int k = 0; c.derivative >= 0 && k < c.candidate.count; ++k) {
+      others.push_back(c.derivative + k);
+    }
+  }
+  std::array<bool, 3> concerned{};
+  const Eigen::VectorXd z = chosen.size.cwiseQuotient(chosen.covariance.diagonal().cwiseSqrt()).cwiseAbs();
+  for (Eigen::Index k = 0; k < z.size(); ++k) {
+    const Eigen::Index axis = z.size() > 3 ? k / 3 : k;   // a matrix row by row
+    concerned[static_cast<std::size_t>(axis)] |= z(k) >= std::min(counts, z.maxCoeff());
+  }
+  Eigen::Index all = 0;
+  for (const Candidate& c : beside) {
+    all += static_cast<Eigen::Index>(c.effect->parameters.size());
+  }
+  const int first = append_columns(beside, Eigen::MatrixXd::Identity(all, all));
+  double smallest = 0.0;
+  for (int column = 0; column < static_cast<int>(all); ++column) {   // axis by axis in threes
+    if (concerned[static_cast<std::size_t>(column % 3)]) {
+      smallest = std::min(smallest, test_group(evidence_, {first + column}, others).log_p);
+    }
+  }
+  const auto axes = std::count(concerned.begin(), concerned.end(), true);
+  return log_corrected(smallest, tests_per_axis * static_cast<double>(axes));
+}
+
+// A drift that is named after one curve in time must not need a second, one named after gravity, field or rate no function
+// of the gimbal angles beside it: over tens of minutes and eighteen positions much looks alike, and a test of everything
+// that may be left has little power against what is likely.
+void Naming::test_likenesses() {
+  log_p_likeness_ = 0.0;
+  const bool gimbal = !context_.data().gimbal_outer.empty() && !context_.data().gimbal_inner.empty();
+  const std::vector<Chosen> named = chosen_;
+  for (const Chosen& c : named) {
+    const std::string& id = c.candidate.effect->id;
+    std::vector<Candidate> beside;
+    if (const Effect* warm_up = slow_curves_of(*c.candidate.effect)) {
+      for (const double constant : warm_up->constants) {
+        beside.push_back({warm_up, constant, 0, 0});
+      }
+    } else if (gimbal && (id == "gyro_g_sensitivity" || id == "gyro_magnetic_sensitivity" || id == "gyro_dead_zone")) {
+      beside.push_back({&gimbal_functions(), NAN, 0, 0});
+    }
+    if (!beside.empty()) {
+      log_p_likeness_ = std::min(log_p_likeness_, test_leftover(c, beside));
+    }
+  }
 }
 
 double Naming::log_p_structure() const {

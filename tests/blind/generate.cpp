@@ -43,6 +43,12 @@ ordered_json to_json(const blind::ConcealedEffect& e) {
     j["shift"] = listed(e.response.shift);
     j["sigma_24"] = listed(e.response.sigma);
   }
+  if (e.unlike_sigmas >= 0.0) {
+    j["unlike_sigmas"] = e.unlike_sigmas;
+  }
+  if (e.augmented_sigma(0) > 0.0) {
+    j["augmented_sigma_24"] = listed(e.augmented_sigma);
+  }
   return j;
 }
 

@@ -133,4 +133,47 @@ sim::PhysicsEffect scaled(const Kind& kind, const sim::PhysicsEffect& effect, do
   return result;
 }
 
+void set_reference_temperature(sim::PhysicsEffect& effect, double celsius) {
+  const EffectDescription& d = description(effect.id);
+  for (std::size_t k = 0; k < d.parameters.size(); ++k) {
+    if (d.parameters[k].name == "reference_c") {
+      effect.values[k] = celsius;
+    }
+  }
+}
+
+std::vector<Column> columns_of(const Kind& kind, const sim::SimConfig& config, const sim::PhysicsEffect& effect,
+                               double size) {
+  const EffectDescription& d = description(kind.id);
+  const Names& names = components(kind, config);
+  const double typical = &names == &kind.components ? kind.typical : kind.typical_without_temperature;
+  std::vector<Column> columns;
+  for (const std::string_view name : names) {
+    sim::PhysicsEffect one = scaled(kind, effect, 0.0);
+    const std::size_t at = place(d, name);
+    one.values[at] = typical * d.parameters[at].si_per_unit;
+    columns.push_back({{{one}}, {}, 1.0, size, 0.0, 0.0});
+  }
+  // Warm-ups have a constant only where they are what shows.
+  const bool measured = !kind.without_temperature.empty() && &names == &kind.components;
+  for (const DrawnConstant& c : kind.constants) {
+    if (measured) {
+      continue;
+    }
+    constexpr double step = 0.05;
+    sim::PhysicsEffect above = effect, below = effect;
+    above.values[place(d, c.name)] *= std::exp(step);
+    below.values[place(d, c.name)] *= std::exp(-step);
+    columns.push_back({{{above}}, {{below}}, 2.0 * step, std::log(c.high / c.low) / std::sqrt(12.0), 0.0,
+                       0.0});
+  }
+  // A scale that follows a temperature without a channel: the block's own time constant is unknown.
+  if (!config.temperature.recorded && kind.id.ends_with("_scale_temperature")) {
+    constexpr double step = 0.05, spread = 0.5;   // drawn from 300 to 1500 s: sigma of its logarithm
+    const double tau = config.temperature.warm_up_tau_s;
+    columns.push_back({{{effect}}, {{effect}}, 2.0 * step, spread, tau * std::exp(step), tau * std::exp(-step)});
+  }
+  return columns;
+}
+
 }  // namespace selfcal::blind

@@ -7,6 +7,7 @@
 
 #include "sim_ins/config.hpp"
 #include "sim_ins/physics.hpp"
+#include "tests/blind/response.hpp"
 #include "sim_ins/random.hpp"
 
 namespace selfcal::blind {
@@ -38,5 +39,12 @@ const Kind& kind_called(std::string_view id);
 sim::PhysicsEffect draw_effect(const Kind& kind, const sim::SimConfig& config, sim::Random& random);
 // The components times a factor; constants stay.
 sim::PhysicsEffect scaled(const Kind& kind, const sim::PhysicsEffect& effect, double factor);
+// The temperature from which thermal effects count; others are left as they are.
+void set_reference_temperature(sim::PhysicsEffect& effect, double celsius);
+
+// What someone who knows the effect, but neither direction nor constants, has to estimate: one column per component at
+// its typical size, one per constant for its logarithm, linearised about the effect.
+std::vector<Column> columns_of(const Kind& kind, const sim::SimConfig& config, const sim::PhysicsEffect& effect,
+                               double size);
 
 }  // namespace selfcal::blind

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/geometry/units.hpp"
 #include "sim_ins/random.hpp"
 #include "tests/blind/kinds.hpp"
 
@@ -71,25 +72,76 @@ sim::PhysicsEffect draw_noise(const Kind& kind, const sim::SimConfig& config, si
   return effect;
 }
 
+// Mean over the recording: what the diagnosis refers the 24 to where temperature is recorded. Else a warm-up begins at
+// the start's.
+double reference_temperature(const Case& c) {
+  const sim::TemperatureConfig& t = c.config.temperature;
+  if (!t.recorded) {
+    return t.start_c;
+  }
+  const double duration = c.schedule.duration_s();
+  return t.start_c + t.warm_up_c * (1.0 + t.warm_up_tau_s / duration * std::expm1(-duration / t.warm_up_tau_s)) +
+         0.5 * t.ramp_c_per_h / units::hour * duration;
+}
+
+// Where the base is level a drift with the sine of the inner angle is a g-sensitivity; and most slow drifts are alike.
+Expected<double> unlike_twins(const Filtered& filtered, const sim::SimConfig& config,
+                              const sim::PhysicsEffect& concealed) {
+  sim::Random random(1, 1);   // of the columns only their span counts
+  double least = HUGE_VAL;
+  for (const char* id : {"gyro_g_sensitivity", "gyro_magnetic_sensitivity", "gyro_drift_ramp", "gyro_temperature",
+                         "gyro_temperature"}) {
+    const Kind& kind = kind_called(id);
+    const sim::PhysicsEffect drawn = draw_effect(kind, config, random);
+    const auto left = filtered.unlike({{concealed}}, columns_of(kind, config, drawn, 1.0));
+    if (!left) {
+      return tl::unexpected(left.error());
+    }
+    least = std::min(least, *left);
+  }
+  return least;
+}
+
 Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& random) {
+  const auto filtered = Filtered::make(c.config, c.schedule, c.seed);
+  if (!filtered) {
+    return tl::unexpected(filtered.error());
+  }
   ConcealedEffect best;
+  double size = 0.0;
   // A direction that cannot be seen is drawn again, a few times.
   for (int attempt = 0; attempt < 4; ++attempt) {
-    const sim::PhysicsEffect unit = draw_effect(kind, c.config, random);
-    const auto response = response_to(c.config, c.schedule, c.seed, {{unit}});
+    sim::PhysicsEffect unit = draw_effect(kind, c.config, random);
+    set_reference_temperature(unit, reference_temperature(c));
+    const auto response = filtered->response({{unit}});
     if (!response) {
       return tl::unexpected(response.error());
     }
     const double wanted = c.recipe.strength > 0.0 ? c.recipe.strength / response->sigmas : 1.0;
     const double factor = std::min(wanted, largest_size);
     if (attempt == 0 || factor * response->sigmas > best.response.sigmas) {
-      best = {scaled(kind, unit, factor), *response};
+      best = {scaled(kind, unit, factor), *response, ParameterVector::Zero(), -1.0};
       best.response.sigmas *= factor;
       best.response.shift *= factor;
+      size = factor;
     }
     if (factor == wanted) {
       break;
     }
+  }
+  if (c.recipe.stratum == "single" && c.recipe.strength >= 6.0) {
+    const auto sigma = filtered->augmented_sigma(columns_of(kind, c.config, best.physics, size));
+    if (!sigma) {
+      return tl::unexpected(sigma.error());
+    }
+    best.augmented_sigma = *sigma;
+  }
+  if (kind.group == KindGroup::outside) {
+    const auto left = unlike_twins(*filtered, c.config, best.physics);
+    if (!left) {
+      return tl::unexpected(left.error());
+    }
+    best.unlike_sigmas = *left;
   }
   return best;
 }
@@ -159,7 +211,7 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t trial_s
   for (const std::string& id : recipe.effects) {
     const Kind& kind = kind_called(id);
     if (kind.group == KindGroup::noise) {
-      c.effects.push_back({draw_noise(kind, c.config, random), {}});
+      c.effects.push_back({draw_noise(kind, c.config, random), {}, ParameterVector::Zero(), -1.0});
       continue;
     }
     auto effect = sized(c, kind, random);

@@ -1,5 +1,7 @@
 #include "tests/blind/response.hpp"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
@@ -40,40 +42,113 @@ PassOutput pass_over(const sim::SimConfig& config, const Recording& recording, c
 
 }  // namespace
 
-Expected<Response> response_to(const sim::SimConfig& config, const Schedule& schedule, std::uint64_t seed,
-                               const sim::ConcealedPhysics& physics) {
-  sim::SimConfig quiet = config;
-  quiet.gyro_arw_deg_per_sqrt_h = 0.0;
-  quiet.accel_vrw_ug_per_sqrt_hz = 0.0;
-  quiet.gyro_lsb_arcsec = 1e-5;       // counts of 32 bits still hold 30 deg/s at 50 Hz
-  quiet.accel_lsb_m_per_s = 1e-9;
-  quiet.gimbal.readout_noise_arcsec = 0.0;
+Expected<Filtered> Filtered::make(const sim::SimConfig& config, const Schedule& schedule, std::uint64_t seed) {
+  Filtered f;
+  f.quiet_ = config;
+  f.quiet_.gyro_arw_deg_per_sqrt_h = 0.0;
+  f.quiet_.accel_vrw_ug_per_sqrt_hz = 0.0;
+  f.quiet_.gyro_lsb_arcsec = 1e-5;       // counts of 32 bits still hold 30 deg/s at 50 Hz
+  f.quiet_.accel_lsb_m_per_s = 1e-9;
+  f.quiet_.gimbal.readout_noise_arcsec = 0.0;
+  f.schedule_ = schedule;
+  f.seed_ = seed;
   const auto errors = sim::true_sensor_errors(config, seed);
-  const auto without = sim::simulate(quiet, schedule, seed, {});
-  const auto with = sim::simulate(quiet, schedule, seed, physics);
-  for (const auto* made : {&without, &with}) {
-    if (!*made) {
-      return tl::unexpected(made->error());
-    }
-  }
+  const auto recording = sim::simulate(f.quiet_, schedule, seed, {});
   if (!errors) {
     return tl::unexpected(errors.error());
   }
-  const ParameterVector truth = Eigen::Map<const ParameterVector>(errors->data());
-  const Matrix3 C_nb = start_attitude(config, *without);
-  const PassOutput a = pass_over(config, *without, truth, C_nb);
-  const PassOutput b = pass_over(config, *with, truth, C_nb);
-  Response r;
-  double square = 0.0;
-  for (std::size_t k = 0; k < a.epochs.size() && k < b.epochs.size(); ++k) {
-    const Vector3 d = b.epochs[k].innovation - a.epochs[k].innovation;
-    square += d.cwiseAbs2().cwiseQuotient(a.epochs[k].variance).sum();
+  if (!recording) {
+    return tl::unexpected(recording.error());
   }
-  r.sigmas = std::sqrt(square);
-  const int at = a.layout.parameters();
-  r.shift = b.mean.segment<sensor_parameter_count>(at) - a.mean.segment<sensor_parameter_count>(at);
-  r.sigma = a.covariance.diagonal().segment<sensor_parameter_count>(at).cwiseSqrt();
-  return r;
+  f.truth_ = Eigen::Map<const ParameterVector>(errors->data());
+  f.C_nb_ = start_attitude(config, *recording);
+  f.assumed_ = config;
+  f.without_ = pass_over(config, *recording, f.truth_, f.C_nb_);
+  return f;
+}
+
+ParameterMatrix Filtered::covariance() const {
+  const int at = without_.layout.parameters();
+  return without_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
+}
+
+Expected<Filtered::Difference> Filtered::difference(const sim::ConcealedPhysics& physics, double warm_up_s) const {
+  if (physics.effects.empty()) {
+    return Difference{Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(without_.epochs.size())),
+                      ParameterVector::Zero()};
+  }
+  sim::SimConfig config = quiet_;
+  if (warm_up_s > 0.0) {
+    config.temperature.warm_up_tau_s = warm_up_s;
+  }
+  const auto recording = sim::simulate(config, schedule_, seed_, physics);
+  if (!recording) {
+    return tl::unexpected(recording.error());
+  }
+  const PassOutput with = pass_over(assumed_, *recording, truth_, C_nb_);
+  const std::size_t epochs = std::min(with.epochs.size(), without_.epochs.size());
+  Difference d;
+  d.innovation.resize(3 * static_cast<Eigen::Index>(epochs));
+  for (std::size_t k = 0; k < epochs; ++k) {
+    d.innovation.segment<3>(3 * static_cast<Eigen::Index>(k)) =
+        (with.epochs[k].innovation - without_.epochs[k].innovation)
+            .cwiseQuotient(without_.epochs[k].variance.cwiseSqrt());
+  }
+  const int at = without_.layout.parameters();
+  d.shift = with.mean.segment<sensor_parameter_count>(at) - without_.mean.segment<sensor_parameter_count>(at);
+  return d;
+}
+
+Expected<Response> Filtered::response(const sim::ConcealedPhysics& physics) const {
+  const auto d = difference(physics);
+  if (!d) {
+    return tl::unexpected(d.error());
+  }
+  return Response{d->innovation.norm(), d->shift, covariance().diagonal().cwiseSqrt()};
+}
+
+Expected<Filtered::Design> Filtered::design(const std::vector<Column>& columns) const {
+  const auto n = static_cast<Eigen::Index>(columns.size());
+  Design design;
+  design.S.resize(sensor_parameter_count, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Column& column = columns[static_cast<std::size_t>(k)];
+    const auto plus = difference(column.plus, column.plus_warm_up_s);
+    const auto minus = difference(column.minus, column.minus_warm_up_s);
+    if (!plus || !minus) {
+      return tl::unexpected(plus ? minus.error() : plus.error());
+    }
+    design.D.conservativeResize(plus->innovation.size(), n);
+    design.D.col(k) = (plus->innovation - minus->innovation) / column.step;
+    design.S.col(k) = (plus->shift - minus->shift) / column.step;
+  }
+  return design;
+}
+
+Expected<ParameterVector> Filtered::augmented_sigma(const std::vector<Column>& columns) const {
+  const auto made = design(columns);
+  if (!made) {
+    return tl::unexpected(made.error());
+  }
+  Eigen::MatrixXd information = made->D.transpose() * made->D;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    information(at, at) += 1.0 / (columns[k].prior * columns[k].prior);
+  }
+  const ParameterMatrix augmented = covariance() + made->S * information.ldlt().solve(made->S.transpose());
+  return ParameterVector(augmented.diagonal().cwiseSqrt());
+}
+
+Expected<double> Filtered::unlike(const sim::ConcealedPhysics& physics, const std::vector<Column>& columns) const {
+  const auto concealed = difference(physics);
+  const auto made = design(columns);
+  if (!concealed || !made) {
+    return tl::unexpected(concealed ? made.error() : concealed.error());
+  }
+  Eigen::MatrixXd information = made->D.transpose() * made->D;
+  information.diagonal().array() += 1e-6;   // sizes up to 1000 of the columns' own
+  const Eigen::VectorXd score = made->D.transpose() * concealed->innovation;
+  return std::sqrt(std::max(0.0, concealed->innovation.squaredNorm() - score.dot(information.ldlt().solve(score))));
 }
 
 }  // namespace selfcal::blind

@@ -73,7 +73,7 @@ def truths(case):
 
 
 def errors(case, value):
-    """Error of the 24 over the bound of a filter that knows which direction is left out."""
+    """Error of the 24 over the bound of a filter that knows effect, direction and constants, not the size."""
     bound = [0.0] * 24
     for e in case["effects"]:
         if "sigma_24" not in e:
@@ -84,6 +84,12 @@ def errors(case, value):
         for k in range(24):
             bound[k] += (e["shift"][k] / e["sigmas"]) ** 2
     return [(value[k] - case["truth"][k]) / math.sqrt(bound[k]) for k in range(24)]
+
+
+def augmented_errors(case, value):
+    """The same over the bound of the augmented model: all of the effect's coefficients and constants estimated."""
+    sigma = case["effects"][0].get("augmented_sigma_24")
+    return [(v - t) / s for v, t, s in zip(value, case["truth"], sigma)] if sigma else []
 
 
 class Score:
@@ -245,9 +251,14 @@ class Score:
         named = sum(bool(names(a)) for _, a in pairs)
         self.say(f"  none of the above or unexplained {share(unexplained, len(pairs))}, a library name "
                  f"{share(named, len(pairs))}")
+        apart = [(c, a) for c, a in pairs if c["effects"][0].get("unlike_sigmas", math.inf) >= 5.9]
+        self.say(f"  of those that differ by 6 sigma and more from the catalogue's own drifts: none of the above or "
+                 f"unexplained {share(sum(alarmed(a) and not names(a) or a.get('unexplained', False) for _, a in apart), len(apart))}, "
+                 f"a library name {share(sum(bool(names(a)) for _, a in apart), len(apart))}")
         for c, a in pairs:
             if names(a):
-                self.say(f"    case {c['number']}: {c['effects'][0]['id']} {c['effects'][0]['sigmas']:.0f} sigma: "
+                self.say(f"    case {c['number']}: {c['effects'][0]['id']} {c['effects'][0]['sigmas']:.0f} sigma, "
+                         f"{c['effects'][0].get('unlike_sigmas', math.nan):.1f} from its twin: "
                          f"{[sorted(class_of(f)) for f in a['findings'] if not f['stochastic']]}")
         self.at_least("none of the above outside the catalogue", unexplained, len(pairs), 0.8)
         self.at_most("library names outside the catalogue", named, len(pairs), 0.05)
@@ -265,7 +276,10 @@ class Score:
         self.say(f"  an equation named: {share(biases, len(self.of('noise')))}")
 
     def coefficients(self, case, answer):
-        """(truth, value, sigma) of every coefficient of effects rightly named, and how many were so checked."""
+        """(truth, value, sigma) of every coefficient of effects rightly named. Where one of a pair stays unnamed (a lever
+        arm lies in the size effect's span) the other's coefficients stand for both, and have no truth of their own."""
+        if len({f["effect"] for f in answer.get("findings", [])} & set(truths(case))) < len(truths(case)):
+            return
         for f in answer.get("findings", []):
             e = truths(case).get(f["effect"])
             if e is None or f["effect"] in NO_COEFFICIENTS or f["stochastic"]:
@@ -308,20 +322,27 @@ class Score:
         self.say(f"95 % intervals of the 24, clean recordings: cover {share(k, n)}")
 
     def parameters(self):
-        before, after, rightly, own = [], [], [], []
+        sizes = collections.defaultdict(list)
         for c, a in self.of("single"):
             if c["effects"][0]["sigmas"] < 5.9 or "value" not in a:
                 continue
-            without, with_names = errors(c, a["value_without"]), errors(c, a["value"])
-            before += without
-            after += with_names
-            if self.judged(c, a) in ("right", "class"):
-                rightly += with_names
-                own += [(v - t) / s for v, t, s in zip(a["value"], c["truth"], a["sigma"])]
-        self.say(f"error of the 24 over the bound (rms), 6 sigma and more: before {rms(before):.2f}, after "
-                 f"{rms(after):.2f}, where rightly named {rms(rightly):.2f} "
-                 f"(median of the sizes {middle(before):.2f}, {middle(after):.2f}, {middle(rightly):.2f}; one normal "
-                 f"error: 0.67); over the sigma stated, where rightly named {rms(own):.2f}")
+            rightly = self.judged(c, a) in ("right", "class")
+            stated = [(v - t) / s for v, t, s in zip(a["value"], c["truth"], a["sigma"])]
+            for of, chosen in (("all", True), ("rightly named", rightly)):
+                if chosen:
+                    sizes[of, "known before"] += errors(c, a["value_without"])
+                    sizes[of, "known"] += errors(c, a["value"])
+                    sizes[of, "augmented before"] += augmented_errors(c, a["value_without"])
+                    sizes[of, "augmented"] += augmented_errors(c, a["value"])
+                    sizes[of, "stated"] += stated
+        self.say()
+        self.say("error of the 24, 6 sigma and more, rms over (median of the sizes; one normal error: 0.67)")
+        for of in ("all", "rightly named"):
+            told = {k: f"{rms(v):.2f} ({middle(v):.2f})" for (o, k), v in sizes.items() if o == of}
+            if told:
+                self.say(f"  {of}: bound with all of the effect's coefficients unknown: before {told['augmented before']}, "
+                         f"after {told['augmented']}; with direction and constants known: before {told['known before']}, "
+                         f"after {told['known']}; sigma stated: {told['stated']}")
 
     def rivals(self):
         clean = [a for _, a in self.of("clean") if "rivals" in a]
