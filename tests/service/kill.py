@@ -1,7 +1,9 @@
-"""kill -9 of the service at random instants of calibrations in compressed time: what becomes of the runs?"""
+"""kill -9 of the service at random instants of calibrations in compressed time, some of them aborted by an operator: what
+becomes of the runs?"""
 import argparse
 import collections
 import math
+import os
 import random
 import re
 import sys
@@ -15,24 +17,29 @@ import case  # noqa: E402
 import witness  # noqa: E402
 
 SPEED = 20.0
-# In which a run can be found; half of the kills aim at one of them, drawn evenly, so that short ones are hit as well.
+# In which a run can be found. Each kill aims at one of them, drawn evenly and taken up in the order of a run, so that short
+# ones are hit as well: half of the kills within a moment after it was entered, half anywhere in the seconds after that.
+# What follows an abort is aimed at by killing right after it.
 STATES = ("connecting", "unlocking", "scheduling", "starting", "rotating", "draining", "estimating", "judging",
           "checking_old", "erasing", "writing", "verifying", "committing", "resetting", "confirming", "checking_new")
+AFTER_AN_ABORT = ("ending_check", "stopping")
 AIMED_WITHIN_S = 0.05
-RUN_S = 8.0            # about what a run takes at this speed
-KILLS_IN_A_RUN = (1, 9)   # wanted; a run may be over before
+ANYWHERE_WITHIN_S = 3.0   # of the 9 s that a run takes at least
+KILLS_IN_A_RUN = (2, 9)   # wanted; a run may be over before
+ABORTED_RUNS = 0.25       # the share of the runs that an operator wants to end
 
 
 class Trial:
     def __init__(self, folder, seed):
         self.draw = random.Random(seed)
         self.unit = bench.Bench(folder, speed=SPEED, seed=seed, sim={"serial": "KILL-0001", "sample_rate_hz": 50.0},
-                                ins={"drift_check_s": 30.0, "fd": True}, sim_options=["--fd"])
+                                ins={"drift_check_s": 10.0, "fd": True}, sim_options=["--fd"])
         (self.unit.folder / "short.toml").write_text(case.SHORT_SCHEDULE, encoding="ascii")
         self.state_directory = self.unit.folder / "state"
         self.killed_in, self.ends, self.faults = collections.Counter(), collections.Counter(), []
+        self.killed_idle = 0
         self.version, self.held = 0, None
-        self.log_begin = 0   # of the run, in the service's log
+        self.log_read, self.log_text = 0, ""   # so much of the service's log; of this run
 
     def start(self):
         self.unit.start()
@@ -40,9 +47,12 @@ class Trial:
 
     # --- what the service wrote, read where it is new only: reading must not cost the processor that is tried ---------
     def log_of_this_run(self):
-        with open(self.unit.folder / "selfcald.log", encoding="utf-8", errors="replace") as file:
-            file.seek(self.log_begin)
-            return file.read()
+        with open(self.unit.folder / "selfcald.log", "rb") as file:
+            file.seek(self.log_read)
+            new = file.read()
+        self.log_read += len(new)
+        self.log_text += new.decode(errors="replace")
+        return self.log_text
 
     @staticmethod
     def ended(run, log):
@@ -54,46 +64,68 @@ class Trial:
             time.sleep(0.1)
         return self.unit.wait_for_end(run, timeout=60)
 
+    def start_service(self):
+        """Ready when it says so: an operator's program that asks again and again costs more than all else."""
+        readies = self.log_of_this_run().count(" ready\n")
+        self.unit.spawn_daemon()
+        end = time.monotonic() + 120
+        while self.log_of_this_run().count(" ready\n") == readies:
+            if self.unit.daemon_process.poll() is not None or time.monotonic() > end:
+                raise RuntimeError(f"the service does not come up again:\n{self.log_text[-2000:]}")
+            time.sleep(0.02)
+
     # --- kills -------------------------------------------------------------------------------------------------
-    def await_instant(self, run):
-        """Waits for a moment of the run. False if the run was over before it came."""
-        aimed = self.draw.random() < 0.5
-        wanted = self.draw.choice(STATES)
-        instant = time.monotonic() + self.draw.uniform(0.0, RUN_S)
-        delay = self.draw.uniform(0.0, AIMED_WITHIN_S)
-        while True:
-            log = self.log_of_this_run()
+    def await_instant(self, run, wanted):
+        """Waits for a moment after the run entered the state. False if the run was over before it came."""
+        delay = self.draw.uniform(0.0, self.draw.choice((AIMED_WITHIN_S, ANYWHERE_WITHIN_S)))
+        # The first state is the run's own beginning, of which the log says nothing.
+        while wanted != STATES[0] and f"run {run}: {wanted}: " not in (log := self.log_of_this_run()):
             if self.ended(run, log):
                 return False
-            if aimed and f"run {run}: {wanted}: " in log:
-                time.sleep(delay)
-                return True
-            if not aimed and time.monotonic() > instant:
-                return True
-            time.sleep(0.005)
+            time.sleep(0.01)
+        time.sleep(delay)
+        return not self.ended(run, self.log_of_this_run())
+
+    def abort(self, run):
+        """False if the run was over before the operator could."""
+        done = self.unit.selfcal("abort", self.unit.name, "--reason", "trial of kills", check=False)
+        if done.returncode != 0 and not self.ended(run, self.log_of_this_run()):
+            self.faults.append(f"run {run} cannot be aborted: {done.stderr.strip()}")
+        time.sleep(self.draw.uniform(0.0, AIMED_WITHIN_S))
+        return done.returncode == 0
 
     def kill(self, run):
         self.unit.kill_daemon()
         states = watch.with_copy(self.state_directory, lambda database: database.execute(
             "SELECT state FROM runs WHERE id = ?", [run]).fetchall())
-        self.killed_in[states[0][0]] += 1
+        if states[0][0] in watch.FINAL:
+            self.killed_idle += 1   # over within the instant: no kill of a run
+        else:
+            self.killed_in[states[0][0]] += 1
         self.faults += [f"run {run}, killed while {states[0][0]}: {fault}"
                         for fault in watch.database_faults(self.state_directory)]
-        self.unit.start_daemon()
+        self.start_service()
 
     # --- runs --------------------------------------------------------------------------------------------------
     def run(self, kills):
         rotations = self.rotations()
-        self.log_begin = (self.unit.folder / "selfcald.log").stat().st_size
+        self.log_of_this_run()
+        self.log_text = ""
+        aborting = self.draw.random() < ABORTED_RUNS
         run = self.unit.start_run("--schedule", self.unit.folder / "short.toml",
                                   "--force", "trial of kills")
-        for _ in range(kills):
-            if self.await_instant(run):
-                self.kill(run)
+        aborted = False
+        for k, wanted in enumerate(sorted(self.draw.sample(STATES, kills), key=STATES.index)):
+            if not self.await_instant(run, wanted):
+                break
+            if aborting and k == kills - 1:
+                aborted = self.abort(run)
+            self.kill(run)
         document = self.wait_for_end(run)
         self.ends[document["state"]] += 1
         complain = lambda text: self.faults.append(f"run {run}, {document['state']}: {text}")  # noqa: E731
-        if document["state"] != "completed":
+        # Too late to abort, or over: completed all the same. Nothing else may end a run here.
+        if document["state"] != "completed" and not (aborted and document["state"] == "aborted"):
             complain(document["reason"])
         if self.rotations() - rotations > 1:
             complain("the gimbal was started twice")
@@ -144,11 +176,13 @@ def main():
         finally:
             trial.unit.stop()
         trial.faults += watch.database_faults(trial.state_directory)
-    in_states = ", ".join(f"{state} {count}" for state, count in trial.killed_in.most_common())
     ends = ", ".join(f"{state} {count}" for state, count in trial.ends.most_common())
     print(f"{trial.killed_in.total()} kills (seed {options.seed}) in {trial.ends.total()} runs, "
-          f"{time.monotonic() - began:.0f} s\n  killed while: {in_states}\n  runs ended: {ends}\n"
-          f"  faults found: {len(trial.faults)}")
+          f"{time.monotonic() - began:.0f} s, {sum(os.times()[:4]):.0f} s of processor for service and operator\n"
+          f"  runs ended: {ends}\n  killed while")
+    for state in (*STATES, *AFTER_AN_ABORT):
+        print(f"    {state:<13}{trial.killed_in[state]:4} {'#' * trial.killed_in[state]}")
+    print(f"  killed with no run in progress, not counted: {trial.killed_idle}\n  faults found: {len(trial.faults)}")
     for fault in trial.faults:
         print(f"    {fault}")
     return 1 if trial.faults else 0

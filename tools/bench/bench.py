@@ -93,8 +93,11 @@ class Bench:
             "--truth", self.truth_file, "--speed", self.speed, *self.sim_options, *more])
         self._wait_for(lambda: self.truth_file.exists(), self.sim_process, "sim_ins")
 
-    def start_daemon(self):
+    def spawn_daemon(self):
         self.daemon_process = self._spawn("selfcald", [BIN / "selfcald", "--config", self.folder / "selfcald.toml"])
+
+    def start_daemon(self):
+        self.spawn_daemon()
         self._wait_for(lambda: self.selfcal("status", "--json", check=False).returncode == 0, self.daemon_process,
                        "selfcald")
 

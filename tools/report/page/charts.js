@@ -44,7 +44,7 @@ function convergenceRange(sigmas, final, sigma) {
 function showConvergence(report) {
   const place = document.getElementById('convergence-plots');
   const axis = passAxis(report);
-  report.parameters.forEach((parameter, index) => {
+  report.parameters.forEach((parameter, index) => later(() => {
     const pick = (key) => axis.passOf.map(
         (pass, row) => (pass === null ? null : report.passes[pass][key][axis.epochOf[row]][index]));
     const values = pick('epoch_values');
@@ -64,7 +64,7 @@ function showConvergence(report) {
       band: [2, 3],
       marks: axis.marks,
     });
-  });
+  }));
 }
 
 function showNis(report) {

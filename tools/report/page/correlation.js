@@ -15,10 +15,10 @@ function showCorrelation(report) {
     svg.append(svgElement('text', {x: left - 6, y: down, 'text-anchor': 'end'}, name));
     svg.append(svgElement('text', {transform: `translate(${along + 4} ${top - 6}) rotate(-90)`}, name));
   });
-  report.correlation.forEach((row, i) => row.forEach((value, j) => {
+  report.correlation.forEach((row, i) => later(() => row.forEach((value, j) => {
     const title = `${names[i]} and ${names[j]}: ${significant(value, 3)}`;
     svg.append(sigmaSquare(left + j * cell, top + i * cell, cell, cell, (value ?? 0) * fullSigma, title));
-  }));
+  })));
   svg.append(svgElement('g', {transform: `translate(${left} ${top + size + 14})`},
       svgElement('rect', {width: 12, height: 12, style: 'fill: var(--x)'}), svgElement('text', {x: 17, y: 10}, 'positive'),
       svgElement('rect', {x: 80, width: 12, height: 12, style: 'fill: var(--y)'}),

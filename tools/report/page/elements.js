@@ -58,8 +58,14 @@ function decimalsFor(sigma) {
   return Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
 }
 
+// Kept until the colour scheme changes: asking the style sheet makes the browser compute the styles of the whole page.
+const knownColours = new Map();
+
 function cssColour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+  if (!knownColours.has(name)) {
+    knownColours.set(name, getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim());
+  }
+  return knownColours.get(name);
 }
 
 // columns: [{title, cells}], cells being texts or elements.

@@ -49,7 +49,7 @@ function addMisfitMap(parent, map, id, title, bias) {
   const z = bias.map((value, k) => value / map.cells.sigma[k]);
   const svg = svgElement('svg', {viewBox: '0 0 780 500', role: 'img', 'aria-label': title + ', in sigma'});
   for (let axis = 0; axis < 6; ++axis) {
-    svg.append(sensorPanel(map, axis, z, {x: 70 + 395 * (axis % 2), y: 20 + 155 * Math.floor(axis / 2)}));
+    later(() => svg.append(sensorPanel(map, axis, z, {x: 70 + 395 * (axis % 2), y: 20 + 155 * Math.floor(axis / 2)})));
   }
   svg.append(svgElement('rect', {x: 70, y: 482, width: 11, height: 11, style: 'fill: var(--x)'}),
              svgElement('text', {x: 86, y: 491}, 'too high'),

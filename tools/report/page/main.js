@@ -3,36 +3,33 @@
 
 function showCalibration(report) {
   document.title = `Self-calibration of ${report.serial || report.run?.serial || 'an INS'}`;
-  showVerdict(report);
-  showRun(report);
-  showHistory(report);
+  const sections = [showVerdict, showRun, showHistory];
   if (report.parameters) {
-    showFacts(report);
-    showParameters(report);
-    showConsistency(report);
-    showUndetermined(report);
+    sections.push(showFacts, showParameters, showConsistency, showUndetermined);
   } else {
     ['parameters', 'consistency', 'noise', 'correlation'].forEach(hideSection);
   }
-  showDiagnosis(report);
+  sections.push(showDiagnosis);
   // What only the recording itself can tell.
   if (report.gimbal) {
-    showPasses(report);
-    showConvergence(report);
-    showNis(report);
-    showInnovations(report);
-    showGimbal(report);
-    showSegments(report);
-    showAllan(report);
-    showCorrelation(report);
+    sections.push(showPasses, showConvergence, showNis, showInnovations, showGimbal, showSegments, showAllan, showCorrelation);
   } else {
     ['convergence', 'schedule', 'noise'].forEach(hideSection);
   }
+  later(...sections.map((section) => () => section(report)));
 }
 
 (function show() {
   const report = JSON.parse(document.getElementById('document').textContent);
+  whenDone = () => {
+    // What was made later has moved the place that the address asked for.
+    if (!document.documentElement.dataset.ready && location.hash && scrollY > 0) {
+      document.getElementById(location.hash.slice(1))?.scrollIntoView();
+    }
+    document.documentElement.dataset.ready = 'true';
+  };
   ({calibration: showCalibration, plan: showPlan, fleet: showFleet})[report.kind](report);
+  workOn();
   document.getElementById('save-json').addEventListener(
       'click', () => saveBlob('report.json', 'application/json', JSON.stringify(report)));
 
@@ -40,12 +37,13 @@ function showCalibration(report) {
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawPlots);
   matchMedia('print').addEventListener('change', (event) => {
     document.documentElement.classList.toggle('print', event.matches);
+    finishWork();
     redrawPlots();
   });
   let pending = 0;
+  addEventListener('beforeprint', finishWork);
   addEventListener('resize', () => {
     clearTimeout(pending);
     pending = setTimeout(redrawPlots, 150);
   });
-  document.documentElement.dataset.ready = 'true';
 })();

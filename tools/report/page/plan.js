@@ -96,8 +96,7 @@ function showPlan(report) {
     ['Velocity random walk', `${significant(at.accel_vrw_ug_per_sqrt_hz, 3)} µg/√Hz`],
     ['Known position', `${significant(at.position_sigma_m, 3)} m at 1 Hz`],
   ]);
-  showAccuracy(plans);
-  showTimelines(plans);
-  plans.forEach((plan, number) => addSphere(document.getElementById('sphere-plots'), plan, number));
-  showForecasts(plans);
+  later(() => showAccuracy(plans), () => showTimelines(plans),
+        ...plans.map((plan, number) => () => addSphere(document.getElementById('sphere-plots'), plan, number)),
+        () => showForecasts(plans));
 }

@@ -8,6 +8,7 @@
 'use strict';
 
 const livePlots = [];
+const usualHeight = 230;
 
 function axisTitle(axis) {
   return axis.unit ? `${axis.label} (${unitSymbol(axis.unit)})` : axis.label;
@@ -144,7 +145,7 @@ function plotOptions(spec, width, ticks, readout) {
   };
   return {
     width,
-    height: spec.height || 230,
+    height: spec.height || usualHeight,
     legend: {show: false},
     cursor: {drag: {x: true, y: false}},
     scales: {x: scale('x'), y: scale('y')},
@@ -205,6 +206,7 @@ function numbersTable(spec) {
 // Left and right move the cursor from point to point, Escape undoes a zoom.
 function addKeys(host, state) {
   host.addEventListener('keydown', (event) => {
+    state.drawOnce();
     const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
     if (step !== undefined) {
       const count = state.plot.data[0].length;
@@ -217,14 +219,19 @@ function addKeys(host, state) {
   });
 }
 
+// The frame stands at once, with room for the picture; the first plot of a page is drawn at once, the others later.
 function addPlot(parent, spec) {
   const host = element('div', {class: 'plot', tabindex: '0', role: 'img', id: spec.id,
+                               style: `min-height: ${spec.height || usualHeight}px`,
                                'aria-label': `${spec.title}: ${axisTitle(spec.y)} against ${axisTitle(spec.x)}`});
   const readout = element('div', {class: 'readout'});
   const state = {spec, host, ticks: {x: [], y: []}, plot: null};
   const button = (label, action) => {
     const made = element('button', {type: 'button', title: `Save "${spec.title}" as ${label}`}, label);
-    made.addEventListener('click', action);
+    made.addEventListener('click', () => {
+      state.drawOnce();
+      action();
+    });
     return made;
   };
   const tools = element('div', {class: 'tools'},
@@ -241,19 +248,27 @@ function addPlot(parent, spec) {
     const data = [spec.x.values, ...spec.series.map((series) => series.shown || series.values)];
     state.plot = new uPlot(plotOptions(spec, Math.max(240, host.clientWidth), state.ticks, readout), data, host);
   };
-  state.draw();
-  if (livePlots.length === 0) {
-    performance.mark('first-plot');
-  }
+  // A plot that was taken away meanwhile is not drawn.
+  state.drawOnce = () => {
+    if (!state.plot && livePlots.includes(state)) {
+      state.draw();
+    }
+  };
   addKeys(host, state);
   livePlots.push(state);
+  if (livePlots.length === 1 && performance.getEntriesByName('first-plot').length === 0) {
+    state.drawOnce();
+    letPaint('first-plot');
+  } else {
+    later(state.drawOnce);
+  }
 }
 
 // Takes the plots of a place away again.
 function dropPlots(place) {
   for (let k = livePlots.length - 1; k >= 0; --k) {
     if (place.contains(livePlots[k].host)) {
-      livePlots[k].plot.destroy();
+      livePlots[k].plot?.destroy();
       livePlots.splice(k, 1);
     }
   }
@@ -261,6 +276,7 @@ function dropPlots(place) {
 }
 
 function redrawPlots() {
+  knownColours.clear();
   for (const state of livePlots) {
     state.draw();
   }
