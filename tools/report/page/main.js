@@ -35,13 +35,16 @@ function showCalibration(report) {
 
   // Canvases do not follow style sheets: drawn anew for another colour scheme, width or paper.
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawPlots);
-  matchMedia('print').addEventListener('change', (event) => {
-    document.documentElement.classList.toggle('print', event.matches);
+  const onPaper = (paper) => {
+    document.documentElement.classList.toggle('print', paper);
     finishWork();
     redrawPlots();
-  });
+  };
+  // Before the sheets are counted for the heights, and again for the widths when the page is laid out on them.
+  addEventListener('beforeprint', () => onPaper(true));
+  addEventListener('afterprint', () => onPaper(false));
+  matchMedia('print').addEventListener('change', (event) => onPaper(event.matches));
   let pending = 0;
-  addEventListener('beforeprint', finishWork);
   addEventListener('resize', () => {
     clearTimeout(pending);
     pending = setTimeout(redrawPlots, 150);

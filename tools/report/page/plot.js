@@ -8,7 +8,12 @@
 'use strict';
 
 const livePlots = [];
-const usualHeight = 230;
+
+// Four rows of plots fit a sheet.
+function plotHeight(spec) {
+  const onPaper = document.documentElement.classList.contains('print');
+  return Math.round((spec.height || 230) * (onPaper ? 0.86 : 1));
+}
 
 function axisTitle(axis) {
   return axis.unit ? `${axis.label} (${unitSymbol(axis.unit)})` : axis.label;
@@ -145,7 +150,7 @@ function plotOptions(spec, width, ticks, readout) {
   };
   return {
     width,
-    height: spec.height || usualHeight,
+    height: plotHeight(spec),
     legend: {show: false},
     cursor: {drag: {x: true, y: false}},
     scales: {x: scale('x'), y: scale('y')},
@@ -222,7 +227,7 @@ function addKeys(host, state) {
 // The frame stands at once, with room for the picture; the first plot of a page is drawn at once, the others later.
 function addPlot(parent, spec) {
   const host = element('div', {class: 'plot', tabindex: '0', role: 'img', id: spec.id,
-                               style: `min-height: ${spec.height || usualHeight}px`,
+                               style: `min-height: ${plotHeight(spec)}px`,
                                'aria-label': `${spec.title}: ${axisTitle(spec.y)} against ${axisTitle(spec.x)}`});
   const readout = element('div', {class: 'readout'});
   const state = {spec, host, ticks: {x: [], y: []}, plot: null};
@@ -245,6 +250,7 @@ function addPlot(parent, spec) {
     if (state.plot) {
       state.plot.destroy();
     }
+    host.style.minHeight = `${plotHeight(spec)}px`;
     const data = [spec.x.values, ...spec.series.map((series) => series.shown || series.values)];
     state.plot = new uPlot(plotOptions(spec, Math.max(240, host.clientWidth), state.ticks, readout), data, host);
   };

@@ -212,6 +212,8 @@ async function check_paper(page, where) {
   const pdf = await page.pdf({format: 'A4', preferCSSPageSize: true});
   const count = pdf.toString('latin1').match(/\/Type \/Page\b(?!s)/g)?.length ?? 0;
   expect(count >= 1 && count <= 20, `${where}: ${count} A4 pages`);
+  const again = (await page.pdf({format: 'A4', preferCSSPageSize: true})).toString('latin1').match(/\/Type \/Page\b(?!s)/g)?.length;
+  expect(count === again, `${where}: ${count} A4 pages of a page that has just been opened, ${again} later`);
   expect(await page.evaluate(() => document.documentElement.dataset.ready) === 'true', `${where}: printed half`);
   for (const [name, share] of await page.evaluate(drawn_shares)) {
     expect(share > 0.005, `${where}: picture ${name} is empty on paper (${share})`);
@@ -219,6 +221,12 @@ async function check_paper(page, where) {
   if (pictures) {
     writeFileSync(`${pictures}/${kind}-a4.pdf`, pdf);
   }
+  // The width between the margins of A4, 186 mm: there is no scrolling on paper.
+  await page.emulateMedia({media: 'print'});
+  await page.setViewportSize({width: 703, height: 1032});
+  const cut = await page.evaluate(() => [...document.querySelectorAll('main *')].filter(
+      (part) => part.checkVisibility() && part.getBoundingClientRect().right > innerWidth + 0.5).map((part) => `${part.tagName} ${part.textContent.slice(0, 30)}`));
+  expect(cut.length === 0, `${where}: beyond the edge of the paper: ${cut.slice(0, 3).join('; ')}`);
 }
 
 async function open(browser, page_file, where, width, scheme) {
