@@ -1,9 +1,10 @@
 // Block transfer over real sockets on an unpaced interface, both ends in this one thread:
-//   socket_bench vcan0 [MEGABYTES]
+//   socket_bench vcan0 [MEGABYTES] [alone]
 // and beside it the bare ceiling: as many frames of the same kind through sendmmsg and recvmmsg on sockets without
 // options, nobody looking at their content. The two take turns, 64 KiB each, so that whatever else the machine does
 // hits both alike. Prints payload per second of processor time against the real 1/5 Mbit/s FD bus, and the share of the
-// ceiling; status 1 where FD is below 5 times the bus, a byte is wrong, or a frame was lost.
+// ceiling; status 1 where FD is below 5 times the bus, a byte is wrong, or a frame was lost. `alone` leaves the bare
+// sockets out and tells only where each case begins and ends, for socket_cpu.py, which takes the host's processor time.
 #include <fmt/format.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -14,8 +15,10 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <string_view>
 #include <vector>
 
 #include "protocol/can/socket.hpp"
@@ -184,7 +187,13 @@ struct Case {
   std::size_t block;
 };
 
-Expected<bool> measure(const char* interface, const Case& c, double megabytes) {
+void mark(const char* what, const Case& c, double bytes) {
+  fmt::print("{} {:.0f} {}\n", what, bytes, c.name);
+  std::fflush(stdout);
+  ::sleep(1);   // while who reads it looks at the clock
+}
+
+Expected<bool> measure(const char* interface, const Case& c, double megabytes, bool alone) {
   auto tester = open_end(interface, c.fd, 0x640, 0x648);
   auto ins = open_end(interface, c.fd, 0x648, 0x640);
   Bare bare(interface, c.fd);
@@ -205,6 +214,10 @@ Expected<bool> measure(const char* interface, const Case& c, double megabytes) {
   double bare_s = 0.0;
   const std::size_t slice = 65535 / c.block;
   blocks = (blocks + slice - 1) / slice * slice;
+  const double bytes = static_cast<double>(blocks) * payload;
+  if (alone) {
+    mark("begin", c, bytes);
+  }
   for (std::size_t done = 0; done < blocks; done += slice) {
     const std::clock_t start = std::clock();
     for (std::size_t i = 0; i < slice; ++i) {
@@ -215,16 +228,19 @@ Expected<bool> measure(const char* interface, const Case& c, double megabytes) {
     }
     ours_s += seconds_since(start);
     const std::clock_t bare_start = std::clock();
-    for (std::size_t i = 0; i < slice; ++i) {
+    for (std::size_t i = 0; i < slice && !alone; ++i) {
       if (!bare.carry(frames)) {
         return fail(ErrorKind::device, "a bare frame was lost");
       }
     }
     bare_s += seconds_since(bare_start);
   }
-  const double bytes = static_cast<double>(blocks) * payload;
-  const double times_real = bytes / ours_s / real_fd_bus_bytes_per_s;
   const std::uint64_t lost = tester->socket.lost_frames() + ins->socket.lost_frames();
+  if (alone) {
+    mark("end", c, bytes);
+    return lost == 0;
+  }
+  const double times_real = bytes / ours_s / real_fd_bus_bytes_per_s;
   fmt::print("{:<20} {:8.0f} kB/s {:6.1f} times the real FD bus; {:.0f} % of the bare system calls' {:.1f} times; {} "
              "lost\n",
              c.name, bytes / ours_s / 1e3, times_real, 100.0 * bare_s / ours_s,
@@ -232,11 +248,11 @@ Expected<bool> measure(const char* interface, const Case& c, double megabytes) {
   return lost == 0 && (!c.fd || times_real >= asked_for);
 }
 
-int run(const char* interface, double megabytes) {
+int run(const char* interface, double megabytes, bool alone) {
   bool good = true;
   for (const Case& c : {Case{"classic, block 4095", false, 4095}, Case{"FD, block 4095", true, 4095},
                         Case{"FD, block 65535", true, 65535}}) {
-    const auto result = measure(interface, c, megabytes);
+    const auto result = measure(interface, c, megabytes, alone);
     if (!result) {
       fmt::print(stderr, "{}: {}\n", c.name, result.error().message);
       return static_cast<int>(result.error().kind);
@@ -251,8 +267,8 @@ int run(const char* interface, double megabytes) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "usage: socket_bench INTERFACE [MEGABYTES]\n");
+    fmt::print(stderr, "usage: socket_bench INTERFACE [MEGABYTES] [alone]\n");
     return 2;
   }
-  return selfcal::run(argv[1], argc > 2 ? std::atof(argv[2]) : 16.46);
+  return selfcal::run(argv[1], argc > 2 ? std::atof(argv[2]) : 16.46, argc > 3 && std::string_view(argv[3]) == "alone");
 }
