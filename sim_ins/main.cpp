@@ -104,6 +104,8 @@ void configure(CLI::App& app, Arguments& a) {
   app.add_option("--speed", node.speed, "INS seconds per second")->check(CLI::Range(0.01, 1e5))->capture_default_str();
   app.add_option("--patience", node.patience, "stretches the time-outs of ISO-TP and session, for slow testers")
       ->check(CLI::Range(1.0, 1000.0))->capture_default_str();
+  app.add_option("--turnaround", node.turnaround_ms, "of the tester in an upload, ms of INS time for each request")
+      ->check(CLI::Range(0.0, 1000.0))->capture_default_str();
   app.add_flag("--fd", node.fd, "CAN FD with bit rate switch");
   app.add_option("--bit-rate", a.arbitration_rate, "bit/s")->capture_default_str();
   app.add_option("--data-bit-rate", a.data_rate, "bit/s, FD data phase")->capture_default_str();

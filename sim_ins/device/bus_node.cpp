@@ -17,11 +17,15 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t frames_per_call = 128;
 constexpr double status_interval_s = 0.2;              // INS time, but
-constexpr double least_real_interval_s = 0.005;        // never more often than this in real time
+constexpr double least_real_interval_s = 0.02;         // never more often than this in real time
 // Largest steps of the INS's clock in one turn of the loop. During an upload small ones, so that frames go out as a
-// real bus would carry them, however fast the clock is asked to run.
+// real bus would carry them, however fast the clock is asked to run. A compressed clock does not make up for what the
+// host takes from all of us: the tester's time-outs run in real time, and it would meet an INS that is far ahead.
 constexpr double longest_step_s = 2.0;
+constexpr double longest_compressed_step_s = 0.02;   // times the speed
 constexpr double longest_step_in_upload_s = 0.025;
+// How long the loop sleeps where no frame comes: while nothing is under way, no longer than until the next status.
+constexpr int short_sleep_ms = 1, long_sleep_ms = 10;
 // During an upload, while it is the tester's turn, the clock stands: a tester in compressed time is not charged its
 // own run time a hundredfold. But not for longer than this, should it have gone.
 constexpr Time patience = 200ms;
@@ -81,6 +85,7 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       server_(transport_options(options), server_timings(options), diagnostics_),
       socket_(std::move(socket)),
       bus_(options.rates),
+      turnaround_(options.turnaround_ms),
       random_(options.seed, fault_stream),
       faulty_(options.scenario) {}
 
@@ -125,6 +130,8 @@ void BusNode::receive(Time now) {
       if (received.event) {
         continue;
       }
+      const double heard_s = turnaround_.heard(received.frame, now_s_, seconds(bus_.free_at()));
+      now_s_ = transaction() ? heard_s : now_s_;
       bus_.transmit(received.frame, ins_time());
       tester_heard_ = now;
       if (instrument_.ready() && !acts(FaultKind::bus_off)) {   // nobody listens while the INS starts
@@ -134,13 +141,20 @@ void BusNode::receive(Time now) {
   }
 }
 
+double BusNode::longest_step() const {
+  if (transaction()) {
+    return longest_step_in_upload_s;
+  }
+  return options_.speed > 1.0 ? std::min(longest_step_s, longest_compressed_step_s * options_.speed) : longest_step_s;
+}
+
 void BusNode::advance_clock(Time now) {
   const double real_step = seconds(now - real_before_);
   real_before_ = now;
   step_began_ = ins_time();
   const bool testers_turn = transaction() && !more_to_send_ && now - tester_heard_ < patience;
   if (!testers_turn) {
-    now_s_ += std::min(options_.speed * real_step, transaction() ? longest_step_in_upload_s : longest_step_s);
+    now_s_ += std::min(options_.speed * real_step, longest_step());
   }
   if (const Fault* refusal = options_.scenario.active(FaultKind::nrc, now_s_)) {
     diagnostics_.answer_all_with(static_cast<uds::Nrc>(static_cast<std::uint8_t>(refusal->value)));
@@ -309,6 +323,7 @@ void BusNode::transmit(Time now) {
     }
     if (fits > 0) {
       server_.sent(fits, now);
+      turnaround_.answer_sent();
     }
     if (fits < offered) {
       more_to_send_ = true;
@@ -338,6 +353,17 @@ void BusNode::tell_progress() {
   }
 }
 
+int BusNode::sleep_ms() const {
+  if (more_to_send_) {
+    return 0;
+  }
+  if (transaction() || !server_.idle() || faulty_.holds_frames() || instrument_.flash().busy()) {
+    return short_sleep_ms;
+  }
+  const double until_status_ms = (next_status_s_ - now_s_) / options_.speed * 1000.0;
+  return static_cast<int>(std::clamp<double>(until_status_ms, short_sleep_ms, long_sleep_ms));
+}
+
 void BusNode::run(const volatile int& stop) {
   real_before_ = real_now();
   reset(real_before_);
@@ -365,7 +391,7 @@ void BusNode::run(const volatile int& stop) {
     if (more_to_send_) {
       ::sched_yield();   // on one processor the tester takes what it was sent, instead of the queue filling up
     }
-    ::poll(&waiting, 1, more_to_send_ ? 0 : 1);
+    ::poll(&waiting, 1, sleep_ms());
   }
   const std::string acted = faulty_.tally();
   fmt::print(stderr, "sim_ins: switched off at {:.3f} s; faults of the bus that acted: {}\n", now_s_,

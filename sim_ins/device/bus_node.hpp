@@ -13,6 +13,7 @@
 #include "sim_ins/device/diagnostics.hpp"
 #include "sim_ins/device/instrument.hpp"
 #include "sim_ins/device/scenario.hpp"
+#include "sim_ins/device/turnaround.hpp"
 #include "sim_ins/random.hpp"
 
 namespace selfcal::sim {
@@ -34,6 +35,7 @@ struct NodeOptions {
   bool fd = false;
   can::BitRates rates;
   double speed = 1.0;                    // INS seconds per second
+  double turnaround_ms = 0.0;            // INS time from an answer to the tester's next request, in an upload
   double patience = 1.0;                 // stretches N_As, N_Bs, N_Cr and S3, which run in real time
   FrameFaults frame_faults;
   Scenario scenario;                     // faults of the bus, of status and answers, by time
@@ -58,6 +60,7 @@ class BusNode {
   void receive(Time now);
   void lose_link(const Error& why);
   void try_reopen(Time now);
+  double longest_step() const;
   void advance_clock(Time now);
   void transmit(Time now);
   bool put_on_bus(std::span<const can::CanFrame> frames);
@@ -66,6 +69,7 @@ class BusNode {
   void hear_second_tester(Time now);
   void queue_status();
   void tell_progress();
+  int sleep_ms() const;
   bool transaction() const { return diagnostics_.uploading(); }
   Time ins_time() const;
 
@@ -76,6 +80,7 @@ class BusNode {
   can::SocketOptions socket_options_;
   std::optional<can::Socket> socket_;
   can::BusClock bus_;
+  Turnaround turnaround_;
   Random random_;
   FaultyBus faulty_;
   std::vector<can::CanFrame> spoilt_;   // kept for its storage

@@ -79,6 +79,7 @@ class FaultyBus {
   // Delayed frames that are due, and babble.
   void flush(double t, std::vector<can::CanFrame>& out);
   void note_state(ins::State state, double t) { scenario_.note_state(state, t); }
+  bool holds_frames() const { return !held_.empty(); }
   const Scenario& scenario() const { return scenario_; }
   // How often each fault acted: "drop 12, reorder 3"; empty if none did.
   std::string tally() const;

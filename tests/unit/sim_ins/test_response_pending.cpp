@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "protocol/byte_order.hpp"
+#include "sim_ins/device/turnaround.hpp"
 #include "tests/unit/protocol/frames.hpp"
 #include "tests/unit/sim_ins/virtual_unit.hpp"
 
@@ -288,6 +289,20 @@ TEST_F(ResponsePending, ASessionOutlivesALongWrite) {
   EXPECT_TRUE(unit_.diagnostics().unlocked());
   pass(3ms);
   EXPECT_FALSE(unit_.diagnostics().unlocked());
+}
+
+// From the end of an answer, at 10 s, to the next request, once; the driver's flow control costs nothing.
+TEST(TurnaroundOfTheTester, IsChargedOnceForEachAnswer) {
+  const can::CanFrame request = frame("640#023601");
+  Turnaround turnaround(2.0);
+  EXPECT_EQ(turnaround.heard(request, 5.0, 4.0), 5.0);               // nothing was answered
+  turnaround.answer_sent();
+  EXPECT_EQ(turnaround.heard(frame("640#300000"), 5.1, 5.1), 5.1);
+  turnaround.answer_sent();
+  EXPECT_DOUBLE_EQ(turnaround.heard(request, 9.9995, 10.0), 10.002);
+  EXPECT_EQ(turnaround.heard(request, 10.5, 10.4), 10.5);            // asked again before any answer
+  turnaround.answer_sent();
+  EXPECT_EQ(turnaround.heard(request, 12.0, 11.0), 12.0);            // the clock went on by itself meanwhile
 }
 
 }  // namespace
