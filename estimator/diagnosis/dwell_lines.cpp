@@ -19,8 +19,8 @@ struct Line {
   double log_p = 0.0;
 };
 
-// Peaks of the dwell's spectrum over its neighbourhood. What comes from white noise of the integral grows as f^2, so bins
-// are compared as densities of velocity or angle would be, divided by it.
+// Peaks of the dwell's spectrum over its neighbourhood. What comes from white noise of the integral grows as f^2, so
+// bins are compared as densities of velocity or angle would be, divided by it.
 std::vector<Line> peaks(const Eigen::VectorXd& rate, double rate_hz, double bins_searched) {
   const Eigen::Index n = rate.size();
   Eigen::VectorXd windowed = rate.array() - rate.mean();

@@ -61,8 +61,8 @@ class Naming {
   // Of the biases that dwells, rotations, times since a turn and times of the recording still show, axis by axis: the
   // smallest p, corrected. A single one is the map's; this is what many together leave.
   double log_p_structure() const;
-  // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts with
-  // the attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some.
+  // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts
+  // with the attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some.
   double log_p_likeness() const { return log_p_likeness_; }
   // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value() const;

@@ -280,8 +280,8 @@ void Naming::append_derivatives() {
     const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
     Eigen::MatrixXd difference(c.count, 2 * c.count);
     difference << Eigen::MatrixXd::Identity(c.count, c.count), -Eigen::MatrixXd::Identity(c.count, c.count);
-    chosen.derivative = append_columns({{c.effect, c.constant * std::exp(h), 0, 0}, {c.effect, c.constant * std::exp(-h), 0, 0}},
-                                       difference / (2.0 * h));
+    const Candidate above{c.effect, c.constant * std::exp(h), 0, 0}, below{c.effect, c.constant * std::exp(-h), 0, 0};
+    chosen.derivative = append_columns({above, below}, difference / (2.0 * h));
   }
 }
 

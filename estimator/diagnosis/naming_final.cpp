@@ -150,9 +150,9 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   return log_corrected(smallest, tests_per_axis * static_cast<double>(axes));
 }
 
-// A drift that is named after one curve in time must not need a second, one named after gravity, field or rate no function
-// of the gimbal angles beside it: over tens of minutes and eighteen positions much looks alike, and a test of everything
-// that may be left has little power against what is likely.
+// A drift that is named after one curve in time must not need a second, one named after gravity, field or rate no
+// function of the gimbal angles beside it: over tens of minutes and eighteen positions much looks alike, and a test of
+// everything that may be left has little power against what is likely.
 void Naming::test_likenesses() {
   log_p_likeness_ = 0.0;
   const bool gimbal = !context_.data().gimbal_outer.empty() && !context_.data().gimbal_inner.empty();

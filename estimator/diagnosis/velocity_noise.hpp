@@ -7,8 +7,8 @@
 
 namespace selfcal::diagnosis {
 
-// Where it is large enough to colour the innovations it becomes a walk of the position observed (exactly its effect on a
-// filter that observes nothing else), and all densities those of the greatest likelihood. True where `input` changed.
+// Where it is large enough to colour the innovations it becomes a walk of the position observed (exactly its effect on
+// a filter that observes nothing else), and all densities those of the greatest likelihood. True where `input` changed.
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise);
 
 }  // namespace selfcal::diagnosis

@@ -30,10 +30,10 @@ std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed);
 struct ConcealedEffect {
   sim::PhysicsEffect physics;
   Response response;           // of this effect alone, at its size; zero where a bound has no meaning (noise)
-  // SI: bound of the 24 with all of the effect's coefficients and its constants to be estimated; zero where not computed.
+  // SI: bound of the 24 with all of the effect's coefficients and constants to be estimated; zero where not computed.
   ParameterVector augmented_sigma = ParameterVector::Zero();
-  // Outside the catalogue: sigmas that the best of its likely twins (gyro drifts with attitude and time) leaves; below 0
-  // where not computed.
+  // Outside the catalogue: sigmas that the best of its likely twins (gyro drifts with attitude and time) leaves; below
+  // 0 where not computed.
   double unlike_sigmas = -1.0;
 };
 

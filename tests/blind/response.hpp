@@ -25,7 +25,7 @@ struct Response {
   ParameterVector sigma = ParameterVector::Zero();   // SI: bound of the 24, effect not fitted
 };
 
-// A direction of the augmented model: (plus - minus) / step, of which it is known beforehand that its size is 0 +-prior.
+// A direction of the augmented model: (plus - minus) / step, whose size is known beforehand to be 0 +-prior.
 struct Column {
   sim::ConcealedPhysics plus, minus;
   double step = 1.0;

@@ -68,6 +68,11 @@ def alarmed(answer):
     return answer.get("mismatch", True)   # a failed diagnosis says at least that something is wrong
 
 
+def unexplained_only(answer):
+    """None of the above, or a mismatch that no equation is named for."""
+    return alarmed(answer) and not names(answer) or answer.get("unexplained", False)
+
+
 def truths(case):
     return {e["id"]: e for e in case["effects"]}
 
@@ -247,13 +252,13 @@ class Score:
                                        for _, a in g)
             if g:
                 self.say(f"  {low:5.1f}..: n {len(g)}: " + ", ".join(f"{k} {v}" for k, v in said.most_common()))
-        unexplained = sum(alarmed(a) and not names(a) or a.get("unexplained", False) for _, a in pairs)
+        unexplained = sum(unexplained_only(a) for _, a in pairs)
         named = sum(bool(names(a)) for _, a in pairs)
         self.say(f"  none of the above or unexplained {share(unexplained, len(pairs))}, a library name "
                  f"{share(named, len(pairs))}")
         apart = [(c, a) for c, a in pairs if c["effects"][0].get("unlike_sigmas", math.inf) >= 5.9]
         self.say(f"  of those that differ by 6 sigma and more from the catalogue's own drifts: none of the above or "
-                 f"unexplained {share(sum(alarmed(a) and not names(a) or a.get('unexplained', False) for _, a in apart), len(apart))}, "
+                 f"unexplained {share(sum(unexplained_only(a) for _, a in apart), len(apart))}, "
                  f"a library name {share(sum(bool(names(a)) for _, a in apart), len(apart))}")
         for c, a in pairs:
             if names(a):
@@ -340,9 +345,9 @@ class Score:
         for of in ("all", "rightly named"):
             told = {k: f"{rms(v):.2f} ({middle(v):.2f})" for (o, k), v in sizes.items() if o == of}
             if told:
-                self.say(f"  {of}: bound with all of the effect's coefficients unknown: before {told['augmented before']}, "
-                         f"after {told['augmented']}; with direction and constants known: before {told['known before']}, "
-                         f"after {told['known']}; sigma stated: {told['stated']}")
+                self.say(f"  {of}: bound with all of the effect's coefficients unknown: before "
+                         f"{told['augmented before']}, after {told['augmented']}; with direction and constants known: "
+                         f"before {told['known before']}, after {told['known']}; sigma stated: {told['stated']}")
 
     def rivals(self):
         clean = [a for _, a in self.of("clean") if "rivals" in a]
