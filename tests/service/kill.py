@@ -5,7 +5,6 @@ import collections
 import math
 import os
 import random
-import re
 import sys
 import tempfile
 import time
@@ -39,39 +38,19 @@ class Trial:
         self.killed_in, self.ends, self.faults = collections.Counter(), collections.Counter(), []
         self.killed_idle = 0
         self.version, self.held = 0, None
-        self.log_read, self.log_text = 0, ""   # so much of the service's log; of this run
+        self.log = watch.ServiceLog(self.unit)   # of this run
 
     def start(self):
         self.unit.start()
         self.version, self.held = witness.coefficients_in_force(self.unit.interface)
 
-    # --- what the service wrote, read where it is new only: reading must not cost the processor that is tried ---------
-    def log_of_this_run(self):
-        with open(self.unit.folder / "selfcald.log", "rb") as file:
-            file.seek(self.log_read)
-            new = file.read()
-        self.log_read += len(new)
-        self.log_text += new.decode(errors="replace")
-        return self.log_text
-
-    @staticmethod
-    def ended(run, log):
-        return re.search(rf"run {run}: ({'|'.join(watch.FINAL)}): ", log)
-
-    def wait_for_end(self, run):
-        end = time.monotonic() + 600
-        while not self.ended(run, self.log_of_this_run()) and time.monotonic() < end:
-            time.sleep(0.1)
-        return self.unit.wait_for_end(run, timeout=60)
-
     def start_service(self):
-        """Ready when it says so: an operator's program that asks again and again costs more than all else."""
-        readies = self.log_of_this_run().count(" ready\n")
+        readies = self.log.now().count(" ready\n")
         self.unit.spawn_daemon()
         end = time.monotonic() + 120
-        while self.log_of_this_run().count(" ready\n") == readies:
+        while self.log.now().count(" ready\n") == readies:
             if self.unit.daemon_process.poll() is not None or time.monotonic() > end:
-                raise RuntimeError(f"the service does not come up again:\n{self.log_text[-2000:]}")
+                raise RuntimeError(f"the service does not come up again:\n{self.log.text[-2000:]}")
             time.sleep(0.02)
 
     # --- kills -------------------------------------------------------------------------------------------------
@@ -79,17 +58,17 @@ class Trial:
         """Waits for a moment after the run entered the state. False if the run was over before it came."""
         delay = self.draw.uniform(0.0, self.draw.choice((AIMED_WITHIN_S, ANYWHERE_WITHIN_S)))
         # The first state is the run's own beginning, of which the log says nothing.
-        while wanted != STATES[0] and f"run {run}: {wanted}: " not in (log := self.log_of_this_run()):
-            if self.ended(run, log):
+        while wanted != STATES[0] and f"run {run}: {wanted}: " not in self.log.now():
+            if self.log.ended(run):
                 return False
             time.sleep(0.01)
         time.sleep(delay)
-        return not self.ended(run, self.log_of_this_run())
+        return not self.log.ended(run)
 
     def abort(self, run):
         """False if the run was over before the operator could."""
         done = self.unit.selfcal("abort", self.unit.name, "--reason", "trial of kills", check=False)
-        if done.returncode != 0 and not self.ended(run, self.log_of_this_run()):
+        if done.returncode != 0 and not self.log.ended(run):
             self.faults.append(f"run {run} cannot be aborted: {done.stderr.strip()}")
         time.sleep(self.draw.uniform(0.0, AIMED_WITHIN_S))
         return done.returncode == 0
@@ -109,8 +88,7 @@ class Trial:
     # --- runs --------------------------------------------------------------------------------------------------
     def run(self, kills):
         rotations = self.rotations()
-        self.log_of_this_run()
-        self.log_text = ""
+        self.log.forget()
         aborting = self.draw.random() < ABORTED_RUNS
         run = self.unit.start_run("--schedule", self.unit.folder / "short.toml",
                                   "--force", "trial of kills")
@@ -121,7 +99,8 @@ class Trial:
             if aborting and k == kills - 1:
                 aborted = self.abort(run)
             self.kill(run)
-        document = self.wait_for_end(run)
+        self.log.wait_for_end(run)
+        document = self.unit.wait_for_end(run, timeout=60)
         self.ends[document["state"]] += 1
         complain = lambda text: self.faults.append(f"run {run}, {document['state']}: {text}")  # noqa: E731
         # Too late to abort, or over: completed all the same. Nothing else may end a run here.

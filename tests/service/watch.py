@@ -1,9 +1,11 @@
 """What the trials of the service look at from outside: its process in /proc, its database and its files."""
 import os
+import re
 import shutil
 import sqlite3
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -34,6 +36,37 @@ class Process:
     def cpu_s(self):
         fields = (self.folder / "stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class ServiceLog:
+    """What the service of a bench wrote, read where it is new only: an operator's program that asks again and again costs
+    more of the processor than all that is tried."""
+    def __init__(self, unit):
+        self.path = unit.folder / "selfcald.log"
+        self.read = 0
+        self.text = ""
+
+    def forget(self):
+        self.now()
+        self.text = ""
+
+    def now(self):
+        with open(self.path, "rb") as file:
+            file.seek(self.read)
+            new = file.read()
+        self.read += len(new)
+        self.text += new.decode(errors="replace")
+        return self.text
+
+    def ended(self, run):
+        return re.search(rf"run {run}: ({'|'.join(sorted(FINAL))}): ", self.now())
+
+    def wait_for_end(self, run, timeout=600.0):
+        end = time.monotonic() + timeout
+        while not self.ended(run):
+            if time.monotonic() > end:
+                raise RuntimeError(f"run {run} has not ended within {timeout:g} s:\n{self.text[-2000:]}")
+            time.sleep(0.1)
 
 
 def with_copy(state_directory, ask):
