@@ -93,7 +93,7 @@ Expected<void> exchange(End& tester, End& ins, std::span<const std::uint8_t> res
   if (!tester.transport.send(request, t)) {
     return fail(ErrorKind::internal, "the tester is still sending");
   }
-  if (const auto asked = tester.transmit(t); !asked) {
+  if (auto asked = tester.transmit(t); !asked) {
     return asked;
   }
   for (;; t = now()) {
@@ -105,7 +105,7 @@ Expected<void> exchange(End& tester, End& ins, std::span<const std::uint8_t> res
       if (!ins.transport.send(response, t)) {
         return fail(ErrorKind::internal, "the INS is still sending");
       }
-      if (const auto begun = ins.transmit(t); !begun) {
+      if (auto begun = ins.transmit(t); !begun) {
         return begun;
       }
     }

@@ -79,6 +79,7 @@ class ResponsePending : public testing::Test {
   }
   static std::vector<std::string> frames(const std::vector<Seen>& seen) {
     std::vector<std::string> result;
+    result.reserve(seen.size());
     for (const Seen& one : seen) {
       result.push_back(one.frame);
     }
