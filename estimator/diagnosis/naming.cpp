@@ -237,7 +237,7 @@ void Naming::refine_constant(Chosen& chosen) {
       chosen.candidate.constant *= std::exp((static_cast<double>(middle) - steps + offset) * step);
       // gain = -2 log likelihood: sigma^2 = -2 / (second derivative).
       chosen.constant_sigma = curvature < 0.0 ? chosen.candidate.constant * step * std::sqrt(-2.0 / curvature) : 0.0;
-      const bool at_edge = top == 0 || top == 2 * steps;
+      const bool at_edge = top == 0 || top + 1 == std::ssize(gain);
       if (!at_edge || chosen.candidate.constant < least || chosen.candidate.constant > most) {
         break;
       }
