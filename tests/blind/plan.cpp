@@ -149,10 +149,7 @@ Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& ra
 }  // namespace
 
 std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed) {
-  std::vector<Recipe> all;
-  for (int k = 0; k < size.clean; ++k) {
-    all.push_back({"clean", {}, 0.0});
-  }
+  std::vector<Recipe> all(static_cast<std::size_t>(std::max(0, size.clean)), Recipe{"clean", {}, 0.0});
   const std::vector<std::string> catalogue = ids_of(KindGroup::catalogue);
   sim::Random random(seed, 1);
   for (int r = 0; r < size.repeats; ++r) {

@@ -1,0 +1,97 @@
+#include "estimator/diagnosis/dwell_lines.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr double rate_hz = 64.0, length_s = 60.0;
+constexpr double integral_noise = 2e-4;   // m/s, white: a quantum of 0.7 mm/s
+constexpr double bias = 1e-3, frequency_hz = 0.4;
+
+// One dwell of accelerometer z: a bias, white noise of velocity and a line of force.
+struct Dwell {
+  std::vector<double> time;
+  AngleVelocity theta, velocity;
+  ImuData data;
+  std::vector<Segment> segments;
+
+  explicit Dwell(double amplitude) {
+    const auto n = static_cast<std::size_t>(rate_hz * length_s);
+    std::mt19937_64 engine(5);
+    std::normal_distribution<double> normal(0.0, integral_noise);
+    theta.assign(n, {0.0, 0.0, 0.0});
+    double last = normal(engine);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double t = static_cast<double>(i) / rate_hz;
+      const double now = normal(engine);
+      const double force = bias + amplitude * std::cos(2.0 * std::numbers::pi * frequency_hz * t);
+      velocity.push_back({0.0, 0.0, force / rate_hz + now - last});
+      last = now;
+      time.push_back(t + 1.0 / rate_hz);
+    }
+    data.sample_rate_hz = rate_hz;
+    data.time_s = time;
+    data.delta_theta = theta;
+    data.delta_v = velocity;
+    segments = {{false, 0, n, 0.0, length_s, 0.0, 0.0}};
+  }
+};
+
+// Amplitude at a frequency of what is left, m/s^2.
+double amplitude_of(const AngleVelocity& velocity) {
+  double cosine = 0.0, sine = 0.0;
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    const double phase = 2.0 * std::numbers::pi * frequency_hz * static_cast<double>(i) / rate_hz;
+    cosine += (velocity[i][2] * rate_hz - bias) * std::cos(phase);
+    sine += (velocity[i][2] * rate_hz - bias) * std::sin(phase);
+  }
+  return std::hypot(cosine, sine) * 2.0 / static_cast<double>(velocity.size());
+}
+
+// White noise s of the integral has the two-sided density s^2 (2 pi f)^2 / rate; an amplitude fitted over T scatters by
+// sqrt(2 density / T), 1.1e-5 m/s^2 here.
+const double amplitude_sigma =
+    2.0 * std::numbers::pi * frequency_hz * integral_noise * std::sqrt(2.0 / (rate_hz * length_s));
+
+TEST(DwellLines, StrongLineIsFoundAndTakenOut) {
+  const double amplitude = 50.0 * amplitude_sigma;
+  Dwell dwell(amplitude);
+  const auto lines = subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity);
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines.front().axis, 5);
+  // Between two bins of 1/60 Hz the peak is found to a tenth of one: the amplitude loses (pi/10)^2/6 = 1.6 %.
+  EXPECT_NEAR(lines.front().frequency_hz, frequency_hz, 0.1 / length_s);
+  EXPECT_NEAR(lines.front().amplitude, amplitude, 5.0 * amplitude_sigma + 0.016 * amplitude);
+  // What a tenth of a bin leaves: pi/10/sqrt(3) of it in quadrature.
+  EXPECT_LT(amplitude_of(dwell.velocity), 0.18 * amplitude + 5.0 * amplitude_sigma);
+}
+
+// Whole periods have no mean, so the bias stays.
+TEST(DwellLines, BiasStays) {
+  Dwell dwell(50.0 * amplitude_sigma);
+  double before = 0.0, after = 0.0;
+  for (const auto& v : dwell.velocity) {
+    before += v[2] / length_s;
+  }
+  subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity);
+  for (const auto& v : dwell.velocity) {
+    after += v[2] / length_s;
+  }
+  // A tenth of a bin off, the sinusoid's mean over the dwell is at most a/(2 pi f T) of its amplitude.
+  EXPECT_NEAR(after, before, 50.0 * amplitude_sigma / (2.0 * std::numbers::pi * frequency_hz * length_s));
+}
+
+TEST(DwellLines, NoiseAloneIsLeftAlone) {
+  Dwell dwell(0.0);
+  const AngleVelocity before = dwell.velocity;
+  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity).empty());
+  EXPECT_EQ(dwell.velocity, before);
+}
+
+}  // namespace
+}  // namespace selfcal::diagnosis
