@@ -1,6 +1,6 @@
 #include "estimator/models/sensor_noise.hpp"
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,52 +21,72 @@ constexpr int lowest_bins = 5;
 constexpr std::size_t enough_pieces = 10;
 constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
 constexpr double margin_s = 1.0;          // left out at both ends of a dwell
-constexpr int detrend_order = 4;
+constexpr int detrend_order = 8;          // a sway of 5 s is two thirds of a cycle of a piece
 
-// Takes a polynomial out of a piece and tapers it; sway is slow and large, and must not leak into the band.
-class PiecePreparation {
+// Takes a polynomial out of a piece and tapers it; sway is slow and large, and must not leak into the band. What both do
+// to noise is linear and taken into account: at the lowest bins the polynomial takes some of it away.
+class PieceAnalysis {
  public:
-  PiecePreparation() : basis_(piece_length, detrend_order + 1), window_(piece_length) {
+  using Bins = Eigen::Array<double, highest_bin - lowest_bin + 1, 1>;
+
+  PieceAnalysis() : cosine_(Bins::RowsAtCompileTime, piece_length), sine_(Bins::RowsAtCompileTime, piece_length) {
+    Eigen::MatrixXd basis(piece_length, detrend_order + 1);
+    Eigen::VectorXd window(piece_length);
     for (int i = 0; i < piece_length; ++i) {
       const double t = (2.0 * i + 1.0) / piece_length - 1.0;
       const double sine = std::sin(std::numbers::pi * (i + 0.5) / piece_length);
-      window_(i) = sine * sine * sine * sine;
-      for (int k = 0; k < basis_.cols(); ++k) {
-        basis_(i, k) = std::pow(t, k);
+      window(i) = sine * sine * sine * sine;
+      for (int k = 0; k < basis.cols(); ++k) {
+        basis(i, k) = std::legendre(static_cast<unsigned>(k), t);
       }
-    }
-    projector_ = basis_ * (basis_.transpose() * basis_).inverse() * basis_.transpose();
-    cosine_.resize(highest_bin - lowest_bin + 1, piece_length);
-    sine_.resize(highest_bin - lowest_bin + 1, piece_length);
-    for (int b = lowest_bin; b <= highest_bin; ++b) {
-      for (int i = 0; i < piece_length; ++i) {
+      for (int b = lowest_bin; b <= highest_bin; ++b) {
         const double phase = 2.0 * std::numbers::pi * b * i / piece_length;
         cosine_(b - lowest_bin, i) = std::cos(phase);
         sine_(b - lowest_bin, i) = std::sin(phase);
       }
     }
+    // x = W (r - B a), a of least squares in the window's own weights: what remains is orthogonal under the window.
+    const Eigen::MatrixXd weighted = window.asDiagonal() * basis;
+    const Eigen::MatrixXd fit = (weighted.transpose() * weighted).ldlt().solve(weighted.transpose() * window.asDiagonal());
+    const Eigen::MatrixXd prepare = Eigen::MatrixXd(window.asDiagonal()) - weighted * fit;
+    cosine_ *= prepare;
+    sine_ *= prepare;
+    white_gain_ = cosine_.rowwise().squaredNorm() + sine_.rowwise().squaredNorm();
+    angle_ratio_ = (difference_power(cosine_) + difference_power(sine_)) / white_gain_;
   }
 
   // Periodogram of rates (per s) at the bins, density per Hz, two-sided: white noise of asd N gives N^2.
-  Eigen::ArrayXd periodogram(const Eigen::VectorXd& rates, double group_s) const {
-    const Eigen::VectorXd x = (rates - projector_ * rates).cwiseProduct(window_);
-    return ((cosine_ * x).array().square() + (sine_ * x).array().square()) * (group_s / window_.squaredNorm());
+  Bins periodogram(const Eigen::VectorXd& rates, double group_s) const {
+    return ((cosine_ * rates).array().square() + (sine_ * rates).array().square()) * group_s / white_gain_;
   }
 
+  // The same of white angle of unit variance: about 4 sin^2(pi f D)/D.
+  Bins angle_density(double group_s) const { return angle_ratio_ / group_s; }
+
  private:
-  Eigen::MatrixXd basis_, projector_, cosine_, sine_;
-  Eigen::VectorXd window_;
+  // Variance of each row's product with the differences of white noise of unit variance: neighbours correlate by -1.
+  static Bins difference_power(const Eigen::MatrixXd& rows) {
+    return 2.0 * rows.rowwise().squaredNorm() -
+           2.0 * rows.leftCols(piece_length - 1).cwiseProduct(rows.rightCols(piece_length - 1)).rowwise().sum();
+  }
+
+  Eigen::MatrixXd cosine_, sine_;
+  Bins white_gain_, angle_ratio_;
 };
 
+const PieceAnalysis& analysis() {
+  static const PieceAnalysis once;
+  return once;
+}
+
 struct Spectrum {
-  Eigen::ArrayXd density = Eigen::ArrayXd::Zero(highest_bin - lowest_bin + 1);
+  PieceAnalysis::Bins density = PieceAnalysis::Bins::Zero();
   std::size_t pieces = 0;
   double group_s = 0.0;   // as grouped: whole samples
 };
 
 Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<Segment>& segments,
                        double group_s) {
-  static const PiecePreparation preparation;
   const auto group = static_cast<std::size_t>(std::max(1.0, std::round(group_s * rate_hz)));
   const std::size_t length = group * piece_length;
   const auto margin = static_cast<std::size_t>(margin_s * rate_hz);
@@ -95,7 +115,7 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
           }
           rates(i) = sum / spectrum.group_s;
         }
-        spectrum.density += preparation.periodogram(rates, spectrum.group_s) / 3.0;
+        spectrum.density += analysis().periodogram(rates, spectrum.group_s) / 3.0;
       }
       ++spectrum.pieces;
     }
@@ -106,15 +126,11 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
   return spectrum;
 }
 
-// density = N^2 + Q^2 * 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
+// density = N^2 + Q^2 * (about) 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
 // A quantum that is carried on (known_angle) leaves quantum^2/12 of white angle; it is then not fitted.
 void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, TriadNoise& noise) {
   const Eigen::Index bins = spectrum.density.size();
-  Eigen::ArrayXd shape(bins);
-  for (Eigen::Index b = 0; b < bins; ++b) {
-    const double sine = std::sin(std::numbers::pi * static_cast<double>(b + lowest_bin) / piece_length);
-    shape(b) = 4.0 * sine * sine / spectrum.group_s;
-  }
+  const PieceAnalysis::Bins shape = analysis().angle_density(spectrum.group_s);
   std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
   std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
   double white = sorted[static_cast<std::size_t>(bins / 2)];
