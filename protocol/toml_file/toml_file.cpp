@@ -37,9 +37,10 @@ std::string written(const toml::node& node) {
 
 Error error_of(const std::string& name, const toml::node* node, std::string_view key, std::string_view what) {
   if (node == nullptr) {
-    return {ErrorKind::bad_input, fmt::format("{}: {}: {}", name, one_line(key), what)};
+    return {ErrorKind::bad_input, fmt::format("{}: {}: {}", name, one_line(key), one_line(what))};
   }
-  return {ErrorKind::bad_input, fmt::format("{}:{}: {}: {}", name, node->source().begin.line, one_line(key), what)};
+  return {ErrorKind::bad_input,
+          fmt::format("{}:{}: {}: {}", name, node->source().begin.line, one_line(key), one_line(what))};
 }
 
 Expected<double> number_of(const std::string& name, const toml::node& node, std::string_view key) {
