@@ -4,6 +4,23 @@
 #include <array>
 
 namespace selfcal::uds {
+namespace {
+
+// Bytes after the service that a positive response repeats and that say what it is about: the identifier of a record, and
+// of a routine behind its sub-function.
+std::size_t identifier_size(std::uint8_t service) {
+  switch (service) {
+    case service::read_data:
+    case service::write_data:
+      return 2;
+    case service::routine_control:
+      return 3;
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
 
 Client::Client(const isotp::Options& options, const ClientTimings& timings)
     : transport_(options), timings_(timings) {}
@@ -14,6 +31,9 @@ bool Client::request(std::span<const std::uint8_t> message, Time now) {
   }
   waiting_ = true;
   service_ = message[0];
+  answered_by_size_ = std::min(message.size(), 1 + identifier_size(service_));
+  std::copy_n(message.begin(), answered_by_size_, answered_by_.begin());
+  answered_by_[0] = static_cast<std::uint8_t>(service_ + positive_offset);
   deadline_.reset();
   pending_until_.reset();
   return true;
@@ -81,10 +101,12 @@ std::optional<Outcome> Client::handle(const isotp::Events& events, Time now) {
   return std::nullopt;
 }
 
-// Whatever does not answer the request under way is the late answer to one that was given up: passed over.
+// Whatever does not answer the request under way is the late answer to one that was given up, or the answer to another
+// tester with the same identifiers: passed over.
 std::optional<Outcome> Client::judge_message(Time now) {
   const auto message = transport_.message();
-  if (message[0] == static_cast<std::uint8_t>(service_ + positive_offset)) {
+  const std::size_t compared = std::min(message.size(), answered_by_size_);
+  if (std::equal(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(compared), answered_by_.begin())) {
     return finish({Outcome::Kind::positive, message, 0, isotp::Result::received});
   }
   if (!deadline_ && !transport_.sending()) {

@@ -4,6 +4,7 @@
 // Drive it as isotp::Transport: on_frame / on_time / pending / sent / next_deadline.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -64,6 +65,8 @@ class Client {
   ClientTimings timings_;
   bool waiting_ = false;
   std::uint8_t service_ = 0;
+  std::array<std::uint8_t, 4> answered_by_{};   // how the positive response begins: service and identifier
+  std::size_t answered_by_size_ = 0;
   std::optional<Time> deadline_;         // P2 or P2*, runs while nothing is being received
   std::optional<Time> pending_until_;    // no more response-pending after this
   std::optional<Time> next_tester_present_;

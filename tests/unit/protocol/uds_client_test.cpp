@@ -83,6 +83,29 @@ TEST_F(UdsClient, LateAnswersToAnotherRequestArePassedOver) {
   EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
 }
 
+// ISO 14229-1: the positive response repeats the record's identifier, the routine's with its sub-function.
+TEST_F(UdsClient, AnswersToAnotherTesterArePassedOver) {
+  ask(read_request(0x0201), ms(0));
+  EXPECT_FALSE(client.on_frame(frame("648#0562F18C4142"), ms(10)));
+  auto outcome = client.on_frame(frame("648#0462020107"), ms(20));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
+  EXPECT_THAT(outcome->response, ElementsAre(0x62, 0x02, 0x01, 0x07));
+
+  ask(routine_request(RoutineAction::result, 0x0301, {}), ms(30));
+  EXPECT_FALSE(client.on_frame(frame("648#0471030302"), ms(40)));
+  EXPECT_FALSE(client.on_frame(frame("648#0471010301"), ms(50)));
+  outcome = client.on_frame(frame("648#057103030102"), ms(60));
+  ASSERT_TRUE(outcome);
+  EXPECT_THAT(outcome->response, ElementsAre(0x71, 0x03, 0x03, 0x01, 0x02));
+  // Nobody else's answer stops the clock.
+  ask(write_request(0x0201, Bytes{1}), ms(100));
+  EXPECT_FALSE(client.on_frame(frame("648#036EF18C"), ms(110)));
+  outcome = client.on_time(ms(250));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::timeout);
+}
+
 TEST_F(UdsClient, BrokenAnswerIsATransportFailure) {
   ask(read_request(0x0210), ms(0));
   EXPECT_FALSE(client.on_frame(frame("648#1014620210010203"), ms(1)));
