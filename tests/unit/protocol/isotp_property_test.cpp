@@ -90,16 +90,14 @@ Outcome run(Transport& sender, Transport& receiver, Bus& bus, std::span<const st
     if (progress) {
       now += std::chrono::microseconds(100);
     } else {
-      std::optional<Time> next = bus.queue().empty() ? std::nullopt : std::optional(bus.queue().begin()->first);
+      Time next = bus.queue().empty() ? Time::max() : bus.queue().begin()->first;
       for (const auto& deadline : {sender.next_deadline(), receiver.next_deadline()}) {
-        if (deadline && (!next || *deadline < *next)) {
-          next = deadline;
-        }
+        next = std::min(next, deadline.value_or(Time::max()));
       }
-      if (!next) {
+      if (next == Time::max()) {
         return outcome;   // at rest
       }
-      now = std::max(now, *next);
+      now = std::max(now, next);
     }
     while (!bus.queue().empty() && bus.queue().begin()->first <= now) {
       const Delivery delivery = bus.queue().begin()->second;
