@@ -210,12 +210,8 @@ class Diagnoser {
   Diagnosis d_;
 };
 
-// White noise of the accelerometers' integral is modelled; lines that alias into the filter beside it are taken out.
+// The recording without the lines that alias into the filter beside white noise of the accelerometers' integral.
 ImuData Diagnoser::quiet_dwells() {
-  PassInput input = forward_pass(data_, d_.calibration);
-  if (d_.calibration.moored || !fit_velocity_noise(input, d_.noise)) {
-    return data_;
-  }
   theta_.assign(data_.delta_theta.begin(), data_.delta_theta.end());
   velocity_.assign(data_.delta_v.begin(), data_.delta_v.end());
   const std::vector<VibrationLine> lines = subtract_dwell_lines(data_, find_segments(data_), theta_, velocity_);
@@ -227,11 +223,15 @@ ImuData Diagnoser::quiet_dwells() {
 }
 
 void Diagnoser::name() {
-  const ImuData data = quiet_dwells();
+  ImuData data = data_;
+  PassInput input = forward_pass(data, d_.calibration);
+  if (fit_velocity_noise(input, d_.noise)) {
+    data = quiet_dwells();
+    input = forward_pass(data, d_.calibration);
+    beats_ = fit_velocity_noise(input, d_.noise);
+  }
   const RecordingContext context(data);
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
-  PassInput input = forward_pass(data, d_.calibration);
-  beats_ = fit_velocity_noise(input, d_.noise);
   say("signatures");
   Naming naming(context, input, log_names_);
   naming.run(say_, options_.stop);
