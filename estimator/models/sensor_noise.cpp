@@ -22,6 +22,10 @@ constexpr std::size_t enough_pieces = 10;
 constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
 constexpr double margin_s = 1.0;          // left out at both ends of a dwell
 constexpr int detrend_order = 8;          // a sway of 5 s is two thirds of a cycle of a piece
+// Of the density at the lowest bins, at least so much is left to the white rate. On a still base a steady rate makes
+// the quantisation periodic, and it can look like white angle all the way down. A moving base sweeps over hundreds of
+// quanta in a group: then it is white angle, and may well be four fifths of what is seen there.
+constexpr double least_white_still = 0.3, least_white_moving = 0.03;
 
 // Takes a polynomial out of a piece and tapers it; sway is slow and large, and must not leak into the band. What both do
 // to noise is linear and taken into account: at the lowest bins the polynomial takes some of it away.
@@ -128,15 +132,14 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
 
 // density = N^2 + Q^2 * (about) 4 sin^2(pi f D)/D: weighted by the model (a periodogram scatters as its mean), lines left out.
 // A quantum that is carried on (known_angle) leaves quantum^2/12 of white angle; it is then not fitted.
-void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, TriadNoise& noise) {
+void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, double least_white, TriadNoise& noise) {
   const Eigen::Index bins = spectrum.density.size();
   const PieceAnalysis::Bins shape = analysis().angle_density(spectrum.group_s);
   std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
   std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
   double white = sorted[static_cast<std::size_t>(bins / 2)];
   double angle = known_angle.value_or(0.0);
-  // Periodic quantisation can look like white angle all the way down: the lowest bins bound what may be taken off.
-  const double least = std::max(1e-6 * white, 0.3 * spectrum.density.head(lowest_bins).mean());
+  const double least = std::max(1e-6 * white, least_white * spectrum.density.head(lowest_bins).mean());
   for (int round = 0; round < 20; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -241,23 +244,25 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
   noise.gyro.quantum = find_quantum(data.delta_theta);
   noise.accel.quantum = find_quantum(data.delta_v);
   const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, fast_group_s);
-  const Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s);
   noise.spectra = accel.pieces;
   if (noise.spectra == 0) {
     return noise;
   }
   const double accel_quantum = noise.accel.quantum;
-  fit_density(accel, accel_quantum > 0.0 ? std::optional(accel_quantum * accel_quantum / 12.0) : std::nullopt, noise.accel);
-  fit_density(gyro, std::nullopt, noise.gyro);
+  fit_density(accel, accel_quantum > 0.0 ? std::optional(accel_quantum * accel_quantum / 12.0) : std::nullopt,
+              least_white_still, noise.accel);
   // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
   const double expected = noise.accel.white_asd * noise.accel.white_asd;
   noise.base_moves = second_variance(data, segments) > 25.0 * expected;
-  if (!noise.base_moves) {
-    const double group_s = slow_group(segments);
-    const Spectrum slow = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
-    if (slow.pieces >= enough_pieces) {
-      fit_density(slow, std::nullopt, noise.gyro);
-    }
+  const Spectrum gyro =
+      mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, noise.base_moves ? fast_group_s : slow_group(segments));
+  if (noise.base_moves) {
+    fit_density(gyro, std::nullopt, least_white_moving, noise.gyro);
+  } else if (gyro.pieces >= enough_pieces) {
+    fit_density(gyro, std::nullopt, least_white_still, noise.gyro);
+  } else {
+    fit_density(mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s), std::nullopt,
+                least_white_still, noise.gyro);
   }
   return noise;
 }
