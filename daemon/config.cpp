@@ -1,15 +1,14 @@
 #include "daemon/config.hpp"
 
-// As everywhere in this code base: the library's two ways do not go together in one program.
-#define TOML_EXCEPTIONS 0
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <cmath>
 #include <fstream>
 #include <functional>
 #include <limits>
 #include <sstream>
+
+#include "protocol/toml_file/toml_text.hpp"
 
 namespace selfcal {
 namespace {
@@ -150,7 +149,7 @@ class Reader {
 
   void complain(toml::source_index line, const std::string& key, const std::string& what) {
     if (!complaints_.empty()) complaints_ += '\n';
-    complaints_ += fmt::format("{}:{}: {}: {}", file_, line, key, what);
+    complaints_ += fmt::format("{}:{}: {}: {}", file_, line, one_line(key), one_line(what));
   }
 
   const std::string& complaints() const { return complaints_; }
@@ -196,16 +195,12 @@ const InsConfig* Config::find(std::string_view name) const {
 }
 
 Expected<Config> parse_config(std::string_view content, const std::string& file) {
-  const toml::parse_result parsed = toml::parse(content, file);
-  if (!parsed) {
-    return fail(ErrorKind::bad_input, fmt::format("{}:{}: {}", file, parsed.error().source().begin.line,
-                                                  parsed.error().description()));
-  }
-  const toml::table& root = parsed.table();
+  const Expected<toml::table> root = parse_toml(content, file);
+  if (!root) return tl::unexpected(root.error());
 
   Config config;
   Reader reader(file);
-  for (const auto& [key, node] : root) {
+  for (const auto& [key, node] : *root) {
     const std::string section(key.str());
     if (section == "daemon" && node.is_table()) {
       reader.read(*node.as_table(), section, daemon_keys(), config);
@@ -231,7 +226,7 @@ Expected<Config> parse_config(std::string_view content, const std::string& file)
   if (config.instruments.empty()) {
     reader.complain(1, "ins", "no INS is configured: at least one section [ins.NAME] is needed");
   } else {
-    check_instruments(*root.get_as<toml::table>("ins"), config, reader);
+    check_instruments(*root->get_as<toml::table>("ins"), config, reader);
   }
   if (!reader.complaints().empty()) return fail(ErrorKind::bad_input, reader.complaints());
   return config;

@@ -30,7 +30,7 @@ void TomlTable::refuse(std::string_view key, const std::string& what) {
   }
   const toml::node* node = table_.get(key);
   const auto line = (node != nullptr ? node->source() : table_.source()).begin.line;
-  problem_ = Error{ErrorKind::bad_input, fmt::format("{}:{}: {}{}: {}", file_, line, prefix_, key, what)};
+  problem_ = Error{ErrorKind::bad_input, fmt::format("{}:{}: {}{}: {}", file_, line, prefix_, one_line(key), one_line(what))};
 }
 
 void TomlTable::number(std::string_view key, double& value, double low, double high) {
@@ -140,12 +140,11 @@ Expected<void> TomlTable::finish() {
 
 Expected<void> read_toml(const std::string& text, const std::string& name,
                          const std::function<void(TomlTable&)>& read) {
-  const toml::parse_result parsed = toml::parse(text, std::string_view{name});
-  if (!parsed) {
-    return fail(ErrorKind::bad_input, fmt::format("{}:{}: {}", name, parsed.error().source().begin.line,
-                                                  parsed.error().description()));
+  const Expected<toml::table> table = parse_toml(text, name);
+  if (!table) {
+    return tl::unexpected(table.error());
   }
-  TomlTable root(parsed.table(), name);
+  TomlTable root(*table, name);
   read(root);
   return root.finish();
 }

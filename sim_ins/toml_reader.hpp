@@ -1,17 +1,16 @@
 // Strict reading of nested TOML tables: each key is asked for by name and type, and what nobody asked for is an error.
 #pragma once
 
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
-
 #include <cstdint>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 
 #include "protocol/error.hpp"
+#include "protocol/toml_file/toml_text.hpp"
 
 namespace selfcal::sim {
 

@@ -6,10 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "protocol/toml_file/utf8.hpp"
-
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
+#include "protocol/toml_file/toml_text.hpp"
 
 namespace selfcal {
 
@@ -19,13 +16,6 @@ struct TomlFile::Document {
 };
 
 namespace {
-
-// Error messages are one line; toml++ quotes what it met, line ends and all.
-std::string one_line(std::string_view text) {
-  std::string line = back_from_plane_15(text);
-  std::replace_if(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
-  return line;
-}
 
 std::string written(const toml::node& node) {
   std::ostringstream out;
@@ -54,54 +44,6 @@ Expected<double> number_of(const std::string& name, const toml::node& node, std:
   return value;
 }
 
-// Behind the string or comment that begins at `at`; the end of the text where it is not closed.
-std::size_t past_string_or_comment(std::string_view text, std::size_t at) {
-  const char quote = text[at];
-  if (quote == '#') {
-    return std::min(text.find('\n', at), text.size());
-  }
-  const std::string_view rest = text.substr(at);
-  const bool many_lines = rest.size() > 2 && rest[1] == quote && rest[2] == quote;
-  const std::size_t quotes = many_lines ? 3 : 1;
-  const std::string closing(quotes, quote);
-  for (std::size_t k = at + quotes; k < text.size(); ++k) {
-    if (text[k] == '\\' && quote == '"') {
-      ++k;
-    } else if (text.substr(k, quotes) == closing) {
-      return k + quotes;
-    } else if (text[k] == '\n' && !many_lines) {
-      return k;
-    }
-  }
-  return text.size();
-}
-
-// A quote in the midst of a number or a name opens nothing.
-bool opens_string(std::string_view text, std::size_t at) {
-  constexpr std::string_view before = " \t\r\n=[{,.";
-  return (text[at] == '"' || text[at] == '\'') && (at == 0 || before.find(text[at - 1]) != std::string_view::npos);
-}
-
-// The first byte that is not UTF-8, or not ASCII where TOML wants ASCII: a better message than toml++ has.
-std::optional<std::size_t> first_unreadable(std::string_view text) {
-  if (const auto malformed = first_malformed_utf8(text)) {
-    return malformed;
-  }
-  if (const auto reserved = first_of_plane_15(text)) {
-    return reserved;
-  }
-  for (std::size_t k = 0; k < text.size();) {
-    if (text[k] == '#' || opens_string(text, k)) {
-      k = past_string_or_comment(text, k);
-    } else if (static_cast<unsigned char>(text[k]) >= 0x80) {
-      return k;
-    } else {
-      ++k;
-    }
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 TomlFile::TomlFile(std::unique_ptr<Document> document) : document_(std::move(document)) {}
@@ -110,21 +52,11 @@ TomlFile& TomlFile::operator=(TomlFile&&) noexcept = default;
 TomlFile::~TomlFile() = default;
 
 Expected<TomlFile> TomlFile::parse(std::string_view text, std::string name) {
-  if (const auto place = first_unreadable(text)) {
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*place), '\n');
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}:{}: byte 0x{:02X} is not UTF-8, outside a string and a comment, or of plane 15", name, line,
-                            static_cast<unsigned char>(text[*place])));
+  auto table = parse_toml(text, name);
+  if (!table) {
+    return tl::unexpected(table.error());
   }
-  // toml++ 3.3 takes some characters from U+00A1 to U+FEFF for impossible where it looks for white space: undefined
-  // behaviour, found by fuzzing, wherever it takes for a string's outside what we take for its inside.
-  toml::parse_result parsed = toml::parse(lifted_to_plane_15(text), std::string_view{name});
-  if (!parsed) {
-    const toml::parse_error& error = parsed.error();
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}:{}: {}", name, error.source().begin.line, one_line(error.description())));
-  }
-  return TomlFile(std::make_unique<Document>(Document{std::move(name), std::move(parsed).table()}));
+  return TomlFile(std::make_unique<Document>(Document{std::move(name), std::move(*table)}));
 }
 
 bool TomlFile::has(std::string_view key) const { return document_->table.contains(key); }
@@ -162,7 +94,7 @@ Expected<std::string> TomlFile::text(std::string_view key) const {
     return tl::unexpected(error_at(key, "missing"));
   }
   if (const auto value = node->value_exact<std::string>()) {
-    return back_from_plane_15(*value);
+    return *value;
   }
   return tl::unexpected(error_at(key, fmt::format("{} is not a string", written(*node))));
 }

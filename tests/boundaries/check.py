@@ -44,6 +44,10 @@ CODECS = ("protocol/isotp", "protocol/uds", "protocol/flash", "protocol/ins_inte
 CODEC_THIRD_PARTY = re.compile(r"^(tl/expected\.hpp|fmt/.*|openssl/.*)$")
 STANDARD = re.compile(r"^[a-z_0-9]+$")
 
+# toml++ does not survive every text; what stands before it does.
+TOML = re.compile(r"^toml\+\+/.*$")
+TOML_GUARD = "protocol/toml_file/"
+
 # Paths generated at build time; written <like/this>, so never mistaken for files of ours.
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 TOP_LEVEL = ["estimator", "protocol", "sim_ins", "daemon", "tools", "tests", "config", "systemd"]
@@ -86,6 +90,8 @@ def include_complaints(root, path):
                 yield f'{where}: {module_of(source)} must not include "{name}"'
         elif source.startswith("estimator/") and IMPURE.match(name):
             yield f"{where}: the estimator does no input, output, timing or threading, so no <{name}>"
+        elif TOML.match(name) and not source.startswith(TOML_GUARD):
+            yield f"{where}: only {TOML_GUARD} includes <{name}>"
         elif is_codec(source) and not STANDARD.match(name) and not CODEC_THIRD_PARTY.match(name):
             yield f"{where}: a codec depends on the standard library only, not on <{name}>"
 

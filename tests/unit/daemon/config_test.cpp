@@ -72,6 +72,20 @@ TEST(Config, WhatContradictsItselfIsRefused) {
   EXPECT_THAT(complaint("[ins.a\n"), HasSubstr("f.toml:1:"));
 }
 
+// Texts that toml++ by itself does not survive, and keys that would make two lines of one complaint.
+TEST(Config, HostileTextIsOneComplaint) {
+  EXPECT_THAT(complaint("[ins.a]\nt = 6='\u00C5\n"), HasSubstr("f.toml:2: "));
+  EXPECT_THAT(complaint("[ins.a]\ninterface = '\xFF'\n"), HasSubstr("f.toml:2: byte 0xFF"));
+  EXPECT_THAT(complaint("[a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a]\n"), HasSubstr("f.toml:1: a key of more than"));
+  EXPECT_EQ(complaint("[ins.a]\ninterface = 'c'\n\"ty\\npo\" = 1\n"), "f.toml:3: ins.a.ty po: unknown key");
+}
+
+TEST(Config, NamesInAnyScriptAreKept) {
+  const auto config = parse_config("[daemon]\nstate_directory = '/var/lib/\u6E2C\u91CF'\n[ins.a]\ninterface = 'c'\n", "f");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->state_directory, "/var/lib/\u6E2C\u91CF");
+}
+
 TEST(Config, TolerancesTakeParametersAndGroups) {
   const auto config = parse_config(
       "[ins.a]\ninterface = \"c\"\ntolerance = { gyro_scale = 3, accel_bias_y = 2.5 }\n", "f.toml");

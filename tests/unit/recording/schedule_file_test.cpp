@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "protocol/toml_file/toml_file.hpp"
-
 namespace selfcal {
 namespace {
 
@@ -54,24 +52,6 @@ TEST(ScheduleFile, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(error_of("positions = [[0, 0]]\ndwell_s = 1\nrotation_s = -1\n"), HasSubstr("s.toml:3: rotation_s"));
   EXPECT_THAT(error_of("positions = [[0, 0]]\ndwell_s = 1\ndwel_s = 1\n"), HasSubstr("s.toml:3: dwel_s: no such key"));
   EXPECT_THAT(error_of("positions = [[0,"), HasSubstr("s.toml:1"));
-}
-
-// Two, three and four bytes, the ends of the first two kinds included; what toml++ gets to see is another text.
-TEST(TomlText, OfAnyScriptComesOutAsItWentIn) {
-  const std::string text = "J\u00F6rg \u0080\u07FF\u0800\uFEFF\uFFFF \u6E2C\u91CF \U0001F600";
-  const auto parsed = TomlFile::parse("# \u00C5\nname = \"" + text + "\"\n\"gr\u00F6\u00DFe\" = 1\n", "t.toml");
-  ASSERT_TRUE(parsed) << parsed.error().message;
-  EXPECT_EQ(parsed->text("name").value(), text);
-  EXPECT_THAT(parsed->only({"name"}).error().message, HasSubstr("t.toml:3: gr\u00F6\u00DFe: no such key"));
-  EXPECT_THAT(parsed->number("name").error().message, HasSubstr("J\u00F6rg"));
-}
-
-TEST(TomlText, WhereNoStringIsMeantIsAnError) {
-  // U+00A1, U+2E3E and others: toml++ 3.3 takes them for impossible there.
-  for (const char* text : {"t = 6='\u00C5", "t = 6='\u2E3E'", "t = \u00C5", "\u00C5 = 1", "t = 1979-05-27T='\u0100"}) {
-    EXPECT_FALSE(TomlFile::parse(text, "t.toml")) << text;
-  }
-  EXPECT_THAT(TomlFile::parse("t = \"\U000F00C5\"", "t.toml").error().message, HasSubstr("t.toml:1: byte 0xF3"));
 }
 
 TEST(ScheduleFile, FindsNamesAndReplacesTiming) {

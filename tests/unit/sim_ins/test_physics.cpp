@@ -116,6 +116,10 @@ TEST(Physics, FilesNameWhatIsWrong) {
   EXPECT_THAT(message("[[effect]]\nid = 'accel_relaxation'\ntau_s = 0\n"), HasSubstr("p.toml:3: effect[0].tau_s"));
   EXPECT_THAT(message("[[effect]]\nx = 1\n"), HasSubstr("effect[0].id: missing"));
   EXPECT_THAT(message("effect = 3\n"), HasSubstr("p.toml:1: effect"));
+  // These two toml++ by itself does not survive.
+  EXPECT_THAT(message("[[effect]]\nw = 6='\u00C5\n"), HasSubstr("p.toml:2: "));
+  EXPECT_THAT(message("[a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a]\n"), HasSubstr("p.toml:1: a key of more than"));
+  EXPECT_THAT(message("[[effect]]\nid = 'accel_cubic'\n\"w\\nw\" = 1\n"), HasSubstr("p.toml:3: effect[0].w w: no such key"));
 }
 
 }  // namespace
