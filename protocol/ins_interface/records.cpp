@@ -232,7 +232,11 @@ Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes) {
   }
   ByteReader in(bytes);
   NavigationCheckRecord r;
-  r.done = in.get<std::uint8_t>() != 0;
+  const auto done = in.get<std::uint8_t>();
+  if (done > 1) {
+    return wrong("navigation check", "completeness", done);
+  }
+  r.done = done == 1;
   for (double* value : {&r.elapsed_s, &r.north_m, &r.east_m, &r.max_horizontal_m}) {
     *value = in.get_double();
     if (!std::isfinite(*value)) {

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "protocol/lcm/decode.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/monitor_terminal.hpp"
 #include "tools/cli/monitor_view.hpp"
@@ -31,32 +32,29 @@ struct Options {
 class Listener {
  public:
   Listener(lcm::LCM& lcm, bool lines) : lines_(lines) {
-    lcm.subscribe("SELFCAL_SERVICE", &Listener::on_service, this);
-    lcm.subscribe("SELFCAL_INS_.*", &Listener::on_ins, this);
-    lcm.subscribe("SELFCAL_ESTIMATE_.*", &Listener::on_estimate, this);
-    lcm.subscribe("SELFCAL_ALARM", &Listener::on_alarm, this);
+    lcm.subscribe("SELFCAL_SERVICE", &Listener::on<selfcal_lcm::service_status>, this);
+    lcm.subscribe("SELFCAL_INS_.*", &Listener::on<selfcal_lcm::ins_status>, this);
+    lcm.subscribe("SELFCAL_ESTIMATE_.*", &Listener::on<selfcal_lcm::estimate>, this);
+    lcm.subscribe("SELFCAL_ALARM", &Listener::on<selfcal_lcm::alarm>, this);
   }
 
   const MonitorState& state() const { return state_; }
   int heard() const { return heard_; }
 
  private:
-  void on_service(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::service_status* message) {
-    state_.service = *message;
-    say(*message);
+  // Undecoded, as LCM's own decoding throws on what strangers may send.
+  template <typename Message>
+  void on(const lcm::ReceiveBuffer* received, const std::string&) {
+    const std::span bytes(static_cast<const std::uint8_t*>(received->data), received->data_size);
+    if (const auto message = lcm_messages::decode<Message>(bytes)) {
+      keep(*message);
+      say(*message);
+    }
   }
-  void on_ins(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::ins_status* message) {
-    state_.instruments[message->ins].status = *message;
-    say(*message);
-  }
-  void on_estimate(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::estimate* message) {
-    state_.instruments[message->ins].estimate = *message;
-    say(*message);
-  }
-  void on_alarm(const lcm::ReceiveBuffer*, const std::string&, const selfcal_lcm::alarm* message) {
-    state_.take(*message);
-    say(*message);
-  }
+  void keep(const selfcal_lcm::service_status& message) { state_.service = message; }
+  void keep(const selfcal_lcm::ins_status& message) { state_.instruments[message.ins].status = message; }
+  void keep(const selfcal_lcm::estimate& message) { state_.instruments[message.ins].estimate = message; }
+  void keep(const selfcal_lcm::alarm& message) { state_.take(message); }
   template <typename Message>
   void say(const Message& message) {
     ++heard_;
