@@ -72,7 +72,7 @@ class Monitor(case.OnBench):
         while (document := unit.document(run))["exit_status"] is None:
             text = "\n".join(self.screen())
             rotating = re.search(rf"TEST-0001: rotating, run {run}", text)
-            position = re.search(r"position (\d+) of 4,", text)
+            position = re.search(r"position ([1-9]) of 4,", text)   # 0: not, or no longer, in the schedule
             if rotating and position and int(position[1]) not in positions[-1:]:
                 positions.append(int(position[1]))
             time.sleep(0.05)
