@@ -4,13 +4,18 @@
 
 Whatever shares the machine costs waiting, not processor time, so that the figure holds on a busy one too. In user-mode
 Linux the processor time is that of the whole guest, its kernel's system calls by ptrace included. Prints how many times the
-real 1/5 Mbit/s FD bus one core carries; exit status 1 where that is less than 5 with FD."""
+real 1/5 Mbit/s FD bus one core carries; exit status 1 where that is less than 5 with FD. SELFCAL_BIN: the programs
+(build/bin)."""
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools" / "bench"))
+
+from freshness import warn_if_old  # noqa: E402
+
 BIN = Path(os.environ.get("SELFCAL_BIN", ROOT / "build" / "bin"))
 REAL_FD_BUS_BYTES_PER_S = 436e3   # ceiling of FD 1/5 Mbit/s with blocks of 65535
 ASKED_FOR = 5.0
@@ -34,6 +39,8 @@ def processor_seconds(ancestor):
 
 
 def main():
+    print(f"programs: {BIN}", flush=True)
+    warn_if_old(BIN, "socket_bench")
     megabytes = sys.argv[1] if len(sys.argv) > 1 else "16.46"
     command = [ROOT / "tools" / "vcan_run", BIN / "socket_bench", "vcan0", megabytes, "alone"]
     enough = True

@@ -11,8 +11,11 @@ import subprocess
 import time
 from pathlib import Path
 
+import freshness
+
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("SELFCAL_BIN", ROOT / "build" / "bin"))
+freshness.warn_if_old(BIN, "selfcald", "sim_ins", "selfcal")
 
 # The paper's Table 3, in the names and units of the interfaces.
 TABLE3 = (
