@@ -16,7 +16,7 @@ function probabilityText(evidence) {
 
 function findingsTable(findings, id) {
   const sizes = (finding) => finding.parameters.map(
-      (p) => `${p.name} ${significant(p.value, 4)} ± ${significant(p.sigma, 2)} ${unitSymbol(p.unit)}`).join('; ');
+      (p) => `${p.name} ${withSigma(p.value, p.sigma)} ${unitSymbol(p.unit)}`).join('; ');
   return table([
     {title: 'effect', cells: findings.map((f) => f.effect), class: 'left'},
     {title: 'equation', cells: findings.map((f) => f.equation), class: 'words'},
@@ -56,8 +56,8 @@ function correctedTable(parameters) {
       .filter((p) => Math.abs(p.move) > p.sigma_without);
   return [`${moved.length} of the 24 moved by more than their σ`, table([
     {title: 'parameter', cells: moved.map((p) => p.name), class: 'left'},
-    {title: '24 alone', cells: moved.map((p) => `${significant(p.value_without, 5)} ± ${significant(p.sigma_without, 2)}`)},
-    {title: 'with the effects', cells: moved.map((p) => `${significant(p.value, 5)} ± ${significant(p.sigma, 2)}`)},
+    {title: '24 alone', cells: moved.map((p) => withSigma(p.value_without, p.sigma_without))},
+    {title: 'with the effects', cells: moved.map((p) => withSigma(p.value, p.sigma))},
     {title: 'difference', cells: moved.map((p) => significant(p.move, 3))},
     {title: 'unit', cells: moved.map((p) => unitSymbol(p.unit)), class: 'left'},
     {title: 'difference (σ)', cells: moved.map((p) => significant(p.move / p.sigma_without, 3))},

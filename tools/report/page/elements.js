@@ -58,6 +58,15 @@ function decimalsFor(sigma) {
   return Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
 }
 
+// "value ± sigma", both cut where sigma has two significant digits; a sigma too small for that, or none, cuts nothing.
+function withSigma(value, sigma) {
+  if (!(sigma >= 1e-5) || !Number.isFinite(sigma)) {
+    return `${significant(value, 5)} ± ${significant(sigma, 2)}`;
+  }
+  const decimals = decimalsFor(sigma);
+  return `${fixed(value, decimals)} ± ${sigma.toFixed(decimals)}`;
+}
+
 // Kept until the colour scheme changes: asking the style sheet makes the browser compute the styles of the whole page.
 const knownColours = new Map();
 

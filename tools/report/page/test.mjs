@@ -229,6 +229,14 @@ async function check_paper(page, where) {
   expect(cut.length === 0, `${where}: beyond the edge of the paper: ${cut.slice(0, 3).join('; ')}`);
 }
 
+// Nothing beside the window, and no table that has to be scrolled for its last columns; those of a plot's numbers may.
+async function check_width(page, where) {
+  const cut = await page.evaluate(() => [...document.querySelectorAll('main *')].filter((part) => !part.closest('details') &&
+      part.checkVisibility() && part.getBoundingClientRect().right > innerWidth + 0.5).map(
+      (part) => `${part.tagName} ${part.textContent.slice(0, 30)}`));
+  expect(cut.length === 0, `${where}: beside the window: ${cut.slice(0, 3).join('; ')}`);
+}
+
 async function open(browser, page_file, where, width, scheme) {
   const context = await browser.newContext({viewport: {width, height: 1000}, colorScheme: scheme, offline: true});
   const page = await context.newPage();
@@ -252,6 +260,7 @@ async function check_page(browser, page_file) {
       console.log(`${where}: first plot painted after ${Math.round(first_plot)} ms`);
     }
     await check_plots(page, where);
+    await check_width(page, where);
     if (width === 1400) {
       await {calibration: check_estimate, run: check_run, failed: check_failed, plan: check_plan, fleet: check_fleet}[kind](page);
       if (kind === 'calibration') {
