@@ -7,6 +7,8 @@
 #include <numbers>
 #include <optional>
 
+#include "estimator/models/quantised_rate.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -263,6 +265,16 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
   } else {
     fit_density(mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s), std::nullopt,
                 least_white_still, noise.gyro);
+  }
+  if (!noise.base_moves && noise.gyro.quantum > 0.0) {
+    const QuantisedRate behind =
+        fit_quantised_rate(data.delta_theta, data.sample_rate_hz, segments, noise.gyro.quantum,
+                           piece_length * slow_group(segments), noise.gyro.white_asd);
+    if (behind.white_asd > 0.0) {
+      noise.gyro.white_asd = behind.white_asd;
+      noise.gyro.white_sigma = behind.white_sigma;
+      noise.gyro.increment_sigma = behind.increment_sigma;
+    }
   }
   return noise;
 }

@@ -10,6 +10,7 @@ namespace selfcal {
 
 struct TriadNoise {
   double white_asd = 0.0;       // angle or velocity random walk: rad/s/sqrt(Hz), m/s^2/sqrt(Hz); mean of the axes
+  double white_sigma = 0.0;     // of it, where the fit states one (gyros with a quantum on a still base); 0: none
   double increment_sigma = 0.0; // white noise of the integral itself (quantisation and the like): rad, m/s
   double quantum = 0.0;         // smallest step of which all increments are multiples: rad, m/s; 0: none found
 };
@@ -21,7 +22,7 @@ struct SensorNoise {
 };
 
 // Mean periodogram of the dwells, in a band chosen by whether the base moves (see the constants in the source), fitted with N^2 + 4 sin^2(pi f D)/D Q^2 (white rate plus white angle; IEEE Std 952, annex C) with spectral lines
-// left out.
+// left out. Gyros with a quantum on a still base: quantised_rate.hpp.
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments);
 
 }  // namespace selfcal

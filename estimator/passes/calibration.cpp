@@ -244,6 +244,7 @@ CalibrationResult Calibration::result() {
   r.accel_vrw = input_.noise.accel_vrw;
   r.position_sigma = input_.noise.observation.sigma;
   r.noise = input_.noise;
+  r.gyro_arw_sigma = noise_.gyro.white_sigma;
   r.gyro_quantum = noise_.gyro.quantum;
   r.accel_quantum = noise_.accel.quantum;
   r.moored = input_.noise.observation.state_count() > 0;

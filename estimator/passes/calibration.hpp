@@ -100,6 +100,7 @@ struct CalibrationResult {
   Attitude initial_attitude;          // of the vehicle, using the gimbal read-out there (zero where absent), rad
   Vector3 attitude_sigma;             // phi north, up, east at the start, rad
   double gyro_arw = 0.0, accel_vrw = 0.0, position_sigma = 0.0;   // in use; SI
+  double gyro_arw_sigma = 0.0;                                    // of the density as found; 0: not stated
   double gyro_quantum = 0.0, accel_quantum = 0.0;                 // found in the increments; rad, m/s; 0: none
   NoiseModel noise;                   // in use, with the motion of a moored base
   bool moored = false;                // coloured motion of the base was found and modelled
