@@ -78,11 +78,15 @@ Finding describe(const WalkTest& walk, double rows) {
   return f;
 }
 
-// 1 sigma of a triad's density over itself. Gyros: pieces of 32 s, accelerometers: of 3.2 s (sensor_noise.cpp); of each,
+// 1 sigma of a triad's density over itself: what the fit states (gyros beside a quantum), or of a fit to the mean spectrum.
+// Gyros: pieces of 32 s, accelerometers: of 3.2 s (sensor_noise.cpp); of each,
 // three axes of 21 bins, of which the taper leaves a third independent, scatter by 1/sqrt(21 pieces) of the square;
 // half of that in the density, twice that because white angle is fitted too. Below 3 % the model of the noise counts.
 double relative_density_sigma(const CalibrationResult& calibration, bool gyro) {
   constexpr double least = 0.03;
+  if (gyro && calibration.gyro_arw_sigma > 0.0) {
+    return std::max(least, calibration.gyro_arw_sigma / calibration.gyro_arw);
+  }
   double dwells_s = 0.0;
   for (const SegmentSummary& s : calibration.segments) {
     dwells_s += s.rotation ? 0.0 : s.end_s - s.start_s;
@@ -241,6 +245,7 @@ void Diagnoser::name() {
 void Diagnoser::decide(const Naming& naming) {
   const double alpha = options_.false_alarm_rate;
   const Map after = naming.map_after();
+  d_.log_p_limit = naming.log_p_limit();
   d_.located = naming.map_before().places;
   d_.remaining = after.places;
   // Beats of a quantum drift in frequency and leave a comb that no line takes out: named as quantum and lines, and no

@@ -84,6 +84,7 @@ struct Diagnosis {
   NoiseCheck noise;
   CalibrationResult calibration;       // of the 24 alone
   std::vector<ModelEffect> model;      // equations among the findings
+  double log_p_limit = 0.0;            // natural logarithm of p, not corrected, below which one test of an effect is a name
   double mean_temperature_c = 0.0;     // of the recording; 0 without a channel
   // Of the 24, SI: mean and sigma over all explanations that the recording leaves open; and with `model` as it is.
   ParameterVector value, sigma;

@@ -96,11 +96,13 @@ std::vector<int> Naming::chosen_columns(std::size_t without) const {
   return columns;
 }
 
-// For the catalogue's tests on this recording (multiplicity.hpp) and the walks of six axes, each at the edge of its
-// range. The frequency of a sway was looked for in a spectrum.
+// The catalogue's on this recording (multiplicity.hpp) and the walks of six axes, each at the edge of its range.
+double Naming::independent_tests() const { return effective_tests_ + 0.5 * walk_axes; }
+
+// The frequency of a sway was looked for in a spectrum.
 double Naming::corrected(double log_p, const std::string& effect) const {
   const double spectrum = effect == "base_sway" ? std::max(1.0, evidence_.rows / 6.0) : 1.0;
-  return log_corrected(log_p, (effective_tests_ + 0.5 * walk_axes) * spectrum);
+  return log_corrected(log_p, independent_tests() * spectrum);
 }
 
 void Naming::refit() {

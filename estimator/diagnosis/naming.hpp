@@ -52,7 +52,8 @@ class Naming {
   double square_before() const { return square_before_; }
   double square_after() const;
   double rows() const { return evidence_.rows; }
-  double effective_tests() const { return effective_tests_; }
+  // Of one test's p, not corrected: as many independent ones as the catalogue and the walks count for share the rate.
+  double log_p_limit() const { return log_threshold_ - std::log(independent_tests()); }
   double log_p_white_before() const { return white_before_; }
   double log_p_white_after() const;
   // Two effects chosen of which the one can stand for half of the other and more: together they describe a curve, and are no
@@ -85,6 +86,7 @@ class Naming {
   double test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside);
   void average();
   void judge();
+  double independent_tests() const;
   double corrected(double log_p, const std::string& effect) const;
   Eigen::VectorXd final_residual() const;
 

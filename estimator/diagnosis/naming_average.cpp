@@ -271,18 +271,40 @@ int Naming::append_columns(const std::vector<Candidate>& more, const Eigen::Matr
 
 // Derivatives of the chosen effects' columns by the logarithm of their constants, as further columns.
 void Naming::append_derivatives() {
-  for (Chosen& chosen : chosen_) {
+  std::vector<Candidate> more;
+  std::vector<double> width;
+  int appended = 0;
+  for (const Chosen& chosen : chosen_) {
     const Candidate& c = chosen.candidate;
     if (std::isnan(c.constant)) {
       continue;
     }
     // A frequency may shift the phase by an eighth of a radian over the recording.
     const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
-    Eigen::MatrixXd difference(c.count, 2 * c.count);
-    difference << Eigen::MatrixXd::Identity(c.count, c.count), -Eigen::MatrixXd::Identity(c.count, c.count);
-    const Candidate above{c.effect, c.constant * std::exp(h), 0, 0}, below{c.effect, c.constant * std::exp(-h), 0, 0};
-    chosen.derivative = append_columns({above, below}, difference / (2.0 * h));
+    more.push_back({c.effect, c.constant * std::exp(h), 0, 0});
+    more.push_back({c.effect, c.constant * std::exp(-h), 0, 0});
+    width.push_back(2.0 * h);
+    appended += c.count;
   }
+  if (more.empty()) {
+    return;
+  }
+  Eigen::MatrixXd combine = Eigen::MatrixXd::Zero(appended, 2 * appended);
+  const int at = static_cast<int>(rows_.columns.cols());
+  int row = 0;
+  std::size_t effect = 0;
+  for (Chosen& chosen : chosen_) {
+    const int count = chosen.candidate.count;
+    if (std::isnan(chosen.candidate.constant)) {
+      continue;
+    }
+    const Eigen::MatrixXd difference = Eigen::MatrixXd::Identity(count, count) / width[effect++];
+    combine.block(row, 2 * row, count, count) = difference;
+    combine.block(row, 2 * row + count, count, count) = -difference;
+    chosen.derivative = at + row;
+    row += count;
+  }
+  append_columns(more, combine);
 }
 
 void Naming::average() {

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
 #include <ctime>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <span>
 
@@ -77,6 +79,7 @@ ordered_json to_json(const Diagnosis& d) {
   }
   j["before"] = to_json(d.before);
   j["after"] = to_json(d.after);
+  j["log_p_limit"] = d.log_p_limit;
   j["moored"] = d.calibration.moored;
   j["value"] = listed(d.value);
   j["sigma"] = listed(d.sigma);
@@ -90,10 +93,7 @@ int fail_with(int code, const std::string& message) {
   return code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const std::span<char*> a(argv, static_cast<std::size_t>(argc));
+int run(std::span<char*> a) {
   const auto assumed = a.size() == 3 ? nlohmann::json::parse(a[2], nullptr, false) : nlohmann::json();
   if (!assumed.is_object()) {
     return fail_with(2, "usage: selfcal_blind_answer RECORDING '{\"gyro_arw_deg_per_sqrt_h\": ...}'");
@@ -128,4 +128,15 @@ int main(int argc, char** argv) {
   j["cpu_s"] = end - begin;
   fmt::print("{}\n", j.dump());
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run({argv, static_cast<std::size_t>(argc)});
+  } catch (const std::exception& e) {   // a noise that is no number, a missing name
+    std::fprintf(stderr, "selfcal_blind_answer: %s\n", e.what());
+    return 3;
+  }
 }

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
+#include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -161,10 +163,7 @@ bool parse(const char* text, T& value) {
   return error == std::errc() && end == s.data() + s.size();
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const std::span<char*> a(argv, static_cast<std::size_t>(argc));
+int run(std::span<char*> a) {
   std::uint64_t seed = 0;
   blind::TrialSize size;
   int number = 0;
@@ -187,4 +186,15 @@ int main(int argc, char** argv) {
     return complain({ErrorKind::usage, fmt::format("case {}: there are {}", number, recipes.size())});
   }
   return write_one(blind::draw_installation(recipes[static_cast<std::size_t>(number)], number, seed), a[5], a[7]);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run({argv, static_cast<std::size_t>(argc)});
+  } catch (const std::exception& e) {   // a key that was edited: a value of another type, a missing name
+    std::fprintf(stderr, "selfcal_blind_generate: %s\n", e.what());
+    return 3;
+  }
 }

@@ -44,6 +44,34 @@ def lower_bound(k, n, confidence=0.95):
     return 1.0 - upper_bound(n - k, n, confidence)
 
 
+def chi_squared_tail(x, degrees):
+    """P(chi-squared > x): Q(1/2) and Q(1) in closed form, Q(a + 1) = Q(a) + x^a e^-x / Gamma(a + 1)."""
+    half = 0.5 * x
+    a = 0.5 if degrees % 2 else 1.0
+    tail = math.erfc(math.sqrt(half)) if degrees % 2 else math.exp(-half)
+    while a < 0.5 * degrees - 0.25:
+        tail += math.exp(a * math.log(half) - half - math.lgamma(a + 1.0))
+        a += 1.0
+    return tail
+
+
+def chi_squared_above(p, degrees):
+    """x with P(chi-squared > x) = p."""
+    low, high = 1e-9, 1000.0
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if chi_squared_tail(middle, degrees) > p else (low, middle)
+    return low
+
+
+def power(square, degrees, p):
+    """Of the chi-squared test of size p: a Poisson mixture of central ones, mean square/2 (non-central chi-squared)."""
+    x, mean = chi_squared_above(p, degrees), 0.5 * square
+    most = int(mean + 12.0 * math.sqrt(mean) + 30.0)
+    return min(1.0, math.fsum(math.exp(j * math.log(mean) - mean - math.lgamma(j + 1.0)) * chi_squared_tail(x, degrees + 2 * j)
+                              for j in range(most)))
+
+
 def rms(values):
     return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else math.nan
 
@@ -167,13 +195,15 @@ class Score:
             groups[low].append((c, a))
         self.say()
         self.say("detection over strength (size over the bound of its sigma), effects of the catalogue and invisible")
-        self.say("  strength    n  detected  named: truth  class  other  unexplained  silent")
+        self.say("  (possible: power of the test of the very coefficients drawn, direction unknown, at the limit in use)")
+        self.say("  strength    n  detected  possible  named: truth  class  other  unexplained  silent")
         for low in sorted(groups):
             g = groups[low]
             count = collections.Counter(self.judged(c, a) for c, a in g)
             middle = sorted(c["effects"][0]["sigmas"] for c, _ in g)[len(g) // 2]
             detected = sum(alarmed(a) for _, a in g)
-            self.say(f"  {middle:8.2f} {len(g):4d}  {100 * detected / len(g):6.1f} %  {count['right']:12d} "
+            possible = sum(self.possible(c, a) for c, a in g) / len(g)
+            self.say(f"  {middle:8.2f} {len(g):4d}  {100 * detected / len(g):6.1f} %  {100 * possible:6.1f} % {count['right']:13d} "
                      f"{count['class']:6d} {count['other']:6d} {count['unexplained']:12d} {count['silent']:7d}")
         strong = [x for low, g in groups.items() if low >= 5.9 for x in g]
         weak = [x for low, g in groups.items() if low < 0.6 for x in g]
@@ -183,6 +213,11 @@ class Score:
         named = sum(bool(names(a, False)) for _, a in weak)
         self.say(f"  6 sigma and more: detected {share(detected, len(strong))}, class right "
                  f"{share(right, len(strong))}" + (f", names in the class {sum(size) / len(size):.2f}" if size else ""))
+        possible = sum(self.possible(c, a) for c, a in strong)
+        if strong:
+            chance = 1.0 - binomial_tail(detected + 1, len(strong), possible / len(strong))
+            self.say(f"  6 sigma and more: {100 * possible / len(strong):.1f} % are possible; so few detected by chance: "
+                     f"{100 * chance:.0f} %")
         for title, chosen in (("one coefficient", True), ("several coefficients", False)):
             part = [(c, a) for c, a in strong if self.single_coefficient(c) == chosen]
             self.say(f"    {title}: detected {share(sum(alarmed(a) for _, a in part), len(part))}, class right "
@@ -202,9 +237,18 @@ class Score:
         self.confusion(strong)
 
     @staticmethod
-    def single_coefficient(case):
+    def coefficients_drawn(case):
+        """How many of an effect's coefficients are concealed: one, or all that it has."""
         skipped = ("tau_s", "reference_c", "width", "period_s", "phase", "field_north", "field_up", "field_east")
-        return sum(v != 0.0 for k, v in case["effects"][0]["values"].items() if k not in skipped) == 1
+        return max(1, sum(v != 0.0 for k, v in case["effects"][0]["values"].items() if k not in skipped))
+
+    def single_coefficient(self, case):
+        return self.coefficients_drawn(case) == 1
+
+    def possible(self, case, answer):
+        """Power where the strength is that of one coefficient, or is spread over all of the group at random."""
+        limit = math.exp(answer.get("log_p_limit", math.log(chi_squared_tail(4.1 ** 2, 1))))
+        return power(case["effects"][0]["sigmas"] ** 2, self.coefficients_drawn(case), limit)
 
     def probability(self, case, answer):
         """On the true name; shared evenly over the class where the answer gives no probabilities."""
