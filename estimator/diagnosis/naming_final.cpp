@@ -5,7 +5,6 @@
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/naming.hpp"
-#include "estimator/diagnosis/velocity_noise.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -50,10 +49,6 @@ const Effect& gimbal_functions() {
 // the one of the greatest likelihood, down to a micrometre, by factors of 3.
 void Naming::sharpen_observation() {
   constexpr double factor = 1.0 / 3.0, least = 0.9e-6;   // m
-  if (!chosen_.empty() && walks_.empty() && has_velocity_noise(input_)) {
-    refit_velocity_noise(input_);
-    relinearise();
-  }
   if ((chosen_.empty() && walks_.empty()) || input_.noise.observation.state_count() > 0) {
     return;
   }

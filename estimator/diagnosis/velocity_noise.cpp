@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <initializer_list>
 
 namespace selfcal::diagnosis {
 namespace {
@@ -23,9 +22,24 @@ PassInput with(const PassInput& input, const std::array<double, 3>& d) {
   return changed;
 }
 
-// Takes the densities to the greatest likelihood, one after another by factors; returns its logarithm.
-double climb(const PassInput& input, std::initializer_list<double> steps, std::array<double, 3>& best) {
+}  // namespace
+
+bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
+  constexpr int accelerometers = 3;
+  double variance = 0.0;   // of the integral's white noise, mean of the axes
+  for (std::size_t axis = accelerometers; axis < noise.axes.size(); ++axis) {
+    variance += noise.axes[axis].increment_sigma * noise.axes[axis].increment_sigma / 3.0;
+  }
+  const double density = std::sqrt(variance / input.data->sample_rate_hz);
+  const double T = input.interval_s;
+  const double of_force = input.noise.accel_vrw * input.noise.accel_vrw * T * T * T / 3.0;
+  if (input.noise.observation.state_count() > 0 || density * density * T < colours * of_force) {
+    return false;
+  }
+  const double before = run_pass(input).log_likelihood;
+  std::array<double, 3> best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
   double top = run_pass(with(input, best)).log_likelihood;
+  constexpr std::array<double, 2> steps = {2.0, 1.25};
   constexpr int rounds = 2;
   for (const double step : steps) {
     for (int round = 0; round < rounds; ++round) {
@@ -48,43 +62,11 @@ double climb(const PassInput& input, std::initializer_list<double> steps, std::a
       }
     }
   }
-  return top;
-}
-
-}  // namespace
-
-bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
-  constexpr int accelerometers = 3;
-  double variance = 0.0;   // of the integral's white noise, mean of the axes
-  for (std::size_t axis = accelerometers; axis < noise.axes.size(); ++axis) {
-    variance += noise.axes[axis].increment_sigma * noise.axes[axis].increment_sigma / 3.0;
-  }
-  const double density = std::sqrt(variance / input.data->sample_rate_hz);
-  const double T = input.interval_s;
-  const double of_force = input.noise.accel_vrw * input.noise.accel_vrw * T * T * T / 3.0;
-  if (input.noise.observation.state_count() > 0 || density * density * T < colours * of_force) {
-    return false;
-  }
-  const double before = run_pass(input).log_likelihood;
-  std::array<double, 3> best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
-  const double top = climb(input, {2.0, 1.25}, best);
   if (top < before + least_log_gain) {
     return false;
   }
   input = with(input, best);
   return true;
-}
-
-bool has_velocity_noise(const PassInput& input) {
-  const std::vector<Oscillation>& motion = input.noise.observation.motion.front().oscillations;
-  return motion.size() == 1 && motion.front().decay_s == correlation_s;
-}
-
-void refit_velocity_noise(PassInput& input) {
-  std::array<double, 3> best = {input.noise.gyro_arw, input.noise.accel_vrw,
-                                input.noise.observation.motion.front().oscillations.front().sigma / std::sqrt(0.5 * correlation_s)};
-  climb(input, {1.25}, best);
-  input = with(input, best);
 }
 
 }  // namespace selfcal::diagnosis

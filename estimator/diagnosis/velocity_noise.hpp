@@ -10,8 +10,5 @@ namespace selfcal::diagnosis {
 // Where it is large enough to colour the innovations it becomes a walk of the position observed (exactly its effect on
 // a filter that observes nothing else), and all densities those of the greatest likelihood. True where `input` changed.
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise);
-// Whether `input` has it; and the densities again, from where they are: what was left out had its share in them.
-bool has_velocity_noise(const PassInput& input);
-void refit_velocity_noise(PassInput& input);
 
 }  // namespace selfcal::diagnosis
