@@ -87,9 +87,12 @@ Task<CalibrationRun::Step> CalibrationRun::identify() {
   if (auto known = co_await check_serial(); !known) co_return tl::unexpected(known.error());
   if (auto taken = co_await take_stock(); !taken) co_return tl::unexpected(taken.error());
   if (stock_.state == ins::State::rotating) {
-    co_return senseless(fmt::format("INS {}: the gimbal turns already, and not for this run", record_.serial));
+    co_return senseless(fmt::format("{}: INS {}: the gimbal turns already, and not for this run", config_.interface,
+                                    record_.serial));
   }
-  if (const auto set = ins::decode_coefficients(in_force_); !set) co_return senseless(set.error().message);
+  if (const auto set = ins::decode_coefficients(in_force_); !set) {
+    co_return senseless(fmt::format("{}: {}", config_.interface, set.error().message));
+  }
   if (auto kept = context_.store.store_set(record_.id, SetRole::previous, in_force_); !kept) {
     co_return senseless(kept.error().message);
   }

@@ -21,6 +21,7 @@ class CanPort : public InsPort {
   void cancel() override;
   void reopen() override;
   std::uint64_t lost_frames() const override;
+  std::string_view interface() const override { return config_.interface; }
 
  private:
   void open();

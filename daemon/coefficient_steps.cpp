@@ -173,7 +173,7 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
     const auto answer = co_await client_.routine(uds::RoutineAction::result, ins::routine::navigation_check, {});
     if (!answer) co_return tl::unexpected(answer.error());
     const auto drift = ins::decode_navigation_result(*answer);
-    if (!drift) co_return senseless(drift.error().message);
+    if (!drift) co_return senseless(fmt::format("{}: {}", config_.interface, drift.error().message));
     if (drift->done) {
       record_.*figure = drift->max_horizontal_m;
       remember("drift", fmt::format("free-inertial drift over {:.0f} s: {:.1f} m", drift->elapsed_s,

@@ -1,5 +1,7 @@
 #include "daemon/ins_client.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "protocol/flash/page.hpp"
@@ -38,15 +40,16 @@ class Exchange {
 };
 
 // An answer that came, but makes no sense.
-tl::unexpected<PortError> senseless(const Error& error) {
-  return tl::unexpected<PortError>(PortError{PortError::Kind::protocol, 0, error.message});
+tl::unexpected<PortError> senseless(const InsPort& port, const Error& error) {
+  return tl::unexpected<PortError>(
+      PortError{PortError::Kind::protocol, 0, fmt::format("{}: {}", port.interface(), error.message)});
 }
 
 template <typename Record>
-Answer<Record> decoded(const Answer<Bytes>& bytes, Expected<Record> (*decode)(ins::ByteView)) {
+Answer<Record> decoded(const InsPort& port, const Answer<Bytes>& bytes, Expected<Record> (*decode)(ins::ByteView)) {
   if (!bytes) return tl::unexpected(bytes.error());
   auto record = decode(*bytes);
-  if (!record) return senseless(record.error());
+  if (!record) return senseless(port, record.error());
   return std::move(*record);
 }
 
@@ -71,14 +74,14 @@ Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
     if (!response) co_return tl::unexpected(response.error());
     const auto record = uds::read_read_response(*response, did);
     if (record) co_return Bytes(record->begin(), record->end());
-    if (attempt == attempts) co_return senseless(record.error());
+    if (attempt == attempts) co_return senseless(port_, record.error());
   }
 }
 
 Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
   const Answer<Bytes> response = co_await ask(uds::write_request(did, record));
   if (!response) co_return tl::unexpected(response.error());
-  if (const auto well = uds::read_write_response(*response, did); !well) co_return senseless(well.error());
+  if (const auto well = uds::read_write_response(*response, did); !well) co_return senseless(port_, well.error());
   co_return Done{};
 }
 
@@ -86,7 +89,7 @@ Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t 
   const Answer<Bytes> response = co_await ask(uds::routine_request(action, routine, option));
   if (!response) co_return tl::unexpected(response.error());
   const auto record = uds::read_routine_response(*response, action, routine);
-  if (!record) co_return senseless(record.error());
+  if (!record) co_return senseless(port_, record.error());
   co_return Bytes(record->begin(), record->end());
 }
 
@@ -96,7 +99,7 @@ Task<Answer<InsClient::Identity>> InsClient::identify() {
   const Answer<Bytes> software = co_await read_record(ins::did::software_version);
   if (!software) co_return tl::unexpected(software.error());
   Identity identity{text(*serial), text(*software)};
-  if (identity.serial.empty()) co_return senseless({ErrorKind::device, "the INS tells an empty serial number"});
+  if (identity.serial.empty()) co_return senseless(port_, {ErrorKind::device, "the INS tells an empty serial number"});
   co_return identity;
 }
 
@@ -104,45 +107,47 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended));
   if (!response) co_return tl::unexpected(response.error());
   if (auto well = uds::read_session_response(*response, uds::Session::extended); !well) {
-    co_return senseless(well.error());
+    co_return senseless(port_, well.error());
   }
   response = co_await ask(uds::seed_request());
   if (!response) co_return tl::unexpected(response.error());
   const auto seed = uds::read_seed_response(*response);
-  if (!seed) co_return senseless(seed.error());
+  if (!seed) co_return senseless(port_, seed.error());
   if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) co_return Done{};
   const auto secret = uds::answer_seed(key, *seed);
-  if (!secret) co_return senseless(secret.error());
+  if (!secret) co_return senseless(port_, secret.error());
   response = co_await ask(uds::key_request(*secret));
   if (!response) co_return tl::unexpected(response.error());
-  if (auto well = uds::read_key_response(*response); !well) co_return senseless(well.error());
+  if (auto well = uds::read_key_response(*response); !well) co_return senseless(port_, well.error());
   co_return Done{};
 }
 
 Task<Answer<ins::StateRecord>> InsClient::read_state() {
   const Answer<Bytes> bytes = co_await read_record(ins::did::state);
-  co_return decoded(bytes, ins::decode_state);
+  co_return decoded(port_, bytes, ins::decode_state);
 }
 
 Task<Answer<ins::DirectoryRecord>> InsClient::read_directory() {
   const Answer<Bytes> bytes = co_await read_record(ins::did::raw_data_directory);
-  co_return decoded(bytes, ins::decode_directory);
+  co_return decoded(port_, bytes, ins::decode_directory);
 }
 
 Task<Answer<ins::SampleFormatRecord>> InsClient::read_sample_format() {
   const Answer<Bytes> bytes = co_await read_record(ins::did::sample_format);
-  co_return decoded(bytes, ins::decode_sample_format);
+  co_return decoded(port_, bytes, ins::decode_sample_format);
 }
 
 Task<Answer<ins::SiteRecord>> InsClient::read_site() {
   const Answer<Bytes> bytes = co_await read_record(ins::did::site);
-  co_return decoded(bytes, ins::decode_site);
+  co_return decoded(port_, bytes, ins::decode_site);
 }
 
 Task<Answer<Done>> InsClient::reset() {
   const Answer<Bytes> response = co_await ask(uds::reset_request(uds::ResetType::hard));
   if (!response) co_return tl::unexpected(response.error());
-  if (auto well = uds::read_reset_response(*response, uds::ResetType::hard); !well) co_return senseless(well.error());
+  if (const auto well = uds::read_reset_response(*response, uds::ResetType::hard); !well) {
+    co_return senseless(port_, well.error());
+  }
   co_return Done{};
 }
 
@@ -150,7 +155,7 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
   const std::size_t wanted = std::size_t{count} * flash::page_bytes;
   Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)));
   if (!response) co_return tl::unexpected(response.error());
-  if (const auto longest = uds::read_upload_response(*response); !longest) co_return senseless(longest.error());
+  if (const auto longest = uds::read_upload_response(*response); !longest) co_return senseless(port_, longest.error());
   Bytes data;
   data.reserve(wanted);
   std::uint32_t whole = 0;
@@ -158,9 +163,9 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
     response = co_await ask(uds::transfer_request(block));
     if (!response) co_return tl::unexpected(response.error());
     const auto part = uds::read_transfer_response(*response, block);
-    if (!part) co_return senseless(part.error());
+    if (!part) co_return senseless(port_, part.error());
     if (part->empty() || data.size() + part->size() > wanted) {
-      co_return senseless({ErrorKind::device, "transferData: more or less data than was asked for"});
+      co_return senseless(port_, {ErrorKind::device, "transferData: more or less data than was asked for"});
     }
     data.insert(data.end(), part->begin(), part->end());
     for (; (whole + 1) * flash::page_bytes <= data.size(); ++whole) {

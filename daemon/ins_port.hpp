@@ -6,6 +6,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <tl/expected.hpp>
 #include <vector>
 
@@ -42,6 +43,7 @@ class InsPort {
   virtual void cancel() = 0;    // forget the request in progress
   virtual void reopen() = 0;    // after the link was lost: a fresh socket and transport
   virtual std::uint64_t lost_frames() const = 0;
+  virtual std::string_view interface() const = 0;   // begins every message about it
 
   // What the CAN controller says of itself and the bus (error frames), as it comes.
   std::function<void(can::BusEvent)> on_bus_event;

@@ -25,6 +25,7 @@ class FakeIns : public InsPort {
   void cancel() override;
   void reopen() override {}
   std::uint64_t lost_frames() const override { return 0; }
+  std::string_view interface() const override { return "fake0"; }
 
   void power_cycle();   // RAM is lost; the newest valid slot comes into force
   ins::State state();
