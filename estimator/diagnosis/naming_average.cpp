@@ -273,7 +273,7 @@ int Naming::append_columns(const std::vector<Candidate>& more, const Eigen::Matr
 void Naming::append_derivatives() {
   std::vector<Candidate> more;
   std::vector<double> width;
-  int appended = 0;
+  Eigen::Index appended = 0;
   for (const Chosen& chosen : chosen_) {
     const Candidate& c = chosen.candidate;
     if (std::isnan(c.constant)) {
@@ -290,18 +290,18 @@ void Naming::append_derivatives() {
     return;
   }
   Eigen::MatrixXd combine = Eigen::MatrixXd::Zero(appended, 2 * appended);
-  const int at = static_cast<int>(rows_.columns.cols());
-  int row = 0;
+  const Eigen::Index at = rows_.columns.cols();
+  Eigen::Index row = 0;
   std::size_t effect = 0;
   for (Chosen& chosen : chosen_) {
-    const int count = chosen.candidate.count;
+    const Eigen::Index count = chosen.candidate.count;
     if (std::isnan(chosen.candidate.constant)) {
       continue;
     }
     const Eigen::MatrixXd difference = Eigen::MatrixXd::Identity(count, count) / width[effect++];
     combine.block(row, 2 * row, count, count) = difference;
     combine.block(row, 2 * row + count, count, count) = -difference;
-    chosen.derivative = at + row;
+    chosen.derivative = static_cast<int>(at + row);
     row += count;
   }
   append_columns(more, combine);
