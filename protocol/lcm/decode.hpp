@@ -1,6 +1,7 @@
 // LCM messages as they come from the network: anybody who reaches the multicast group can send one.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,7 +10,7 @@
 #include <selfcal_lcm/ins_status.hpp>
 #include <selfcal_lcm/service_status.hpp>
 #include <span>
-#include <stdexcept>
+#include <string_view>
 
 namespace selfcal::lcm_messages {
 
@@ -19,49 +20,86 @@ inline constexpr std::int32_t most_parameters = 1024;
 
 namespace detail {
 
-inline std::optional<std::int32_t> int_at(std::span<const std::uint8_t> bytes, std::size_t place) {
-  if (bytes.size() < 4 || place > bytes.size() - 4) {
-    return std::nullopt;
-  }
-  std::uint32_t value = 0;
-  for (const std::uint8_t byte : bytes.subspan(place, 4)) {
-    value = value << 8U | byte;
-  }
-  return static_cast<std::int32_t>(value);
-}
+// The fields of a message behind its hash, in the order of the .lcm file: i int32_t, l int64_t, d double, b boolean,
+// s text; n an int32_t that counts the elements of the arrays S (texts) and D (doubles).
+template <typename Message>
+inline constexpr std::string_view fields = {};
+template <>
+inline constexpr std::string_view fields<selfcal_lcm::service_status> = "ilsiid";
+template <>
+inline constexpr std::string_view fields<selfcal_lcm::ins_status> = "ilssslbddiidiiil";
+template <>
+inline constexpr std::string_view fields<selfcal_lcm::estimate> = "ilslidnSSDDDibddd";
+template <>
+inline constexpr std::string_view fields<selfcal_lcm::alarm> = "ilslbs";
 
-// The count of parameters, whose place in the message depends on the length of the text before it.
-inline bool count_is_sound(std::span<const std::uint8_t> bytes) {
-  constexpr std::size_t before_text = 8 + 4 + 8;       // hash, schema, utime_us
-  constexpr std::size_t behind_text = 8 + 4 + 8;       // run, pass_number, pass_fraction
-  const auto text = int_at(bytes, before_text);
-  if (!text || *text < 1) {
-    return false;
+// Walks over the fields; what it does not find within the bytes is what `sound` then says.
+class Walk {
+ public:
+  explicit Walk(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+
+  bool sound() const { return sound_; }
+
+  void skip(std::size_t count) {
+    sound_ = sound_ && count <= bytes_.size();
+    bytes_ = sound_ ? bytes_.subspan(count) : std::span<const std::uint8_t>{};
   }
-  const auto count = int_at(bytes, before_text + 4 + static_cast<std::size_t>(*text) + behind_text);
-  return count && *count >= 0 && *count <= most_parameters;
+  std::int32_t integer() {
+    std::uint32_t value = 0;
+    for (const std::uint8_t byte : bytes_.first(std::min<std::size_t>(4, bytes_.size()))) {
+      value = value << 8U | byte;
+    }
+    skip(4);
+    return static_cast<std::int32_t>(value);
+  }
+  void text() {   // its length counts the NUL behind it
+    const std::int32_t length = integer();
+    sound_ = sound_ && length >= 1;
+    skip(sound_ ? static_cast<std::size_t>(length) : 0);
+  }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  bool sound_ = true;
+};
+
+inline bool lengths_are_sound(std::string_view fields, std::span<const std::uint8_t> bytes) {
+  Walk walk(bytes);
+  walk.skip(8);   // the hash
+  std::int32_t count = 0;
+  for (const char field : fields) {
+    if (field == 'n') {
+      count = walk.integer();
+      if (count < 0 || count > most_parameters) {
+        return false;
+      }
+    } else if (field == 's') {
+      walk.text();
+    } else if (field == 'S') {
+      for (std::int32_t k = 0; k < count; ++k) {
+        walk.text();
+      }
+    } else {
+      const std::size_t elements = field == 'D' ? static_cast<std::size_t>(count) : 1;
+      walk.skip(elements * (field == 'b' ? 1 : field == 'i' ? 4 : 8));
+    }
+  }
+  return walk.sound();
 }
 
 }  // namespace detail
 
-// nullopt: not a whole message of this type. lcm-gen's decoder alone throws on texts of length 0 and on negative counts,
-// through the C library that called it, and allocates what a count says before it looks for the values.
+// nullopt: not a whole message of this type. lcm-gen's decoder alone reads gigabytes beyond the message on a text of the
+// most negative length, throws on other lengths and on negative counts, through the C library that called it, and
+// allocates what a count says before it looks for the values.
 template <typename Message>
 std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() > longest) {
+  static_assert(!detail::fields<Message>.empty());
+  if (bytes.size() > longest || !detail::lengths_are_sound(detail::fields<Message>, bytes)) {
     return std::nullopt;
   }
-  if constexpr (std::is_same_v<Message, selfcal_lcm::estimate>) {
-    if (!detail::count_is_sound(bytes)) {
-      return std::nullopt;
-    }
-  }
-  try {
-    Message message;
-    return message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) < 0 ? std::nullopt : std::optional(message);
-  } catch (const std::length_error&) {
-    return std::nullopt;
-  }
+  Message message;
+  return message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) < 0 ? std::nullopt : std::optional(message);
 }
 
 }  // namespace selfcal::lcm_messages
