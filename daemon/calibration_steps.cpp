@@ -51,6 +51,10 @@ std::uint32_t new_rotation_number() {
   return std::uniform_int_distribution<std::uint32_t>(1)(device);
 }
 
+bool holds_whole_rotation(const ins::DirectoryRecord& directory) {
+  return directory.complete && directory.pages_expected > 0 && directory.pages_written == directory.pages_expected;
+}
+
 }  // namespace
 
 Task<Answer<Done>> CalibrationRun::check_serial() {
@@ -78,8 +82,7 @@ Task<Answer<Done>> CalibrationRun::take_stock() {
 Task<Answer<Done>> CalibrationRun::look_for_data() {
   const auto directory = co_await client_.read_directory();
   if (!directory) co_return tl::unexpected(directory.error());
-  data_complete_ = directory->complete && directory->pages_expected > 0 &&
-                   directory->pages_written == directory->pages_expected;
+  data_complete_ = holds_whole_rotation(*directory);
   co_return Done{};
 }
 
@@ -190,6 +193,7 @@ Task<Answer<Done>> CalibrationRun::poll_state() {
   const auto directory = co_await client_.read_directory();
   if (!directory) co_return tl::unexpected(directory.error());
   stock_ = *state;
+  data_complete_ = directory->run_id == record_.rotation && holds_whole_rotation(*directory);
   progress_.ins.state = state->state;
   progress_.ins.pages_written = directory->pages_written;
   report_progress();
@@ -216,6 +220,8 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
       co_return tl::unexpected(polled.error());
     }
     if (progress_.ins.state == ins::State::complete) co_return Event::rotation_ended;
+    // An INS that restarted before anybody saw it complete is idle, and its FLASH has everything.
+    if (progress_.ins.state != ins::State::rotating && data_complete_) co_return Event::rotation_ended;
     if (progress_.ins.state != ins::State::rotating) {
       co_return senseless(fmt::format("{}: the rotation ended before its time, at position {} of {}: the INS is {}{}",
                                       config_.interface, position, progress_.positions,

@@ -146,6 +146,17 @@ TEST_F(CalibrationRunTest, AnInsThatLostItsPowerInRotationEndsTheRun) {
   EXPECT_TRUE(old_set_in_force());
 }
 
+// It was complete for an instant, and idle when it was asked: all data are in its FLASH.
+TEST_F(CalibrationRunTest, AnInsThatLostItsPowerJustAfterTheRotationIsTakenUp) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  timers_.run_until([&] { return ins_.state() == ins::State::complete; }, 200s);
+  ASSERT_EQ(run_->record().state, State::rotating);
+  ins_.power_cycle();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.starts, 1);
+}
+
 TEST_F(CalibrationRunTest, APowerLossInRotationGivesItsReason) {
   begin();
   ASSERT_TRUE(until(State::rotating));

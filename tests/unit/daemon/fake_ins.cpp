@@ -199,7 +199,8 @@ Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
     case uds::service::routine_control: return unlocked_ ? respond_to_routine(request) : no(0x33);
     case uds::service::request_upload: {
       const auto range = uds::parse_upload_request(request);
-      if (!range || !unlocked_) return no(0x31);
+      if (!unlocked_) return no(0x33);
+      if (!range) return no(0x31);
       upload_page_ = range->first_page;
       return uds::upload_response(flash::page_bytes + uds::transfer_overhead);
     }
