@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <linux/can.h>
+#include <net/if.h>
 
 #include <algorithm>
 #include <charconv>
@@ -138,6 +139,9 @@ Expected<LogEntry> parse_log_line(std::string_view line) {
   }
   if (interface.empty() || hash == std::string_view::npos) {
     return bad_line("not 'interface identifier#data'", line);
+  }
+  if (interface.size() >= IFNAMSIZ) {
+    return bad_line(fmt::format("the name of an interface has at most {} characters", IFNAMSIZ - 1), line);
   }
   entry.interface = interface;
   if (!parse_identifier(frame_text.substr(0, hash), entry)) {

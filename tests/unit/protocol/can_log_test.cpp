@@ -57,6 +57,14 @@ TEST(BusLog, BadLinesAreRefusedWithTheirNumber) {
   EXPECT_NE(second.error().message.find("line 3"), std::string::npos) << second.error().message;
 }
 
+// Linux gives an interface 15 characters (IFNAMSIZ with its NUL); the longest line holds no more.
+TEST(BusLog, AnInterfaceHasTheKernelsLength) {
+  EXPECT_TRUE(parse_log_line("(1.000001) can456789012345 123#00"));
+  const auto entry = parse_log_line("(1.000001) can4567890123456 123#00");
+  ASSERT_FALSE(entry);
+  EXPECT_NE(entry.error().message.find("at most 15 characters"), std::string::npos) << entry.error().message;
+}
+
 RC_GTEST_PROP(BusLog, ReadsBackWhatItWrote, ()) {
   LogEntry entry;
   entry.interface = "vcan0";
