@@ -1,5 +1,6 @@
 // selfcal report: one calibration, or all units, as a self-contained HTML page or an A4 PDF.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -215,6 +216,12 @@ Expected<Json> fleet_page(const ReportArguments& arguments) {
   return report::fleet_document(histories, arguments.fleet_options);
 }
 
+Expected<int> page_written(const ReportArguments& arguments) {
+  return (arguments.fleet ? fleet_page(arguments) : page_of(arguments.subjects.front(), arguments))
+      .and_then([&](const Json& document) { return report::write_page(document, arguments.output); })
+      .map([] { return 0; });
+}
+
 // The page is the answer, whatever it says; `estimate` and `diagnose` have the status that a script asks for.
 Expected<int> write_report(ReportArguments arguments) {
   if (arguments.fleet) {
@@ -224,9 +231,16 @@ Expected<int> write_report(ReportArguments arguments) {
   } else if (arguments.subjects.size() != 1) {
     return fail(ErrorKind::usage, "one RUN or RECORDING is wanted (or --history for all units)");
   }
-  return (arguments.fleet ? fleet_page(arguments) : page_of(arguments.subjects.front(), arguments))
-      .and_then([&](const Json& document) { return report::write_page(document, arguments.output); })
-      .map([] { return 0; });
+  try {
+    return page_written(arguments);
+  } catch (const Json::exception& error) {   // a value of another type than `show` and `history` write
+    std::vector<std::string> files = arguments.subjects;
+    if (!arguments.past.empty()) {
+      files.push_back(arguments.past);
+    }
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: not as selfcal writes it: {}", fmt::join(files, ", "), error.what()));
+  }
 }
 
 Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& schedules, const Installation& installation,

@@ -112,5 +112,29 @@ TEST(BadFile, SimulationFilesNameLineAndKey) {
                                        folder / "absent/r.h5"}), internal), "");
 }
 
+TEST(BadFile, ReportOfADocumentWithValuesOfOtherTypes) {
+  const test::TemporaryFolder folder;
+  const std::string out = folder / "page.html", run = folder / "run.json", past = folder / "past.json";
+  const std::string sound = R"({"run": 1, "serial": "X", "state": "completed", "started_utc": "2026-01-01T00:00:00Z",
+                                "events": [], "result": {"parameters": [{"name": "gyro_drift_x", "value": 1, "sigma": 1}]}})";
+  for (const char* document : {R"({"run": 1, "serial": 7, "state": "completed", "started_utc": "", "events": [], "result": {}})",
+                               R"({"run": 1, "serial": "X", "state": "completed", "started_utc": [], "events": [], "result": {}})",
+                               R"({"run": 1, "serial": "X", "state": "completed", "started_utc": "", "events": [], "result": {},
+                                   "recording": 3})"}) {
+    ASSERT_TRUE(write_file_atomically(run, document));
+    const auto finished = run_selfcal({"report", run, "-o", out});
+    EXPECT_EQ(failure_fault(finished, bad_input), "") << document;
+    EXPECT_THAT(finished.error, HasSubstr("run.json"));
+  }
+  ASSERT_TRUE(write_file_atomically(run, sound));
+  ASSERT_TRUE(write_file_atomically(past, R"({"serial": "X", "runs": 3, "parameters": [{"name": 4}, "gyro_drift_x"]})"));
+  const auto beside = run_selfcal({"report", run, "--past", past, "-o", out});
+  EXPECT_EQ(failure_fault(beside, bad_input), "");
+  EXPECT_THAT(beside.error, HasSubstr("past.json"));
+  const auto fleet = run_selfcal({"report", "--history", past, "-o", out});
+  EXPECT_EQ(failure_fault(fleet, bad_input), "");
+  EXPECT_THAT(fleet.error, HasSubstr("past.json"));
+}
+
 }  // namespace
 }  // namespace selfcal
