@@ -27,6 +27,9 @@ function graticule() {
   return circles;
 }
 
+// A label lies on the lines of the track: they end before its letters.
+const halo = 'paint-order: stroke; stroke: var(--ground); stroke-width: 8px; stroke-linejoin: round';
+
 // One side of the sphere at (cx, cy); what lies behind is left to the other side.
 function drawSide(group, plan, axes, cx, cy, radius) {
   const flat = (p) => [cx + radius * dot(p, axes.right), cy - radius * dot(p, axes.up)];
@@ -55,7 +58,7 @@ function drawSide(group, plan, axes, cx, cy, radius) {
       const point = unit.map((value) => sign * value);
       if (shown(point)) {
         const [x, y] = flat(point);
-        group.append(svgElement('text', {x, y: y + 19, 'text-anchor': 'middle', style: 'font-weight: bold'},
+        group.append(svgElement('text', {x, y: y + 19, 'text-anchor': 'middle', style: 'font-weight: bold; ' + halo},
                                 (sign > 0 ? '+' : '−') + name));
       }
     }
@@ -70,7 +73,7 @@ function drawSide(group, plan, axes, cx, cy, radius) {
     if (shown(at)) {
       const [x, y] = flat(at);
       group.append(svgElement('circle', {cx: x, cy: y, r: 5, style: 'fill: var(--y)'}),
-                   svgElement('text', {x: x > cx ? x - 7 : x + 7, y: y - 7, 'text-anchor': x > cx ? 'end' : 'start'},
+                   svgElement('text', {x: x > cx ? x - 7 : x + 7, y: y - 7, 'text-anchor': x > cx ? 'end' : 'start', style: halo},
                               names.join(' ')));
     }
   }
