@@ -83,7 +83,7 @@ function showRun(report) {
   }
   const events = run.events;
   document.getElementById('run-story').append(element('details', {},
-      element('summary', {}, `${events.length} events of the run`), table([
+      element('summary', {}, `${events.length} ${events.length === 1 ? 'event' : 'events'} of the run`), table([
         {title: 'UTC', cells: events.map((e) => e.utc), class: 'left'},
         {title: 'kind', cells: events.map((e) => e.kind), class: 'left'},
         {title: 'what', cells: events.map((e) => e.text), class: 'words'}])));
