@@ -19,7 +19,12 @@ function runSentence(run) {
   if (!run) {
     return '';
   }
-  return run.coefficients?.in_force ? ' The set was pushed, read back and is in force.' : ` The run ${run.state}: the set is not in force.`;
+  if (!run.coefficients?.in_force) {
+    return ` The run ${run.state}: the set is not in force.`;
+  }
+  // Only the word of an operator puts a set into force that was not accepted.
+  return run.force_reason ? ` The set was pushed and is in force, forced by ${run.user}: ${run.force_reason}.`
+                          : ' The set was pushed, read back and is in force.';
 }
 
 function fillFacts(facts) {
