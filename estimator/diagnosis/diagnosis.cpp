@@ -334,6 +334,9 @@ DiagnosisOutcome Diagnoser::run() {
   if (options_.stop.stop_requested()) {
     return {std::nullopt, "stopped"};
   }
+  if (!d_.value.allFinite() || !d_.covariance.allFinite() || !d_.value_as_named.allFinite()) {
+    return {std::nullopt, "internal error: the parameters of the diagnosis are not finite"};
+  }
   return {std::move(d_), {}};
 }
 

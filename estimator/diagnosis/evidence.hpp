@@ -1,6 +1,7 @@
 // Tests on the rows of a signature pass: which columns explain the residuals, one group at a time, given others.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -54,5 +55,12 @@ WalkTest test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& m
 // `reduced` columns. `fold` gives each row's number.
 double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual, const std::vector<int>& fold,
                      const std::vector<int>& full, const std::vector<int>& reduced);
+
+// A line is looked for at every frequency that so many rows (three axes) tell apart.
+inline double searched_frequencies(double rows) { return std::max(1.0, rows / 6.0); }
+// So many constants of an effect were looked at: those of its grid, or the frequencies of a spectrum. At least 1.
+inline double variants(const Effect& effect, double rows) {
+  return effect.constants.empty() ? searched_frequencies(rows) : static_cast<double>(effect.constants.size());
+}
 
 }  // namespace selfcal::diagnosis

@@ -101,7 +101,7 @@ double Naming::independent_tests() const { return effective_tests_ + 0.5 * walk_
 
 // The frequency of a sway was looked for in a spectrum.
 double Naming::corrected(double log_p, const std::string& effect) const {
-  const double spectrum = effect == "base_sway" ? std::max(1.0, evidence_.rows / 6.0) : 1.0;
+  const double spectrum = effect == "base_sway" ? searched_frequencies(evidence_.rows) : 1.0;
   return log_corrected(log_p, independent_tests() * spectrum);
 }
 

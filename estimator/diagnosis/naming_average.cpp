@@ -5,7 +5,7 @@
 //   log p = (b' A^-1 b - log|A| - log|V|) / 2,   A = T'(Z'Z)T + V^-1,   b = T'Z'r,
 // and the spread between explanations goes into sigma: a direction that only one of them leaves open does not pass
 // for known, nor for unknown (Hoeting and others, Bayesian model averaging, Statistical Science 14, 1999).
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -60,6 +60,7 @@ class Averaging {
       : evidence_(evidence), rows_(rows), chosen_(chosen) {}
 
   const Chosen& chosen(std::size_t i) const { return chosen_[i]; }
+  double rows() const { return evidence_.rows; }
   bool names(const Effect& effect) const {
     return std::any_of(chosen_.begin(), chosen_.end(),
                        [&](const Chosen& x) { return x.candidate.effect->id == effect.id; });
@@ -150,15 +151,20 @@ class Averaging {
       row += q->T.rows();
       col += q->T.cols();
     }
-    Eigen::MatrixXd A = T.transpose() * evidence_.information(columns, columns) * T;
-    A.diagonal() += sigma.cwiseAbs2().cwiseInverse();
-    const Eigen::VectorXd b = T.transpose() * evidence_.score(columns);
-    const Eigen::LDLT<Eigen::MatrixXd> solver(A);
-    const Eigen::VectorXd mean = solver.solve(b);
+    // In units of the prior's sigma A is I + H. H has no negative eigenvalue but by rounding, which is large beside 1 where
+    // some direction is known a billion times better than others.
+    const Eigen::MatrixXd H =
+        sigma.asDiagonal() * (T.transpose() * evidence_.information(columns, columns) * T) * sigma.asDiagonal();
+    const Eigen::VectorXd b = sigma.cwiseProduct(T.transpose() * evidence_.score(columns));
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(H);
+    const Eigen::VectorXd precision = 1.0 + solver.eigenvalues().cwiseMax(0.0).array();
+    const Eigen::MatrixXd axes = sigma.asDiagonal() * solver.eigenvectors();
+    const Eigen::VectorXd along = solver.eigenvectors().transpose() * b;
+    const Eigen::VectorXd mean = axes * along.cwiseQuotient(precision);
     Explanation e;
-    e.log_p = p.log_prior + 0.5 * b.dot(mean) - 0.5 * solver.vectorD().array().log().sum() - sigma.array().log().sum();
+    e.log_p = p.log_prior + 0.5 * along.cwiseAbs2().cwiseQuotient(precision).sum() - 0.5 * precision.array().log().sum();
     if (full) {
-      const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(size, size));
+      const Eigen::MatrixXd covariance = axes * precision.cwiseInverse().asDiagonal() * axes.transpose();
       const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns) * T;
       e.mean = mean.head(p.T.cols());
       e.covariance = covariance.topLeftCorner(p.T.cols(), p.T.cols());
@@ -194,8 +200,7 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
   with(averaging.chosen(i).candidate, averaging.own_parts(i, 0.0));
   for (const Candidate& rival : candidates) {
     if (!averaging.names(*rival.effect)) {
-      const auto variants = static_cast<double>(rival.effect->constants.size());
-      with(rival, Averaging::parts(rival, -1, {}, -std::log(variants)));
+      with(rival, Averaging::parts(rival, -1, {}, -std::log(variants(*rival.effect, averaging.rows()))));
     }
   }
   return tried;

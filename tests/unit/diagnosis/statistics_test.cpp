@@ -4,6 +4,9 @@
 
 #include <cmath>
 
+#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/evidence.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -32,6 +35,13 @@ TEST(FitColumns, LeavesOutWhatCannotBeSeen) {
   EXPECT_NEAR(fit.gain, 100.0, 1e-9);
   const Fit seen = fit_columns(Eigen::Matrix2d::Identity(), Eigen::Vector2d(50.0, 1.0));
   EXPECT_EQ(seen.rank, 2);   // the negative control
+}
+
+// A share of the prior probability is 1 over this: none may be 0, a sway's frequency included, which has no grid.
+TEST(Variants, EveryEffectWasLookedForAtLeastOnce) {
+  for (const Effect& effect : catalogue()) {
+    EXPECT_GE(variants(effect, 2940.0 * 3.0), 1.0) << effect.id;
+  }
 }
 
 }  // namespace
