@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "protocol/toml_file/toml_text.hpp"
 
@@ -17,9 +18,31 @@ struct TomlFile::Document {
 
 namespace {
 
+// Arrays not by the library: its formatter (toml++ 3.3) guesses their width and converts a negative number to an unsigned one
+// where an element is below 0.1. The parser lets arrays in arrays go no deeper than 256.
+void write(const toml::node& node, std::ostream& out) {
+  if (node.is_table()) {
+    out << "{...}";
+  } else if (const toml::array* array = node.as_array()) {
+    const char* separator = "";
+    out << '[';
+    for (const toml::node& element : *array) {
+      out << std::exchange(separator, ", ");
+      write(element, out);
+    }
+    out << ']';
+  } else {
+    node.visit([&](const auto& value) {
+      if constexpr (toml::is_value<decltype(value)>) {
+        out << value;
+      }
+    });
+  }
+}
+
 std::string written(const toml::node& node) {
   std::ostringstream out;
-  node.visit([&](const auto& value) { out << value; });
+  write(node, out);
   const std::string text = one_line(out.str());
   constexpr std::size_t longest = 60;
   return text.size() > longest ? text.substr(0, longest) + "..." : text;

@@ -34,6 +34,15 @@ TEST(TomlText, AtAnyDepthComesOutAsItWentIn) {
   EXPECT_EQ(table->get("a")->as_table()->find("\u00EB")->first.source().begin.line, 4U);
 }
 
+// Values in a message: arrays of numbers below 0.1 as well, tables by what they are.
+TEST(TomlText, AnErrorSaysTheValue) {
+  const auto parsed = TomlFile::parse("a = [[0, 0.0625, -0.03125]]\nt = {x = 1}\nd = 1979-05-27\n", "t.toml");
+  ASSERT_TRUE(parsed) << parsed.error().message;
+  EXPECT_THAT(parsed->number("a").error().message, HasSubstr("t.toml:1: a: [[0, 0.0625, -0.03125]] is not a number"));
+  EXPECT_THAT(parsed->number("t").error().message, HasSubstr("{...} is not a number"));
+  EXPECT_THAT(parsed->number("d").error().message, HasSubstr("1979-05-27 is not a number"));
+}
+
 TEST(TomlText, WhereNoStringIsMeantIsAnError) {
   // U+00A1, U+2E3E and others: toml++ 3.3 takes them for impossible there.
   for (const char* text : {"t = 6='\u00C5", "t = 6='\u2E3E'", "t = \u00C5", "\u00C5 = 1", "t = 1979-05-27T='\u0100"}) {
