@@ -1,9 +1,10 @@
-// What is settled once the names stand: the noise of the base, and whether they are an explanation.
+// What is settled once the names stand: the noise of the base, whether they are an explanation, and what they leave.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/naming.hpp"
 #include "estimator/geometry/units.hpp"
 
@@ -191,6 +192,61 @@ double Naming::log_p_structure() const {
     }
   }
   return log_corrected(smallest, tests);
+}
+
+Map Naming::map_after() const {
+  return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns());
+}
+
+double Naming::square_after() const {
+  return evidence_.square - evidence_.fit(chosen_columns()).gain;
+}
+
+Eigen::VectorXd Naming::final_residual() const {
+  Eigen::VectorXd residual = rows_.residual;
+  if (!applied_columns_.empty()) {
+    residual += rows_.columns(Eigen::all, applied_columns_) * applied_;
+  }
+  const std::vector<int> columns = chosen_columns();
+  if (!columns.empty()) {
+    residual -= rows_.columns(Eigen::all, columns) * evidence_.fit(columns).value;
+  }
+  for (const WalkTest& walk : walks_) {   // the walk's own estimate
+    const Eigen::MatrixXd Z = rows_.columns(Eigen::all, walk.columns);
+    const Eigen::MatrixXd J = Z.transpose() * Z;
+    const auto n = J.rows();
+    residual -= Z * (walk.covariance * (Eigen::MatrixXd::Identity(n, n) + J * walk.covariance).inverse() *
+                     (Z.transpose() * residual));
+  }
+  return residual;
+}
+
+double Naming::log_p_white_after() const { return diagnosis::log_p_white(final_residual()); }
+
+// Truth = estimate + shift * (size - what the correction already took out).
+ParameterVector Naming::value_as_named() const {
+  const PassOutput& pass = rows_.pass;
+  ParameterVector value = input_.parameters + pass.mean.segment<sensor_parameter_count>(pass.layout.parameters());
+  for (const Chosen& c : chosen_) {
+    value += rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+  }
+  if (!applied_columns_.empty()) {
+    value -= rows_.shift(Eigen::all, applied_columns_) * applied_;
+  }
+  return value;
+}
+
+ParameterVector Naming::value() const {
+  ParameterVector value = value_as_named() + averaged_;
+  for (const Chosen& c : chosen_) {
+    value -= rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+  }
+  return value;
+}
+
+ParameterMatrix Naming::covariance() const {
+  const int at = rows_.pass.layout.parameters();
+  return rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
 }
 
 }  // namespace selfcal::diagnosis
