@@ -16,7 +16,7 @@ def binomial_tail(k, n, p):
     """P(X >= k)."""
     if k <= 0:
         return 1.0
-    if p <= 0.0:
+    if k > n or p <= 0.0:
         return 0.0
     if p >= 1.0:
         return 1.0
