@@ -219,10 +219,9 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
     } else if (auto polled = co_await poll_state(); !polled) {   // what a status frame says is not enough to end a run
       co_return tl::unexpected(polled.error());
     }
-    if (progress_.ins.state == ins::State::complete) co_return Event::rotation_ended;
-    // An INS that restarted before anybody saw it complete is idle, and its FLASH has everything.
-    if (progress_.ins.state != ins::State::rotating && data_complete_) co_return Event::rotation_ended;
     if (progress_.ins.state != ins::State::rotating) {
+      // An INS that restarted before anybody saw it complete is idle, and its FLASH has everything.
+      if (progress_.ins.state == ins::State::complete || data_complete_) co_return Event::rotation_ended;
       co_return senseless(fmt::format("{}: the rotation ended before its time, at position {} of {}: the INS is {}{}",
                                       config_.interface, position, progress_.positions,
                                       ins::name(progress_.ins.state), words_of_faults(stock_.faults)));
