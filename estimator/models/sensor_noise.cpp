@@ -256,20 +256,15 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
   // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
   const double expected = noise.accel.white_asd * noise.accel.white_asd;
   noise.base_moves = second_variance(data, segments) > 25.0 * expected;
-  const Spectrum gyro =
-      mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, noise.base_moves ? fast_group_s : slow_group(segments));
-  if (noise.base_moves) {
-    fit_density(gyro, std::nullopt, least_white_moving, noise.gyro);
-  } else if (gyro.pieces >= enough_pieces) {
-    fit_density(gyro, std::nullopt, least_white_still, noise.gyro);
-  } else {
-    fit_density(mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s), std::nullopt,
-                least_white_still, noise.gyro);
+  const double group_s = noise.base_moves ? fast_group_s : slow_group(segments);
+  Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
+  if (gyro.pieces < enough_pieces && !noise.base_moves) {
+    gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s);
   }
+  fit_density(gyro, std::nullopt, noise.base_moves ? least_white_moving : least_white_still, noise.gyro);
   if (!noise.base_moves && noise.gyro.quantum > 0.0) {
-    const QuantisedRate behind =
-        fit_quantised_rate(data.delta_theta, data.sample_rate_hz, segments, noise.gyro.quantum,
-                           piece_length * slow_group(segments), noise.gyro.white_asd);
+    const QuantisedRate behind = fit_quantised_rate(data.delta_theta, data.sample_rate_hz, segments, noise.gyro.quantum,
+                                                    piece_length * group_s, noise.gyro.white_asd);
     if (behind.white_asd > 0.0) {
       noise.gyro.white_asd = behind.white_asd;
       noise.gyro.white_sigma = behind.white_sigma;
