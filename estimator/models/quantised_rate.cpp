@@ -1,64 +1,26 @@
 #include "estimator/models/quantised_rate.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "estimator/models/dwell_periodogram.hpp"
 
 namespace selfcal {
 namespace {
 
 using std::numbers::pi;
 
-constexpr int lowest_bin = 6, highest_bin = 26, bin_count = highest_bin - lowest_bin + 1;   // 0.19 to 0.8 Hz of 32 s
+constexpr int lowest_bin = DwellPeriodogram::lowest_bin, bin_count = DwellPeriodogram::bin_count;   // 0.19 to 0.8 Hz of 32 s
 constexpr double margin_s = 1.0;          // left out at both ends of a dwell
-constexpr int detrend_order = 8;
 constexpr int enough_pieces = 10;         // of an axis
 constexpr int rounds = 40, rounds_before_lines = 10;
 // Taper sin^4: neighbouring bins share noise, and a sum over bins scatters by mean(w^4)/mean(w^2)^2 of independent ones:
 // mean(sin^16) = 6435/32768, mean(sin^8) = 35/128.
 constexpr double taper_spread = 6435.0 / 32768.0 / (35.0 / 128.0 * 35.0 / 128.0);
 
-using Bins = Eigen::Array<double, bin_count, 1>;
-
-// Tapered pieces without a polynomial, at the full rate: sums over groups would fold the quantum's noise, which is
-// that of an angle, down from above.
-class Analysis {
- public:
-  Analysis(Eigen::Index length, double rate_hz) : dt_(1.0 / rate_hz), rows_(2 * bin_count, length) {
-    Eigen::MatrixXd basis(length, detrend_order + 1);
-    Eigen::VectorXd taper(length);
-    const auto n = static_cast<double>(length);
-    for (Eigen::Index i = 0; i < length; ++i) {
-      const double at = (static_cast<double>(i) + 0.5) / n;
-      taper(i) = std::pow(std::sin(pi * at), 4);
-      for (int k = 0; k <= detrend_order; ++k) {
-        basis(i, k) = std::legendre(static_cast<unsigned>(k), 2.0 * at - 1.0);
-      }
-      for (int b = 0; b < bin_count; ++b) {
-        rows_(b, i) = std::cos(2.0 * pi * (b + lowest_bin) * at);
-        rows_(bin_count + b, i) = std::sin(2.0 * pi * (b + lowest_bin) * at);
-      }
-    }
-    const Eigen::MatrixXd tapered = taper.asDiagonal() * basis;
-    const Eigen::MatrixXd gram = tapered.transpose() * tapered;
-    const Eigen::MatrixXd along = gram.ldlt().solve((rows_ * tapered).transpose());
-    rows_ = (rows_ - along.transpose() * tapered.transpose()) * taper.asDiagonal();
-    gain_ = rows_.topRows(bin_count).rowwise().squaredNorm() + rows_.bottomRows(bin_count).rowwise().squaredNorm();
-  }
-
-  // Of rates, two-sided, per Hz.
-  Bins periodogram(const Eigen::VectorXd& rates) const {
-    const Eigen::ArrayXd y = (rows_ * rates).array();
-    return (y.head(bin_count).square() + y.tail(bin_count).square()) * dt_ / gain_;
-  }
-
- private:
-  double dt_;
-  Eigen::MatrixXd rows_;
-  Bins gain_;
-};
+using Bins = DwellPeriodogram::Bins;
 
 // One axis in one dwell: mean periodogram and mean rate.
 struct AxisDwell {
@@ -70,7 +32,8 @@ struct AxisDwell {
 
 std::vector<AxisDwell> axis_dwells(std::span<const std::array<double, 3>> increments, double rate_hz,
                                    const std::vector<Segment>& segments, std::size_t length) {
-  const Analysis analysis(static_cast<Eigen::Index>(length), rate_hz);
+  // At the full rate: sums over groups would fold the quantum's noise, which is that of an angle, down from above.
+  const DwellPeriodogram analysis(static_cast<Eigen::Index>(length));
   const auto margin = static_cast<std::size_t>(margin_s * rate_hz);
   std::vector<AxisDwell> all;
   Eigen::VectorXd rates(static_cast<Eigen::Index>(length));
@@ -90,7 +53,7 @@ std::vector<AxisDwell> axis_dwells(std::span<const std::array<double, 3>> increm
         for (std::size_t i = 0; i < length; ++i) {
           rates(static_cast<Eigen::Index>(i)) = increments[first + i][axis] * rate_hz - dwell.rate;
         }
-        dwell.density += analysis.periodogram(rates);
+        dwell.density += analysis.density(rates, 1.0 / rate_hz);
         ++dwell.pieces;
       }
       dwell.density /= dwell.pieces;

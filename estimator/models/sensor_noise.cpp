@@ -1,12 +1,12 @@
 #include "estimator/models/sensor_noise.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
+#include "estimator/models/dwell_periodogram.hpp"
 #include "estimator/models/quantised_rate.hpp"
 
 namespace selfcal {
@@ -15,7 +15,6 @@ namespace {
 using Increments = std::span<const std::array<double, 3>>;
 
 constexpr int piece_length = 64;          // groups
-constexpr int lowest_bin = 6, highest_bin = 26;   // of piece_length
 // Increments are summed into groups. 0.05 s: pieces of 3.2 s, 1.9 to 8 Hz, where sway has died out. Gyros on a still
 // base 0.5 s: 32 s, 0.19 to 0.8 Hz, because a slow steady rate leaves their quantisation far from white above that.
 constexpr double slow_group_s = 0.5, fast_group_s = 0.05;
@@ -23,70 +22,20 @@ constexpr int lowest_bins = 5;
 constexpr std::size_t enough_pieces = 10;
 constexpr std::size_t most_pieces = 600;  // 10 x 600 periodogram values fix a density to 1 %
 constexpr double margin_s = 1.0;          // left out at both ends of a dwell
-constexpr int detrend_order = 8;          // a sway of 5 s is two thirds of a cycle of a piece
 // Of the density at the lowest bins, at least so much is left to the white rate. On a still base a steady rate makes
 // the quantisation periodic, and it can look like white angle all the way down. A moving base sweeps over hundreds of
 // quanta in a group: then it is white angle, and may well be four fifths of what is seen there.
 constexpr double least_white_still = 0.3, least_white_moving = 0.03;
 
-// Takes a polynomial out of a piece and tapers it; sway is slow and large, and must not leak into the band. What both do
-// to noise is linear and taken into account: at the lowest bins the polynomial takes some of it away.
-class PieceAnalysis {
- public:
-  using Bins = Eigen::Array<double, highest_bin - lowest_bin + 1, 1>;
+using Bins = DwellPeriodogram::Bins;
 
-  PieceAnalysis() : cosine_(Bins::RowsAtCompileTime, piece_length), sine_(Bins::RowsAtCompileTime, piece_length) {
-    Eigen::MatrixXd basis(piece_length, detrend_order + 1);
-    Eigen::VectorXd window(piece_length);
-    for (int i = 0; i < piece_length; ++i) {
-      const double t = (2.0 * i + 1.0) / piece_length - 1.0;
-      const double sine = std::sin(std::numbers::pi * (i + 0.5) / piece_length);
-      window(i) = sine * sine * sine * sine;
-      for (int k = 0; k < basis.cols(); ++k) {
-        basis(i, k) = std::legendre(static_cast<unsigned>(k), t);
-      }
-      for (int b = lowest_bin; b <= highest_bin; ++b) {
-        const double phase = 2.0 * std::numbers::pi * b * i / piece_length;
-        cosine_(b - lowest_bin, i) = std::cos(phase);
-        sine_(b - lowest_bin, i) = std::sin(phase);
-      }
-    }
-    // x = W (r - B a), a of least squares in the window's own weights: what remains is orthogonal under the window.
-    const Eigen::MatrixXd weighted = window.asDiagonal() * basis;
-    const Eigen::MatrixXd fit = (weighted.transpose() * weighted).ldlt().solve(weighted.transpose() * window.asDiagonal());
-    const Eigen::MatrixXd prepare = Eigen::MatrixXd(window.asDiagonal()) - weighted * fit;
-    cosine_ *= prepare;
-    sine_ *= prepare;
-    white_gain_ = cosine_.rowwise().squaredNorm() + sine_.rowwise().squaredNorm();
-    angle_ratio_ = (difference_power(cosine_) + difference_power(sine_)) / white_gain_;
-  }
-
-  // Periodogram of rates (per s) at the bins, density per Hz, two-sided: white noise of asd N gives N^2.
-  Bins periodogram(const Eigen::VectorXd& rates, double group_s) const {
-    return ((cosine_ * rates).array().square() + (sine_ * rates).array().square()) * group_s / white_gain_;
-  }
-
-  // The same of white angle of unit variance: about 4 sin^2(pi f D)/D.
-  Bins angle_density(double group_s) const { return angle_ratio_ / group_s; }
-
- private:
-  // Variance of each row's product with the differences of white noise of unit variance: neighbours correlate by -1.
-  static Bins difference_power(const Eigen::MatrixXd& rows) {
-    return 2.0 * rows.rowwise().squaredNorm() -
-           2.0 * rows.leftCols(piece_length - 1).cwiseProduct(rows.rightCols(piece_length - 1)).rowwise().sum();
-  }
-
-  Eigen::MatrixXd cosine_, sine_;
-  Bins white_gain_, angle_ratio_;
-};
-
-const PieceAnalysis& analysis() {
-  static const PieceAnalysis once;
+const DwellPeriodogram& analysis() {
+  static const DwellPeriodogram once(piece_length);
   return once;
 }
 
 struct Spectrum {
-  PieceAnalysis::Bins density = PieceAnalysis::Bins::Zero();
+  Bins density = Bins::Zero();
   std::size_t pieces = 0;
   double group_s = 0.0;   // as grouped: whole samples
 };
@@ -121,7 +70,7 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
           }
           rates(i) = sum / spectrum.group_s;
         }
-        spectrum.density += analysis().periodogram(rates, spectrum.group_s) / 3.0;
+        spectrum.density += analysis().density(rates, spectrum.group_s) / 3.0;
       }
       ++spectrum.pieces;
     }
@@ -136,7 +85,7 @@ Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<
 // A quantum that is carried on (known_angle) leaves quantum^2/12 of white angle; it is then not fitted.
 void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, double least_white, TriadNoise& noise) {
   const Eigen::Index bins = spectrum.density.size();
-  const PieceAnalysis::Bins shape = analysis().angle_density(spectrum.group_s);
+  const Bins shape = analysis().angle_density(spectrum.group_s);
   std::vector<double> sorted(spectrum.density.begin(), spectrum.density.end());
   std::nth_element(sorted.begin(), sorted.begin() + bins / 2, sorted.end());
   double white = sorted[static_cast<std::size_t>(bins / 2)];
