@@ -16,6 +16,7 @@ struct Chosen {
   Candidate candidate;                 // columns as in the naming's candidates
   double constant_sigma = 0.0;         // of the candidate's constant, from the curvature of the likelihood
   int derivative = -1;                 // first column of its derivative by the constant's logarithm, once averaged
+  std::vector<Candidate> constants;    // the same effect with constants about its own, columns of their own, once averaged
   Eigen::VectorXd size;                // fitted, in typical sizes
   Eigen::MatrixXd covariance;
   double log_p = 0.0;                  // given the others, corrected for variants and effects
@@ -81,7 +82,7 @@ class Naming {
   bool exchange();
   void sharpen_observation();
   int append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine);
-  void append_derivatives();
+  void append_constants();
   void test_likenesses();
   double test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside);
   void average();

@@ -14,13 +14,20 @@
 namespace selfcal::diagnosis {
 namespace {
 
-// Typical sizes that coefficients may have: unknown, so each is tried.
-constexpr std::array<double, 6> scales = {1.0, 3.0, 10.0, 30.0, 100.0, 300.0};
+// Typical sizes that coefficients may have: unknown, so each is tried. What is seen at a hundredth of its typical size (a
+// lever arm, a time offset) is also found at that.
+constexpr std::array<double, 10> scales = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0};
+constexpr std::size_t first_scale = 7;     // to begin with
 constexpr double constant_prior = 2.0;     // sigma of a constant's logarithm: the width of the grids
 constexpr double negligible = 25.0;        // log odds below which an explanation is left out
+// Constants beside a chosen effect's own: so many sigmas of the logarithm apart, further out by a share of the distance.
+constexpr double constants_apart = 0.5, constants_spread = 0.25;
+constexpr double furthest_apart = 0.5;     // of the logarithm
 
 // A share of the design: columns of the rows, combined by T, sizes ~ N(0, sigma^2).
 struct Part {
+  int only = -1;                     // the coefficient, -1: all
+  double constant = NAN;
   std::vector<int> columns;
   Eigen::MatrixXd T;
   Eigen::VectorXd sigma;
@@ -69,6 +76,8 @@ class Averaging {
   // All coefficients of a candidate, or one of them; `derivative`: of its first coefficient by the constant, or -1.
   static Part part(const Candidate& c, int only, double scale, int derivative, const Eigen::VectorXd& size) {
     Part p;
+    p.only = only;
+    p.constant = c.constant;
     for (int k = 0; k < c.count; ++k) {
       if (only < 0 || only == k) {
         p.columns.push_back(c.first + k);
@@ -105,19 +114,37 @@ class Averaging {
     return all;
   }
 
-  std::vector<Part> own_parts(std::size_t i, double log_prior) const {
-    return parts(chosen_[i].candidate, chosen_[i].derivative, chosen_[i].size, log_prior);
+  // About the constant as fitted, and linear in what it is off by.
+  std::vector<Part> linear_parts(std::size_t i) const {
+    return parts(chosen_[i].candidate, chosen_[i].derivative, chosen_[i].size, 0.0);
+  }
+  // Each of the constants beside it: what is known of a constant to a factor of 2 only is not linear in it.
+  std::vector<Part> own_parts(std::size_t i) const {
+    const std::vector<Candidate>& constants = chosen_[i].constants;
+    if (constants.empty()) {
+      return linear_parts(i);
+    }
+    const double range = std::log(constants.back().constant / constants.front().constant);
+    std::vector<Part> all;
+    for (std::size_t k = 0; k < constants.size(); ++k) {
+      const double below = constants[k > 0 ? k - 1 : k].constant;
+      const double above = constants[std::min(k + 1, constants.size() - 1)].constant;
+      const double share = 0.5 * std::log(above / below) / range;   // every logarithm is equally likely
+      const std::vector<Part> some = parts(constants[k], -1, {}, std::log(share));
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    return all;
   }
 
   // Effect by effect the most probable part, the others at theirs.
   void settle() {
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
-      current_.push_back(part(chosen_[i].candidate, -1, scales[3], chosen_[i].derivative, chosen_[i].size));
+      current_.push_back(part(chosen_[i].candidate, -1, scales[first_scale - 1], chosen_[i].derivative, chosen_[i].size));
     }
     for (int sweep = 0; sweep < (chosen_.size() > 1 ? 2 : 1); ++sweep) {
       for (std::size_t i = 0; i < chosen_.size(); ++i) {
         double best = -HUGE_VAL;
-        for (const Part& p : own_parts(i, 0.0)) {
+        for (const Part& p : linear_parts(i)) {
           const double found = explain(i, p, false).log_p;
           if (found > best) {
             best = found;
@@ -197,7 +224,7 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
       tried.push_back({&candidate, p, averaging.explain(i, p, false).log_p});
     }
   };
-  with(averaging.chosen(i).candidate, averaging.own_parts(i, 0.0));
+  with(averaging.chosen(i).candidate, averaging.own_parts(i));
   for (const Candidate& rival : candidates) {
     if (!averaging.names(*rival.effect)) {
       with(rival, Averaging::parts(rival, -1, {}, -std::log(variants(*rival.effect, averaging.rows()))));
@@ -208,33 +235,22 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
 
 // What the explanations in the place of one chosen effect say together.
 struct PlaceAverage {
-  Mixture<ParameterVector, ParameterMatrix> shift;        // of the 24, by all effects
-  Mixture<Eigen::VectorXd, Eigen::MatrixXd> sizes, constants;   // of the effect itself
+  Mixture<ParameterVector, ParameterMatrix> shift;   // of the 24, by all effects
+  std::vector<Share> constants;
   std::map<std::string, double> probability;
-
-  // Sizes of the coefficients that the part leaves out are zero.
-  void add_own(double weight, const Explanation& e, const Part& part, const Chosen& own) {
-    const int count = own.candidate.count;
-    const bool has_constant = own.derivative >= 0;
-    const auto here = e.mean.size() - (has_constant ? 1 : 0);
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
-    const Eigen::Index at = part.columns.front() - own.candidate.first;
-    mean.segment(at, here) = e.mean.head(here);
-    covariance.block(at, at, here, here) = e.covariance.topLeftCorner(here, here);
-    sizes.add(weight, mean, covariance);
-    if (has_constant) {
-      constants.add(weight, e.mean.tail(1), e.covariance.bottomRightCorner(1, 1));
-    }
-  }
 };
 
-PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std::vector<Candidate>& candidates) {
-  const std::vector<Tried> tried = try_all(averaging, i, candidates);
+double top_of(const std::vector<Tried>& tried) {
   double top = -HUGE_VAL;
   for (const Tried& t : tried) {
     top = std::max(top, t.log_p);
   }
+  return top;
+}
+
+PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std::vector<Tried>& tried) {
+  const double top = top_of(tried);
+  const Chosen& own = averaging.chosen(i);
   PlaceAverage place;
   for (const Tried& t : tried) {
     if (t.log_p < top - negligible) {
@@ -244,14 +260,56 @@ PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std:
     const Explanation e = averaging.explain(i, t.part, true);
     place.shift.add(weight, e.shift, e.shift_covariance);
     place.probability[t.candidate->effect->id] += weight;
-    if (t.candidate == &averaging.chosen(i).candidate) {
-      place.add_own(weight, e, t.part, averaging.chosen(i));
+    if (t.candidate != &own.candidate || std::isnan(t.part.constant)) {
+      continue;
+    }
+    if (own.constants.empty()) {   // the last size is the logarithm's
+      const Eigen::Index last = e.mean.size() - 1;
+      place.constants.push_back({weight, t.part.constant * (1.0 + e.mean(last)),
+                                 t.part.constant * std::sqrt(e.covariance(last, last))});
+    } else {
+      place.constants.push_back({weight, t.part.constant, 0.0});
     }
   }
   for (auto& [name, p] : place.probability) {
     p /= place.shift.weight;
   }
   return place;
+}
+
+// Size and sigma of the coefficients, all of them unknown: that only one is concerned may well be the better guess, but
+// an interval must not rest on it. Size and constant as told belong together; sigma says what else they may be.
+void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, Chosen& chosen) {
+  std::erase_if(tried, [&](const Tried& t) {
+    return t.candidate != &averaging.chosen(i).candidate || t.part.only >= 0;
+  });
+  const double top = top_of(tried);
+  const Eigen::Index count = chosen.candidate.count;
+  Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;   // with any constant, with the one told
+  std::vector<std::vector<Share>> each(static_cast<std::size_t>(count));
+  for (const Tried& t : tried) {
+    if (t.log_p < top - negligible) {
+      continue;
+    }
+    const double weight = std::exp(t.log_p - top);
+    const Explanation e = averaging.explain(i, t.part, true);
+    const Eigen::VectorXd mean = e.mean.head(count);
+    const Eigen::MatrixXd covariance = e.covariance.topLeftCorner(count, count);
+    any.add(weight, mean, covariance);
+    if (std::isnan(t.part.constant) || t.part.constant == chosen.candidate.constant) {
+      fitted.add(weight, mean, covariance);
+    }
+    for (Eigen::Index k = 0; k < count; ++k) {
+      each[static_cast<std::size_t>(k)].push_back({weight, mean(k), std::sqrt(covariance(k, k))});
+    }
+  }
+  chosen.size = (fitted.weight > 0.0 ? fitted : any).mean();
+  chosen.covariance = any.covariance();
+  Eigen::VectorXd stretch(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    stretch(k) = sigma_about(chosen.size(k), each[static_cast<std::size_t>(k)]) / std::sqrt(chosen.covariance(k, k));
+  }
+  chosen.covariance = stretch.asDiagonal() * chosen.covariance * stretch.asDiagonal();
 }
 
 }  // namespace
@@ -274,12 +332,42 @@ int Naming::append_columns(const std::vector<Candidate>& more, const Eigen::Matr
   return static_cast<int>(at);
 }
 
-// Derivatives of the chosen effects' columns by the logarithm of their constants, as further columns.
-void Naming::append_derivatives() {
+// Constants that a chosen effect may have beside its own, in order: close where the likelihood's curvature says, for it may
+// be anything but a parabola out to the ends of the catalogue's grid and a factor of 2 beyond. A frequency is sharp: its
+// derivative will do.
+static std::vector<double> constants_about(const Chosen& chosen) {
+  const std::vector<double>& grid = chosen.candidate.effect->constants;
+  if (grid.empty()) {
+    return {};
+  }
+  const auto [smallest, largest] = std::minmax_element(grid.begin(), grid.end());
+  const double own = chosen.candidate.constant;
+  const double down = std::log(own / (0.5 * *smallest)), up = std::log(2.0 * *largest / own);
+  const double apart = chosen.constant_sigma > 0.0 ? constants_apart * chosen.constant_sigma / own : furthest_apart;
+  std::vector<double> all = {own};
+  for (double offset = 0.0; offset < std::max(down, up);) {
+    offset += std::min(std::max(apart, constants_spread * offset), furthest_apart);
+    if (offset < down) {
+      all.insert(all.begin(), own * std::exp(-offset));
+    }
+    if (offset < up) {
+      all.push_back(own * std::exp(offset));
+    }
+  }
+  return all;
+}
+
+// Further columns for the chosen effects' constants: derivatives by the logarithm, and others in the constant's place.
+void Naming::append_constants() {
+  struct Appended {
+    Chosen* chosen;
+    double width;                      // of the difference that makes the derivative
+    std::vector<double> constants;
+  };
   std::vector<Candidate> more;
-  std::vector<double> width;
-  Eigen::Index appended = 0;
-  for (const Chosen& chosen : chosen_) {
+  std::vector<Appended> all;
+  Eigen::Index rows = 0, columns = 0;
+  for (Chosen& chosen : chosen_) {
     const Candidate& c = chosen.candidate;
     if (std::isnan(c.constant)) {
       continue;
@@ -288,26 +376,36 @@ void Naming::append_derivatives() {
     const double h = c.effect->id == "base_sway" ? 0.02 / (c.constant * rows_.time_s.back()) : 0.05;
     more.push_back({c.effect, c.constant * std::exp(h), 0, 0});
     more.push_back({c.effect, c.constant * std::exp(-h), 0, 0});
-    width.push_back(2.0 * h);
-    appended += c.count;
+    all.push_back({&chosen, 2.0 * h, constants_about(chosen)});
+    for (const double constant : all.back().constants) {
+      more.push_back({c.effect, constant, 0, 0});
+    }
+    const auto beside = static_cast<Eigen::Index>(all.back().constants.size());
+    rows += c.count * (1 + beside);
+    columns += c.count * (2 + beside);
   }
-  if (more.empty()) {
+  if (all.empty()) {
     return;
   }
-  Eigen::MatrixXd combine = Eigen::MatrixXd::Zero(appended, 2 * appended);
+  Eigen::MatrixXd combine = Eigen::MatrixXd::Zero(rows, columns);
   const Eigen::Index at = rows_.columns.cols();
-  Eigen::Index row = 0;
-  std::size_t effect = 0;
-  for (Chosen& chosen : chosen_) {
-    const Eigen::Index count = chosen.candidate.count;
-    if (std::isnan(chosen.candidate.constant)) {
-      continue;
+  Eigen::Index row = 0, column = 0;
+  for (const Appended& a : all) {
+    const Candidate& c = a.chosen->candidate;
+    const Eigen::Index count = c.count, beside = count * std::ssize(a.constants);
+    const Eigen::MatrixXd difference = Eigen::MatrixXd::Identity(count, count) / a.width;
+    combine.block(row, column, count, count) = difference;
+    combine.block(row, column + count, count, count) = -difference;
+    combine.block(row + count, column + 2 * count, beside, beside).setIdentity();
+    a.chosen->derivative = static_cast<int>(at + row);
+    int first = static_cast<int>(at + row + count);
+    a.chosen->constants.clear();
+    for (const double constant : a.constants) {
+      a.chosen->constants.push_back({c.effect, constant, first, c.count});
+      first += c.count;
     }
-    const Eigen::MatrixXd difference = Eigen::MatrixXd::Identity(count, count) / width[effect++];
-    combine.block(row, 2 * row, count, count) = difference;
-    combine.block(row, 2 * row + count, count, count) = -difference;
-    chosen.derivative = static_cast<int>(at + row);
-    row += count;
+    row += count + beside;
+    column += 2 * count + beside;
   }
   append_columns(more, combine);
 }
@@ -318,7 +416,7 @@ void Naming::average() {
   if (chosen_.empty()) {
     return;
   }
-  append_derivatives();
+  append_constants();
   const std::vector<Chosen> found = chosen_;
   Averaging averaging(evidence_, rows_, found);
   averaging.settle();
@@ -326,15 +424,13 @@ void Naming::average() {
   averaged_ = best.shift;
   spread_ = best.shift_covariance;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const PlaceAverage place = average_place(averaging, i, pass_.candidates());
+    const std::vector<Tried> tried = try_all(averaging, i, pass_.candidates());
+    const PlaceAverage place = average_place(averaging, i, tried);
     Chosen& c = chosen_[i];
     c.probability = place.probability;
-    if (place.sizes.weight > 0.0) {
-      c.size = place.sizes.mean();
-      c.covariance = place.sizes.covariance();
-    }
-    if (place.constants.weight > 0.0) {
-      c.constant_sigma = c.candidate.constant * std::sqrt(place.constants.covariance()(0, 0));
+    tell_sizes(averaging, i, tried, c);
+    if (!place.constants.empty()) {
+      c.constant_sigma = sigma_about(c.candidate.constant, place.constants);
     }
     averaged_ += place.shift.mean() - best.shift;
     spread_ += place.shift.covariance() - best.shift_covariance;

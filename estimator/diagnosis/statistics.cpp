@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace selfcal::diagnosis {
 
@@ -68,6 +69,40 @@ Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most) {
   const Eigen::Index seen = information.rows() - hidden;
   return eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse().asDiagonal() *
          eigen.eigenvectors().rightCols(seen).transpose();
+}
+
+double sigma_about(double centre, const std::vector<Share>& shares) {
+  constexpr double of_95_percent = 1.959964;
+  double weight = 0.0, square = 0.0;
+  for (const Share& s : shares) {
+    weight += s.weight;
+    square += s.weight * (s.sigma * s.sigma + (s.mean - centre) * (s.mean - centre));
+  }
+  const double rms = std::sqrt(square / weight);
+  const auto held = [&](double half) {
+    double sum = 0.0;
+    for (const Share& s : shares) {
+      const double off = s.mean - centre;
+      // P(|x| <= half), x ~ N(off, sigma^2).
+      const double p = s.sigma > 0.0 ? 0.5 * (std::erf((half - off) / (std::numbers::sqrt2 * s.sigma)) +
+                                              std::erf((half + off) / (std::numbers::sqrt2 * s.sigma)))
+                                     : (std::abs(off) <= half ? 1.0 : 0.0);
+      sum += s.weight * p;
+    }
+    return sum / weight;
+  };
+  double low = of_95_percent * rms, high = low;
+  if (held(low) >= 0.95) {
+    return rms;
+  }
+  while (held(high) < 0.95) {   // at 4.5 rms at the latest (Chebyshev)
+    high *= 1.5;
+  }
+  for (int step = 0; step < 50; ++step) {
+    const double middle = 0.5 * (low + high);
+    (held(middle) < 0.95 ? low : high) = middle;
+  }
+  return high / of_95_percent;
 }
 
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most) {

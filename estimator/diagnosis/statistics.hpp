@@ -14,6 +14,14 @@ double log_corrected(double log_p, double count);
 // The |z| whose two-sided normal tail has this log p; for words.
 double sigma_from_log_p(double log_p);
 
+// One of the normal distributions that make up a mixture; sigma 0: a point.
+struct Share {
+  double weight = 0.0, mean = 0.0, sigma = 0.0;
+};
+// Sigma with which `centre` +- 1.96 sigma holds 95 % of the mixture, at least the rms about `centre`: a mixture of a narrow
+// and a wide one has tails that its rms does not show, and a rare far one a rms that its 95 % do not.
+double sigma_about(double centre, const std::vector<Share>& shares);
+
 // Regression of unit-noise residuals on columns, from its normal equations. Directions in which even `most` typical
 // sizes would not be seen count as invisible: they take no degree of freedom.
 struct Fit {

@@ -37,6 +37,24 @@ TEST(FitColumns, LeavesOutWhatCannotBeSeen) {
   EXPECT_EQ(seen.rank, 2);   // the negative control
 }
 
+TEST(SigmaAbout, IsThatOfASingleNormal) {
+  EXPECT_NEAR(sigma_about(3.0, {{0.2, 3.0, 0.7}}), 0.7, 1e-12);
+  EXPECT_EQ(sigma_about(3.0, {{1.0, 3.0, 0.0}}), 0.0);
+  // Told one sigma off: the rms is sqrt(2), and 1 +- 2.77 holds 96 %.
+  EXPECT_NEAR(sigma_about(1.0, {{1.0, 0.0, 1.0}}), std::sqrt(2.0), 1e-12);
+}
+
+// Nine tenths at 0 and one tenth N(0, 10^2): 95 % leave half of the wide one outside, beyond its 0.67449 sigma. Its rms,
+// sqrt(10), would hold 94.6 %.
+TEST(SigmaAbout, HoldsTheTailOfTheWiderOne) {
+  EXPECT_NEAR(sigma_about(0.0, {{0.9, 0.0, 0.0}, {0.1, 0.0, 10.0}}), 6.7449 / 1.95996, 1e-4);
+}
+
+// 4 % far off are beyond every interval of 95 %; the rms remembers them.
+TEST(SigmaAbout, IsNeverBelowTheRms) {
+  EXPECT_NEAR(sigma_about(0.0, {{0.96, 0.0, 0.0}, {0.04, 10.0, 0.0}}), 2.0, 1e-12);
+}
+
 // A share of the prior probability is 1 over this: none may be 0, a sway's frequency included, which has no grid.
 TEST(Variants, EveryEffectWasLookedForAtLeastOnce) {
   for (const Effect& effect : catalogue()) {
