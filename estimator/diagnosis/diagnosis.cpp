@@ -20,6 +20,7 @@ namespace {
 constexpr double share_names = 0.45, share_map = 0.1, share_structure = 0.1, share_white = 0.1, share_size = 0.1,
                  share_noise = 0.15;
 constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
+constexpr double remainder_rate = 0.01;        // and by map, whiteness and size
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
 
@@ -252,8 +253,9 @@ void Diagnoser::decide(const Naming& naming) {
   // question of whiteness any more.
   d_.before = adequacy(naming.square_before(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_before(),
                        naming.map_before(), alpha, d_.calibration.moored);
-  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after, alpha,
-                      d_.calibration.moored);
+  const bool nothing_found = naming.chosen().empty() && naming.walks().empty();
+  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after,
+                      nothing_found ? alpha : std::max(alpha, remainder_rate), d_.calibration.moored);
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
     named.push_back(describe(c, naming.rows()));

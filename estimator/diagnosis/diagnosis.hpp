@@ -21,7 +21,8 @@
 namespace selfcal::diagnosis {
 
 struct DiagnosisOptions {
-  double false_alarm_rate = 0.01;      // of a whole recording, over all tests
+  // Of a whole recording, over all tests: half of what is promised (1 %), for the null distributions are approximations.
+  double false_alarm_rate = 0.005;
   AssumedNoise assumed;                // what the simulation takes for the sensors
   CalibrationOptions calibration;
   std::stop_token stop;                // asked for between steps: the failure is then "stopped"

@@ -28,7 +28,7 @@ struct DiagnoseArguments {
   std::string split_schedule;
   std::string holdout;
   bool json = false;
-  double false_alarm_rate = 0.01;
+  double false_alarm_rate = diagnosis::DiagnosisOptions{}.false_alarm_rate;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
   double gyro_lsb_arcsec = 0.1, accel_lsb_mps = 2e-6;
 };
