@@ -11,7 +11,10 @@ namespace selfcal::blind {
 namespace {
 
 constexpr double largest_size = 40.0;   // typical sizes
-const std::vector<double> strengths = {0.3, 1.0, 3.0, 6.0, 10.0, 30.0};
+const std::vector<double> strengths = {0.3, 1.0, 3.0, 6.0, 10.0};
+// What can be seen well has no size of its own: every logarithm is as likely.
+constexpr double range_from = 6.0, range_to = 100.0;
+constexpr int range_cases = 2;          // of every effect
 
 std::vector<std::string> ids_of(KindGroup group) {
   std::vector<std::string> ids;
@@ -107,8 +110,9 @@ Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& ra
   if (!filtered) {
     return tl::unexpected(filtered.error());
   }
+  const bool by_likeness = c.recipe.stratum == "unlike";
   ConcealedEffect best;
-  double size = 0.0;
+  double size = 0.0, strongest = -1.0;
   // A direction that cannot be seen is drawn again, a few times.
   for (int attempt = 0; attempt < 4; ++attempt) {
     sim::PhysicsEffect unit = draw_effect(kind, c.config, random);
@@ -117,10 +121,19 @@ Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& ra
     if (!response) {
       return tl::unexpected(response.error());
     }
-    const double wanted = c.recipe.strength > 0.0 ? c.recipe.strength / response->sigmas : 1.0;
+    double strength = response->sigmas;   // of the unit
+    if (by_likeness) {
+      const auto left = unlike_twins(*filtered, c.config, unit);
+      if (!left) {
+        return tl::unexpected(left.error());
+      }
+      strength = *left;
+    }
+    const double wanted = c.recipe.strength > 0.0 ? c.recipe.strength / strength : 1.0;
     const double factor = std::min(wanted, largest_size);
-    if (attempt == 0 || factor * response->sigmas > best.response.sigmas) {
-      best = {scaled(kind, unit, factor), *response, ParameterVector::Zero(), -1.0};
+    if (factor * strength > strongest) {
+      strongest = factor * strength;
+      best = {scaled(kind, unit, factor), *response, ParameterVector::Zero(), by_likeness ? strongest : -1.0};
       best.response.sigmas *= factor;
       best.response.shift *= factor;
       size = factor;
@@ -129,14 +142,14 @@ Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& ra
       break;
     }
   }
-  if (c.recipe.stratum == "single" && c.recipe.strength >= 6.0) {
+  if (c.recipe.effects.size() == 1 && kind.group == KindGroup::catalogue && c.recipe.strength >= 6.0) {
     const auto sigma = filtered->augmented_sigma(columns_of(kind, c.config, best.physics, size));
     if (!sigma) {
       return tl::unexpected(sigma.error());
     }
     best.augmented_sigma = *sigma;
   }
-  if (kind.group == KindGroup::outside) {
+  if (c.recipe.stratum == "outside") {
     const auto left = unlike_twins(*filtered, c.config, best.physics);
     if (!left) {
       return tl::unexpected(left.error());
@@ -157,6 +170,9 @@ std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed) {
       for (const double strength : strengths) {
         all.push_back({"single", {id}, strength});
       }
+      for (int k = 0; k < range_cases; ++k) {
+        all.push_back({"range", {id}, log_uniform(random, range_from, range_to)});
+      }
       const auto other = static_cast<std::size_t>(random.uniform() * static_cast<double>(catalogue.size()));
       if (catalogue[other] != id) {
         all.push_back({"pair", {id, catalogue[other]}, 20.0});
@@ -165,6 +181,7 @@ std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed) {
     for (const std::string& id : ids_of(KindGroup::outside)) {
       for (const double strength : {6.0, 10.0, 30.0, 100.0}) {
         all.push_back({"outside", {id}, strength});
+        all.push_back({"unlike", {id}, strength});
       }
     }
     for (const std::string& id : ids_of(KindGroup::invisible)) {

@@ -19,9 +19,10 @@ struct TrialSize {
 
 // One case before anything is drawn.
 struct Recipe {
-  std::string stratum;         // clean, single, pair, outside, invisible, noise
+  std::string stratum;         // clean, single, range, pair, outside, unlike, invisible, noise
   std::vector<std::string> effects;
-  double strength = 0.0;       // sigmas of the bound, each effect alone; 0: typical size
+  // Sigmas of the bound, each effect alone; `unlike`: that the best of its twins leaves; 0: typical size.
+  double strength = 0.0;
 };
 
 // Strata are mixed, so that the first part of a trial is a small trial.

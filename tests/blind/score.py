@@ -189,6 +189,7 @@ class Score:
 
     def strengths(self):
         groups = collections.defaultdict(list)
+        drawn = self.of("range")
         for c, a in self.of("single", "invisible"):
             s = c["effects"][0]["sigmas"]
             low = max((b for b in (0.0, 0.2, 0.6, 1.8, 5.9, 9.5, 20.0) if s >= b), default=0.0)
@@ -205,23 +206,23 @@ class Score:
             possible = sum(self.possible(c, a) for c, a in g) / len(g)
             self.say(f"  {middle:8.2f} {len(g):4d}  {100 * detected / len(g):6.1f} %  {100 * possible:6.1f} % {count['right']:13d} "
                      f"{count['class']:6d} {count['other']:6d} {count['unexplained']:12d} {count['silent']:7d}")
-        strong = [x for low, g in groups.items() if low >= 5.9 for x in g]
+        near = groups.pop(5.9, [])          # exactly 6: the hardest of all
+        strong = [x for low, g in groups.items() if low >= 5.9 for x in g] + drawn
+        self.say("  drawn, every logarithm from 6 to 100 sigma as likely:")
+        for low, high in ((5.9, 9.5), (9.5, 20.0), (20.0, 1e9)):
+            g = [(c, a) for c, a in drawn if low <= c["effects"][0]["sigmas"] < high]
+            if g:
+                self.say(f"    {low:4.1f}..: {self.detected_and_named(g)}")
         weak = [x for low, g in groups.items() if low < 0.6 for x in g]
         detected = sum(alarmed(a) for _, a in strong)
         right = sum(self.judged(c, a) in ("right", "class") for c, a in strong)
         size = [len(class_of(a["findings"][0])) for c, a in strong if self.judged(c, a) in ("right", "class")]
         named = sum(bool(names(a, False)) for _, a in weak)
-        self.say(f"  6 sigma and more: detected {share(detected, len(strong))}, class right "
-                 f"{share(right, len(strong))}" + (f", names in the class {sum(size) / len(size):.2f}" if size else ""))
-        possible = sum(self.possible(c, a) for c, a in strong)
-        if strong:
-            chance = 1.0 - binomial_tail(detected + 1, len(strong), possible / len(strong))
-            self.say(f"  6 sigma and more: {100 * possible / len(strong):.1f} % are possible; so few detected by chance: "
-                     f"{100 * chance:.0f} %")
-        for title, chosen in (("one coefficient", True), ("several coefficients", False)):
-            part = [(c, a) for c, a in strong if self.single_coefficient(c) == chosen]
-            self.say(f"    {title}: detected {share(sum(alarmed(a) for _, a in part), len(part))}, class right "
-                     f"{share(sum(self.judged(c, a) in ('right', 'class') for c, a in part), len(part))}")
+        for title, g in (("6 sigma and more, 10 and drawn", strong), ("  one coefficient", self.concealing(strong, True)),
+                         ("  several", self.concealing(strong, False)), ("exactly 6 sigma", near)):
+            self.say(f"  {title}: {self.detected_and_named(g)}")
+        if size:
+            self.say(f"  names in a class that holds the truth: {sum(size) / len(size):.2f}")
         self.say(f"  below 0.6 sigma: named {share(named, len(weak))}")
         probability = [self.probability(c, a) for c, a in strong]
         if probability:
@@ -231,10 +232,10 @@ class Score:
             positive = sum(g > 0.0 for g in gains)
             self.say(f"  held-out gain of right names: positive in {share(positive, len(gains))}, "
                      f"median {gains[len(gains) // 2]:.1f}")
-        self.at_least("detection at 6 sigma", detected, len(strong), 0.99)
-        self.at_least("right class at 6 sigma", right, len(strong), 0.95)
+        self.at_least("detection at 6 sigma and more", detected, len(strong), 0.99)
+        self.at_least("right class at 6 sigma and more", right, len(strong), 0.95)
         self.at_most("names below 0.6 sigma", named, len(weak), 0.01)
-        self.confusion(strong)
+        self.confusion(near + strong)
 
     @staticmethod
     def coefficients_drawn(case):
@@ -242,8 +243,19 @@ class Score:
         skipped = ("tau_s", "reference_c", "width", "period_s", "phase", "field_north", "field_up", "field_east")
         return max(1, sum(v != 0.0 for k, v in case["effects"][0]["values"].items() if k not in skipped))
 
-    def single_coefficient(self, case):
-        return self.coefficients_drawn(case) == 1
+    def concealing(self, pairs, one):
+        return [(c, a) for c, a in pairs if (self.coefficients_drawn(c) == 1) == one]
+
+    def detected_and_named(self, pairs):
+        if not pairs:
+            return "none"
+        n = len(pairs)
+        detected = sum(alarmed(a) for _, a in pairs)
+        right = sum(self.judged(c, a) in ("right", "class") for c, a in pairs)
+        possible = sum(self.possible(c, a) for c, a in pairs) / n
+        chance = 1.0 - binomial_tail(detected + 1, n, possible)
+        return (f"detected {share(detected, n)} (possible {100 * possible:.1f} %; so few by chance: {100 * chance:.0f} %), "
+                f"class right {share(right, n)}")
 
     def possible(self, case, answer):
         """Power where the strength is that of one coefficient, or is spread over all of the group at random."""
@@ -287,30 +299,32 @@ class Score:
         self.say(f"pairs: both named {share(both, len(pairs))}, one {one}, names that are neither {extra}")
 
     def outside(self):
-        pairs = [(c, a) for c, a in self.of("outside") if c["effects"][0]["sigmas"] >= 5.9]
+        """What a twin in the catalogue would leave of it decides whether it can be known for outside."""
+        pairs = [(c, a) for c, a in self.of("outside", "unlike") if c["effects"][0]["sigmas"] >= 5.9]
+
+        def unlike(case):
+            return case["effects"][0].get("unlike_sigmas", math.inf)
+
         self.say()
-        self.say("outside the catalogue, 6 sigma and more, by strength")
-        for low, high in ((5.9, 8.0), (8.0, 20.0), (20.0, 50.0), (50.0, 1e9)):
-            g = [(c, a) for c, a in pairs if low <= c["effects"][0]["sigmas"] < high]
+        self.say("outside the catalogue, seen by 6 sigma and more, by what the best of its twins in the catalogue leaves")
+        for low, high in ((0.0, 3.0), (3.0, 5.9), (5.9, 9.5), (9.5, 20.0), (20.0, 50.0), (50.0, math.inf)):
+            g = [(c, a) for c, a in pairs if low <= unlike(c) < high]
             said = collections.Counter(names(a)[0] if names(a) else ("none of the above" if alarmed(a) else "silent")
                                        for _, a in g)
             if g:
                 self.say(f"  {low:5.1f}..: n {len(g)}: " + ", ".join(f"{k} {v}" for k, v in said.most_common()))
-        unexplained = sum(unexplained_only(a) for _, a in pairs)
-        named = sum(bool(names(a)) for _, a in pairs)
-        self.say(f"  none of the above or unexplained {share(unexplained, len(pairs))}, a library name "
-                 f"{share(named, len(pairs))}")
-        apart = [(c, a) for c, a in pairs if c["effects"][0].get("unlike_sigmas", math.inf) >= 5.9]
-        self.say(f"  of those that differ by 6 sigma and more from the catalogue's own drifts: none of the above or "
-                 f"unexplained {share(sum(unexplained_only(a) for _, a in apart), len(apart))}, "
-                 f"a library name {share(sum(bool(names(a)) for _, a in apart), len(apart))}")
+        apart = [(c, a) for c, a in pairs if unlike(c) >= 5.9]
+        for title, g in (("all", pairs), ("6 sigma and more from every twin", apart)):
+            named = sum(bool(names(a)) for _, a in g)
+            self.say(f"  {title}: none of the above or unexplained {share(sum(unexplained_only(a) for _, a in g), len(g))}, "
+                     f"a library name {share(named, len(g))}, upper 95 % bound {100 * upper_bound(named, len(g)):.1f} %")
         for c, a in pairs:
             if names(a):
                 self.say(f"    case {c['number']}: {c['effects'][0]['id']} {c['effects'][0]['sigmas']:.0f} sigma, "
                          f"{c['effects'][0].get('unlike_sigmas', math.nan):.1f} from its twin: "
                          f"{[sorted(class_of(f)) for f in a['findings'] if not f['stochastic']]}")
-        self.at_least("none of the above outside the catalogue", unexplained, len(pairs), 0.8)
-        self.at_most("library names outside the catalogue", named, len(pairs), 0.05)
+        self.at_least("none of the above outside the catalogue", sum(unexplained_only(a) for _, a in apart), len(apart), 0.8)
+        self.at_most("library names outside the catalogue", sum(bool(names(a)) for _, a in apart), len(apart), 0.05)
 
     def noise(self):
         self.say()
@@ -351,7 +365,7 @@ class Score:
     def coverage(self):
         inside = collections.Counter()
         total = collections.Counter()
-        for c, a in self.of("single", "pair"):
+        for c, a in self.of("single", "range", "pair"):
             if min(e["sigmas"] for e in c["effects"]) < 9.5:
                 continue              # near the threshold only large draws are named: they cover less by selection
             for kind, truth, value, sigma in self.coefficients(c, a):
@@ -372,7 +386,7 @@ class Score:
 
     def parameters(self):
         sizes = collections.defaultdict(list)
-        for c, a in self.of("single"):
+        for c, a in self.of("single", "range"):
             if c["effects"][0]["sigmas"] < 5.9 or "value" not in a:
                 continue
             rightly = self.judged(c, a) in ("right", "class")
@@ -395,8 +409,10 @@ class Score:
 
     def rivals(self):
         clean = [a for _, a in self.of("clean") if "rivals" in a]
-        strong = [(c, a) for c, a in self.of("single") if c["effects"][0]["sigmas"] >= 5.9 and "rivals" in a]
-        outside = [(c, a) for c, a in self.of("outside") if c["effects"][0]["sigmas"] >= 5.9 and "rivals" in a]
+        strong = [(c, a) for c, a in self.of("single", "range")
+                  if c["effects"][0]["sigmas"] >= 5.9 and "rivals" in a]
+        outside = [(c, a) for c, a in self.of("outside", "unlike")
+                   if c["effects"][0]["sigmas"] >= 5.9 and "rivals" in a]
         self.say()
         self.say("rivals on the same files: false alarms on clean; at 6 sigma and more detected, truth first, truth "
                  "among its names; names outside the catalogue; error of the 24 over the bound")
