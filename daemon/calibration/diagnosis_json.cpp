@@ -21,8 +21,10 @@ ordered_json to_json(const Located& l) {
   }
   j["axis"] = l.axis;
   j["significance"] = l.significance;
-  j["start_s"] = l.start_s;
-  j["end_s"] = l.end_s;
+  if (l.end_s > l.start_s) {   // a place in time
+    j["start_s"] = l.start_s;
+    j["end_s"] = l.end_s;
+  }
   j["bias"] = l.size;
   j["unit"] = l.axis.starts_with("gyro") ? "deg/h" : "ug";
   j["words"] = l.words;
@@ -67,6 +69,11 @@ ordered_json list(const std::vector<T>& all) {
   return j;
 }
 
+ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diagnosis::Located>& by) {
+  places.insert(places.end(), by.begin(), by.end());
+  return list(places);
+}
+
 }  // namespace
 
 std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
@@ -86,7 +93,7 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
   j["verdict"] = verdict_name(d.verdict);
   j["false_alarm_rate"] = false_alarm_rate;
   j["adequacy"] = {{"before", to_json(d.before)}, {"after", to_json(d.after)}};
-  j["located"] = list(d.located);
+  j["located"] = list(d.located, d.located_by);
   j["findings"] = list(d.findings);
   j["undetectable_here"] = ordered_json::array();
   j["expected_z"] = ordered_json::object();
@@ -100,7 +107,7 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
   j["unexplained"] = d.unexplained;
   j["rejected"] = list(d.rejected);
   j["suspected"] = list(d.suspected);
-  j["remaining"] = list(d.remaining);
+  j["remaining"] = list(d.remaining, d.remaining_by);
   j["data_faults"] = ordered_json::array();
   for (const auto& f : d.faults) {
     j["data_faults"].push_back(

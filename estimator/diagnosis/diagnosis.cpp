@@ -256,6 +256,11 @@ void Diagnoser::decide(const Naming& naming) {
   const bool nothing_found = naming.chosen().empty() && naming.walks().empty();
   d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after,
                       nothing_found ? alpha : std::max(alpha, remainder_rate), d_.calibration.moored);
+  if (!nothing_found || !d_.before.accepted) {
+    const Naming::ByQuantity by = naming.locate_by_quantities();
+    d_.located_by = by.before;
+    d_.remaining_by = by.after;
+  }
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
     named.push_back(describe(c, naming.rows()));

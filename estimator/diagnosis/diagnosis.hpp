@@ -80,6 +80,7 @@ struct Diagnosis {
   std::vector<Finding> rejected;       // fitted best, but what remains says no
   std::vector<Finding> suspected;      // too weak to name
   std::vector<Located> located, remaining;
+  std::vector<Located> located_by, remaining_by;   // by gimbal angles, directions, temperature: the worst of each
   std::vector<Undetectable> undetectable, detectable;
   Adequacy before, after;
   NoiseCheck noise;

@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::size_t most_terms = 8;
 constexpr int axes = 6;
-constexpr std::array<const char*, axes> axis_ids = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
 
 using Function = double (*)(const EffectContext&);
 

@@ -1,6 +1,5 @@
 #include "estimator/diagnosis/locate.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -14,7 +13,6 @@ namespace {
 
 constexpr std::size_t most_places = 12;
 constexpr double least_sigma = 3.0;
-constexpr std::array<const char*, 6> axis_ids = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
 
 std::string describe(const Located& l) {
   char text[160];
@@ -33,34 +31,44 @@ std::string describe(const Located& l) {
 
 }  // namespace
 
-Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column,
-           const std::vector<int>& fitted) {
-  Map result;
-  Eigen::LDLT<Eigen::MatrixXd> solver;
-  Eigen::VectorXd fitted_score;
+SingleTest::SingleTest(const Evidence& e, const std::vector<int>& fitted) : evidence_(e), fitted_(fitted) {
   if (!fitted.empty()) {
     Eigen::MatrixXd A = e.information(fitted, fitted);
     A.diagonal().array() += 1e-6;
-    solver.compute(A);
-    fitted_score = solver.solve(Eigen::VectorXd(e.score(fitted)));
+    solver_.compute(A);
+    fitted_score_ = solver_.solve(Eigen::VectorXd(e.score(fitted)));
   }
+}
+
+std::optional<SingleTest::Result> SingleTest::operator()(int column) const {
+  constexpr double least = 1e-6;       // information: a bias there would not be seen
+  double g = evidence_.information(column, column);
+  double b = evidence_.score(column);
+  const double alone = g;
+  if (!fitted_.empty()) {
+    const Eigen::VectorXd x = evidence_.information(fitted_, column);
+    g -= x.dot(solver_.solve(x));
+    b -= x.dot(fitted_score_);
+  }
+  if (g < least || g < least * alone) {
+    return std::nullopt;
+  }
+  return Result{b / std::sqrt(g), b / g};
+}
+
+Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column,
+           const std::vector<int>& fitted) {
+  Map result;
+  const SingleTest test(e, fitted);
   for (std::size_t k = 0; k < map.size(); ++k) {
-    const int column = first_map_column + static_cast<int>(k);
-    double g = e.information(column, column);
-    double b = e.score(column);
-    const double alone = g;
-    if (!fitted.empty()) {
-      const Eigen::VectorXd x = e.information(fitted, column);
-      g -= x.dot(solver.solve(x));
-      b -= x.dot(fitted_score);
-    }
-    if (g < 1e-6 || g < 1e-6 * alone) {
-      continue;   // a bias there would not be seen
+    const auto bias = test(first_map_column + static_cast<int>(k));
+    if (!bias) {
+      continue;
     }
     ++result.tests;
-    const double z = b / std::sqrt(g);
-    result.largest_sigma = std::max(result.largest_sigma, std::abs(z));
-    if (std::abs(z) < least_sigma) {
+    const double significance = std::abs(bias->z);
+    result.largest_sigma = std::max(result.largest_sigma, significance);
+    if (significance < least_sigma) {
       continue;
     }
     const LocatedColumn& m = map[k];
@@ -68,8 +76,8 @@ Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_m
     l.axis = axis_ids[static_cast<std::size_t>(m.axis)];
     l.start_s = m.start_s;
     l.end_s = m.end_s;
-    l.significance = std::abs(z);
-    l.size = b / g * (m.axis < 3 ? map_unit(0) / units::degree_per_hour : map_unit(3) / units::micro_g);
+    l.significance = significance;
+    l.size = bias->size * (m.axis < 3 ? map_unit(0) / units::degree_per_hour : map_unit(3) / units::micro_g);
     switch (m.kind) {
       case LocatedColumn::Kind::dwell: l.where = "dwell"; l.position = m.index + 1; break;
       case LocatedColumn::Kind::rotation: l.where = "rotation"; l.position = m.index + 1; break;

@@ -1,6 +1,9 @@
 // Where the misfit is: bias of one sensor axis in one dwell, one rotation, after turns, or in one part of the time.
 #pragma once
 
+#include <Eigen/Cholesky>
+#include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,7 +12,8 @@
 namespace selfcal::diagnosis {
 
 struct Located {
-  std::string where;           // dwell, rotation, after_turn, time, frequency
+  // dwell, rotation, after_turn, time, frequency; outer_angle, inner_angle, gravity, earth_rate, temperature
+  std::string where;
   int position = -1;           // number from 1 of the dwell or rotation; -1: none
   std::string axis;            // gyro_x ... accel_z, or north, up, east
   double start_s = 0.0, end_s = 0.0;   // since the start; after_turn: since the turn
@@ -17,6 +21,25 @@ struct Located {
   double size = 0.0;           // bias: deg/h or ug; frequency: amplitude, um
   double frequency_hz = 0.0;
   std::string words;
+};
+
+constexpr std::array<const char*, 6> axis_ids = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+// One column by itself, given that `fitted` ones are fitted. `evidence` must outlive this.
+class SingleTest {
+ public:
+  SingleTest(const Evidence& evidence, const std::vector<int>& fitted);
+  struct Result {
+    double z = 0.0;            // size over its sigma
+    double size = 0.0;         // in the column's units
+  };
+  std::optional<Result> operator()(int column) const;   // none where it would not be seen
+
+ private:
+  const Evidence& evidence_;
+  std::vector<int> fitted_;
+  Eigen::LDLT<Eigen::MatrixXd> solver_;
+  Eigen::VectorXd fitted_score_;
 };
 
 struct Map {

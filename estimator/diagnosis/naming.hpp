@@ -49,6 +49,11 @@ class Naming {
 
   const Map& map_before() const { return map_before_; }
   Map map_after() const;
+  // The same by gimbal angles, directions and temperature (quantities.hpp); takes no part in any verdict. One more pass.
+  struct ByQuantity {
+    std::vector<Located> before, after;
+  };
+  ByQuantity locate_by_quantities() const;
   const std::vector<InnovationLine>& lines_before() const { return lines_before_; }
   double square_before() const { return square_before_; }
   double square_after() const;

@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/naming.hpp"
+#include "estimator/diagnosis/quantities.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -196,6 +197,39 @@ double Naming::log_p_structure() const {
 
 Map Naming::map_after() const {
   return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns());
+}
+
+Naming::ByQuantity Naming::locate_by_quantities() const {
+  std::vector<Candidate> all = quantity_bins(context_);
+  const std::size_t bins = all.size(), applied = bins + chosen_.size();
+  for (const Chosen& c : chosen_) {
+    all.push_back(c.candidate);
+  }
+  all.insert(all.end(), correction_.effects.begin(), correction_.effects.end());
+  SignaturePass pass(context_, all, !walks_.empty());
+  Evidence evidence(pass.run(input_));
+  all = pass.candidates();
+  std::vector<int> fitted, restored;
+  for (std::size_t i = bins; i < all.size(); ++i) {
+    const std::vector<int> columns = columns_of(all[i]);
+    std::vector<int>& to = i < applied ? fitted : restored;
+    to.insert(to.end(), columns.begin(), columns.end());
+  }
+  if (!restored.empty()) {
+    evidence.restore(restored, correction_.size);
+  }
+  all.resize(bins);
+  ByQuantity located;
+  located.before = locate_by_quantity(evidence, all, {}, context_.mean_temperature());
+  for (const WalkTest& walk : walks_) {
+    std::vector<int> columns = walk.columns;
+    for (int& column : columns) {
+      column += pass.first_map_column() - pass_.first_map_column();
+    }
+    evidence.absorb(columns, walk.covariance);
+  }
+  located.after = locate_by_quantity(evidence, all, fitted, context_.mean_temperature());
+  return located;
 }
 
 double Naming::square_after() const {

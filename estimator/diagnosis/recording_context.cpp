@@ -56,6 +56,7 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
   c.rate_change = rate_at(block.last) - rate_at(block.first);
   c.C_nb = block.C_nb;
   c.field_b = block.C_nb.transpose() * field_n_;
+  c.earth_rate_b = block.C_nb.transpose() * Vector3(std::cos(data_.site.latitude), std::sin(data_.site.latitude), 0.0);
   c.duration_s = data_.time_s.back() - start_s_;
   for (std::size_t k = segment_at(block.start_s); k <= segment_at(block.end_s - 1e-9); ++k) {
     const Segment& s = segments_[k];

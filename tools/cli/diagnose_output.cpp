@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -29,6 +30,15 @@ std::string text_of(const Finding& f) {
   return text;
 }
 
+std::string places_text(const std::vector<diagnosis::Located>& places, const std::vector<diagnosis::Located>& by) {
+  constexpr std::size_t most = 5;
+  std::string text;
+  const auto add = [&](const diagnosis::Located& l) { text += fmt::format("  {:.1f} sigma  {}\n", l.significance, l.words); };
+  std::for_each(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(std::min(most, places.size())), add);
+  std::for_each(by.begin(), by.end(), add);
+  return text;
+}
+
 }  // namespace
 
 std::string diagnosis_text(const diagnosis::Diagnosis& d) {
@@ -41,10 +51,7 @@ std::string diagnosis_text(const diagnosis::Diagnosis& d) {
   text += fmt::format("after:  NIS {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n", d.after.nis,
                       d.after.largest_sigma, d.after.log_p_white / std::log(10.0));
   if (!d.located.empty() && !d.before.accepted) {
-    text += "where:\n";
-    for (std::size_t k = 0; k < std::min<std::size_t>(5, d.located.size()); ++k) {
-      text += fmt::format("  {:.1f} sigma  {}\n", d.located[k].significance, d.located[k].words);
-    }
+    text += "where:\n" + places_text(d.located, d.located_by);
   }
   if (!d.findings.empty()) {
     text += "left out:\n";
@@ -65,10 +72,7 @@ std::string diagnosis_text(const diagnosis::Diagnosis& d) {
                         (d.calibration.value(at) - d.value(at)) / p.si_per_unit, p.unit, largest);
   }
   if (d.unexplained) {
-    text += "not explained by anything in the catalogue; what remains:\n";
-    for (std::size_t k = 0; k < std::min<std::size_t>(5, d.remaining.size()); ++k) {
-      text += fmt::format("  {:.1f} sigma  {}\n", d.remaining[k].significance, d.remaining[k].words);
-    }
+    text += "not explained by anything in the catalogue; what remains:\n" + places_text(d.remaining, d.remaining_by);
     for (const Finding& f : d.rejected) {
       text += fmt::format("  the best fitting name, rejected by what remains: {} ({:.1f} sigma)\n", f.effect,
                           f.significance);
