@@ -5,17 +5,17 @@
 #include <cstdio>
 #include <numbers>
 
-#include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
 constexpr double largest_shift_s = 2.0;    // between the same turns of both
-constexpr std::size_t most_effects = 6;
-constexpr double share_names = 0.5, share_parameters = 0.1;   // of the false-alarm rate
-const double class_log_odds = std::log(100.0);
+// Of the false-alarm rate. Map, whiteness and size have a tenth each by themselves (judgement.hpp).
+constexpr double share_names = 0.5, share_structure = 0.1, share_parameters = 0.1;
+constexpr double rejection_rate = 0.01;    // of right names, by what they leave
 
 std::string schedules_differ(const ImuData& a, const ImuData& b) {
   char text[160];
@@ -36,224 +36,229 @@ std::string schedules_differ(const ImuData& a, const ImuData& b) {
   return {};
 }
 
+// A recording, with effects taken out of its increments.
+struct Side {
+  explicit Side(const ImuData& original) : data(original) {}
+  std::string calibrate(const DiagnosisOptions& options);
+  std::string take_out(const Correction& correction, const DiagnosisOptions& options);
+
+  ImuData data;
+  AngleVelocity theta, velocity;   // behind `data`, once something was taken out
+  CalibrationResult calibration;
+};
+
+std::string Side::calibrate(const DiagnosisOptions& options) {
+  CalibrationOutcome outcome = calibrate_still(data, options.calibration, options.stop);
+  if (outcome.result) {
+    calibration = std::move(*outcome.result);
+  }
+  return outcome.result ? std::string() : outcome.failure.message;
+}
+
+std::string Side::take_out(const Correction& correction, const DiagnosisOptions& options) {
+  const ImuData original = data;
+  theta.assign(original.delta_theta.begin(), original.delta_theta.end());
+  velocity.assign(original.delta_v.begin(), original.delta_v.end());
+  subtract_effects(RecordingContext(original), forward_pass(original, calibration), correction, theta, velocity);
+  data.delta_theta = theta;
+  data.delta_v = velocity;
+  return calibrate(options);
+}
+
+// Equations that can be taken out of increments, and of a recording with or without a temperature channel.
+Correction carried(const std::vector<Chosen>& chosen, bool temperature) {
+  Correction correction;
+  std::vector<double> sizes;
+  for (const Chosen& c : chosen) {
+    const Effect& effect = *c.candidate.effect;
+    if (effect.sensor != nullptr && (temperature || !effect.needs_temperature)) {
+      correction.effects.push_back({&effect, c.candidate.constant, static_cast<int>(sizes.size()), c.candidate.count});
+      sizes.insert(sizes.end(), c.size.begin(), c.size.end());
+    }
+  }
+  correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
+  return correction;
+}
+
 class Comparer {
  public:
   Comparer(const ImuData& recording, const ImuData& simulation, const DiagnosisOptions& options,
-           CalibrationResult of_recording, CalibrationResult of_simulation)
+           const std::function<void(const std::string&)>& progress)
       : recording_(recording),
         simulation_(simulation),
         options_(options),
-        calibration_(std::move(of_recording)),
-        reference_(std::move(of_simulation)),
-        context_(recording),
-        pass_(context_, candidates(), true) {}
+        progress_(progress),
+        log_names_(std::log(share_names * options.false_alarm_rate)) {}
 
-  Comparison run();
+  ComparisonOutcome run();
 
  private:
-  std::vector<Candidate> candidates() const;
-  SignatureRows difference();
-  bool add_best();
-  void refine(Candidate& winner);
-  void judge();
-  void compare_parameters();
-  std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
-  double corrected(double log_p) const {
-    return log_corrected(log_p, static_cast<double>(pass_.candidates().size()));
+  std::string take_out_common();
+  NoiseModel common_noise() const;
+  const Eigen::VectorXd& simulated_residual(const NoiseModel& noise);
+  bool moored() const { return recording_.calibration.moored || simulation_.calibration.moored; }
+  void judge(const Naming& naming);
+  void compare_parameters(const Naming& naming);
+  double attitude_difference() const;
+  void say(const std::string& words) const {
+    if (progress_) {
+      progress_(words);
+    }
   }
 
-  const ImuData& recording_;
-  const ImuData& simulation_;
+  Side recording_, simulation_;
   const DiagnosisOptions& options_;
-  CalibrationResult calibration_, reference_;
-  RecordingContext context_;
-  SignaturePass pass_;
+  const std::function<void(const std::string&)>& progress_;
+  double log_names_;
+  NoiseModel simulated_noise_;           // that simulated_residual_ was made with
   Eigen::VectorXd simulated_residual_;
-  SignatureRows rows_;
-  std::vector<Chosen> chosen_;
   Comparison result_;
 };
 
-std::vector<Candidate> Comparer::candidates() const {
-  std::vector<Candidate> all;
-  for (const Effect& effect : catalogue()) {
-    for (const double constant : effect.constants) {
-      if (!effect.needs_temperature || !recording_.temperature.empty()) {
-        all.push_back({&effect, constant, 0, 0});
-      }
+std::string Comparer::take_out_common() {
+  const RecordingContext context(simulation_.data);
+  Naming naming(context, forward_pass(simulation_.data, simulation_.calibration), log_names_);
+  naming.run({}, options_.stop);
+  const Correction common = carried(naming.chosen(), !recording_.data.temperature.empty());
+  if (common.effects.empty()) {
+    return {};
+  }
+  for (const Chosen& c : naming.chosen()) {
+    if (std::any_of(common.effects.begin(), common.effects.end(),
+                    [&](const Candidate& x) { return x.effect == c.candidate.effect; })) {
+      result_.in_both.push_back(describe(c, naming.rows()));
     }
   }
-  return all;
+  std::string failure = simulation_.take_out(common, options_);
+  return failure.empty() ? recording_.take_out(common, options_) : "the simulation: " + failure;
 }
 
-SignatureRows Comparer::difference() {
-  SignatureRows rows = pass_.run(forward_pass(recording_, calibration_));
-  const Eigen::Index n = std::min(rows.residual.size(), simulated_residual_.size());
-  rows.residual = (rows.residual.head(n) - simulated_residual_.head(n)) * std::numbers::sqrt2 / 2.0;
-  rows.columns = rows.columns.topRows(n) * std::numbers::sqrt2 / 2.0;
-  rows.time_s.resize(static_cast<std::size_t>(n));
-  return rows;
+// With the mean of both variances in the filter of either, the difference has twice what each predicts. The motion of a moored
+// base is each one's own.
+NoiseModel Comparer::common_noise() const {
+  NoiseModel noise = recording_.calibration.noise;
+  if (!moored()) {
+    const NoiseModel& other = simulation_.calibration.noise;
+    const auto mean = [](double a, double b) { return std::hypot(a, b) / std::numbers::sqrt2; };
+    noise.gyro_arw = mean(noise.gyro_arw, other.gyro_arw);
+    noise.accel_vrw = mean(noise.accel_vrw, other.accel_vrw);
+    noise.observation.sigma = mean(noise.observation.sigma, other.observation.sigma);
+  }
+  return noise;
 }
 
-std::vector<int> Comparer::chosen_columns(std::size_t without) const {
-  std::vector<int> columns;
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    if (i != without) {
-      const std::vector<int> own = columns_of(chosen_[i].candidate);
-      columns.insert(columns.end(), own.begin(), own.end());
-    }
+const Eigen::VectorXd& Comparer::simulated_residual(const NoiseModel& asked) {
+  const NoiseModel& noise = moored() ? simulation_.calibration.noise : asked;
+  const bool known = simulated_residual_.size() > 0 && noise.gyro_arw == simulated_noise_.gyro_arw &&
+                     noise.accel_vrw == simulated_noise_.accel_vrw &&
+                     noise.observation.sigma == simulated_noise_.observation.sigma;
+  if (!known) {
+    const RecordingContext context(simulation_.data);
+    PassInput input = forward_pass(simulation_.data, simulation_.calibration);
+    input.noise = noise;
+    simulated_residual_ = SignaturePass(context, {}, false).run(input).residual;
+    simulated_noise_ = noise;
   }
-  return columns;
+  return simulated_residual_;
 }
 
-// The constant between its neighbours on the grid, in steps of a sixteenth of their ratio.
-void Comparer::refine(Candidate& winner) {
-  constexpr int steps = 8;
-  double best = 0.0, constant = winner.constant;
-  for (int k = -steps; k <= steps; ++k) {
-    const double trial = winner.constant * std::pow(2.0, static_cast<double>(k) / steps);
-    SignaturePass alone(context_, {{winner.effect, trial, 0, 0}}, false);
-    const SignatureRows rows = alone.run(forward_pass(recording_, calibration_));
-    SignatureRows scaled;
-    scaled.residual = rows_.residual;
-    scaled.columns = rows.columns.topRows(rows_.residual.size()) * std::numbers::sqrt2 / 2.0;
-    const Evidence evidence(scaled);
-    const double gain = test_group(evidence, columns_of(alone.candidates().front()), {}).gain;
-    if (gain > best) {
-      best = gain;
-      constant = trial;
-    }
+void Comparer::judge(const Naming& naming) {
+  Diagnosis& d = result_.diagnosis;
+  const double alpha = options_.false_alarm_rate;
+  const Map after = naming.map_after();
+  d.log_p_limit = naming.log_p_limit();
+  d.located = naming.map_before().places;
+  d.remaining = after.places;
+  d.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha, moored());
+  d.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
+  for (const Chosen& c : naming.chosen()) {
+    d.findings.push_back(describe(c, naming.rows()));
+    d.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
   }
-  winner.constant = constant;
-  pass_.set_constant(winner.first, constant);
-  rows_ = difference();
-}
-
-bool Comparer::add_best() {
-  const Evidence evidence(rows_);
-  const std::vector<int> others = chosen_columns();
-  double best = std::log(share_names * options_.false_alarm_rate);
-  const Candidate* winner = nullptr;
-  for (const Candidate& c : pass_.candidates()) {
-    const bool taken = std::any_of(chosen_.begin(), chosen_.end(),
-                                   [&](const Chosen& x) { return x.candidate.effect->id == c.effect->id; });
-    const double log_p = taken ? 0.0 : corrected(test_group(evidence, columns_of(c), others).log_p);
-    if (log_p < best) {
-      best = log_p;
-      winner = &c;
-    }
+  bool jumps = false;
+  for (const WalkTest& w : naming.walks()) {
+    const bool real = walks_inside_dwells(recording_.data, recording_.calibration.noise, w);
+    jumps = jumps || !real;
+    (real ? d.findings : d.rejected).push_back(describe(w, naming.rows()));
   }
-  if (winner == nullptr) {
-    return false;
+  std::stable_sort(d.findings.begin(), d.findings.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
+  if (!moored()) {
+    d.after.log_p_structure = naming.log_p_structure();
+    d.after.accepted = d.after.accepted &&
+                       d.after.log_p_structure > std::log(d.findings.empty() ? share_structure * alpha : rejection_rate);
   }
-  chosen_.emplace_back();
-  chosen_.back().candidate = *winner;
-  if (!std::isnan(winner->constant)) {
-    refine(chosen_.back().candidate);
+  d.after.accepted = d.after.accepted && !jumps && naming.log_p_likeness() > std::log(rejection_rate) && !naming.entangled();
+  d.unexplained = !d.after.accepted;
+  constexpr double tolerable_share = 0.1;   // names must explain all but this much of the misfit
+  if (d.unexplained && d.after.misfit > tolerable_share * d.before.misfit) {
+    d.rejected.insert(d.rejected.end(), d.findings.begin(), d.findings.end());
+    d.findings.clear();
+    d.model.clear();
   }
-  return true;
-}
-
-void Comparer::judge() {
-  const Evidence evidence(rows_);
-  std::vector<int> fold;
-  for (const double t : rows_.time_s) {
-    fold.push_back(static_cast<int>(context_.segment_at(t)));
-  }
-  const std::vector<int> all = chosen_columns();
-  const Fit fit = evidence.fit(all);
-  Eigen::Index at = 0;
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    Chosen& c = chosen_[i];
-    const std::vector<int> others = chosen_columns(i);
-    const GroupTest own = test_group(evidence, columns_of(c.candidate), others);
-    c.size = fit.value.segment(at, c.candidate.count);
-    c.covariance = fit.covariance.block(at, at, c.candidate.count, c.candidate.count);
-    at += c.candidate.count;
-    c.gain = own.gain;
-    c.rank = own.rank;
-    c.log_p = corrected(own.log_p);
-    c.held_out = held_out_gain(rows_.columns, rows_.residual, fold, all, others);
-    for (const Candidate& rival : pass_.candidates()) {
-      const std::string& id = rival.effect->id;
-      const bool known = std::find(c.equivalent.begin(), c.equivalent.end(), id) != c.equivalent.end() ||
-                         std::any_of(chosen_.begin(), chosen_.end(),
-                                     [&](const Chosen& x) { return x.candidate.effect->id == id; });
-      if (!known && test_group(evidence, columns_of(rival), others).log_p < own.log_p + class_log_odds) {
-        c.equivalent.push_back(id);
-      }
-    }
-    result_.diagnosis.findings.push_back(describe(c, evidence.rows));
-    result_.diagnosis.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
-  }
-  const Map after = locate(evidence, pass_.map(), pass_.first_map_column(), all);
-  Eigen::VectorXd residual = rows_.residual;
-  if (!all.empty()) {
-    residual -= rows_.columns(Eigen::all, all) * fit.value;
-  }
-  const bool moored = calibration_.moored || reference_.moored;
-  result_.diagnosis.remaining = after.places;
-  result_.diagnosis.after = adequacy(evidence.square - (all.empty() ? 0.0 : fit.gain), evidence.rows,
-                                     log_p_white(residual), after, options_.false_alarm_rate, moored);
 }
 
 // The difference of the 24, with what the findings shift them by.
-void Comparer::compare_parameters() {
-  result_.difference = calibration_.value - reference_.value;
-  for (const Chosen& c : chosen_) {
-    result_.difference += rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
-  }
-  ParameterMatrix P = calibration_.covariance + reference_.covariance;
-  const std::vector<int> columns = chosen_columns();
-  if (!columns.empty()) {
-    const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns);
-    P += S * Evidence(rows_).fit(columns).covariance * S.transpose();
-  }
-  result_.sigma = P.diagonal().cwiseSqrt();
+void Comparer::compare_parameters(const Naming& naming) {
+  Diagnosis& d = result_.diagnosis;
+  d.value = naming.value();
+  d.value_as_named = naming.value_as_named();
+  d.covariance = naming.covariance();
+  d.sigma = d.covariance.diagonal().cwiseSqrt();
+  d.calibration = recording_.calibration;
+  result_.difference = d.value - simulation_.calibration.value;
+  result_.sigma = (d.covariance + simulation_.calibration.covariance).diagonal().cwiseSqrt();
 }
 
-Comparison Comparer::run() {
-  const RecordingContext simulated(simulation_);
-  simulated_residual_ = SignaturePass(simulated, {}, false).run(forward_pass(simulation_, reference_)).residual;
-  rows_ = difference();
-  Diagnosis& d = result_.diagnosis;
-  const Evidence evidence(rows_);
-  const Map before = locate(evidence, pass_.map(), pass_.first_map_column(), {});
-  d.located = before.places;
-  d.before = adequacy(evidence.square, evidence.rows, log_p_white(rows_.residual), before, options_.false_alarm_rate,
-                      calibration_.moored || reference_.moored);
-  while (chosen_.size() < most_effects && add_best()) {
+double Comparer::attitude_difference() const {
+  const std::vector<Segment> first = find_segments(recording_.data), second = find_segments(simulation_.data);
+  const auto apart = [](double a, double b) { return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi)); };
+  const Eigen::AngleAxisd start(recording_.calibration.C_nb_start.transpose() * simulation_.calibration.C_nb_start);
+  double largest = std::abs(start.angle());
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    if (!first[k].rotation) {
+      largest = std::max({largest, apart(first[k].outer, second[k].outer), apart(first[k].inner, second[k].inner)});
+    }
   }
-  judge();
-  compare_parameters();
+  return largest;
+}
+
+ComparisonOutcome Comparer::run() {
+  say("calibrations");
+  std::string failure = recording_.calibrate(options_);
+  if (failure.empty()) {
+    failure = simulation_.calibrate(options_);
+    failure = failure.empty() ? failure : "the simulation: " + failure;
+  }
+  if (failure.empty()) {
+    say("what the simulation holds");
+    failure = take_out_common();
+  }
+  if (!failure.empty()) {
+    return {std::nullopt, std::move(failure)};
+  }
+  say("difference");
+  const RecordingContext context(recording_.data, [this](const NoiseModel& noise) -> const Eigen::VectorXd& {
+    return simulated_residual(noise);
+  });
+  PassInput input = forward_pass(recording_.data, recording_.calibration);
+  input.noise = common_noise();
+  Naming naming(context, input, log_names_);
+  naming.run(progress_, options_.stop);
+  if (options_.stop.stop_requested()) {
+    return {std::nullopt, "stopped"};
+  }
+  judge(naming);
+  compare_parameters(naming);
+  Diagnosis& d = result_.diagnosis;
   const double z = result_.difference.cwiseAbs().cwiseQuotient(result_.sigma).maxCoeff();
   const bool same_parameters = log_corrected(log_chi_squared_tail(z * z, 1.0), sensor_parameter_count) >
                                std::log(share_parameters * options_.false_alarm_rate);
-  d.unexplained = !d.after.accepted;
-  constexpr double tolerable_share = 0.1;   // as in a diagnosis: names must explain all but this much of the misfit
-  if (d.unexplained && d.after.misfit > tolerable_share * d.before.misfit) {
-    d.rejected.swap(d.findings);
-    d.model.clear();
-  }
   d.mismatch = !d.findings.empty() || d.unexplained || !same_parameters;
   d.verdict = !d.findings.empty()  ? DiagnosisVerdict::named
               : d.unexplained      ? DiagnosisVerdict::none_of_the_above
                                    : DiagnosisVerdict::adequate;
-  d.value = calibration_.value;
-  d.value_as_named = calibration_.value;
-  d.sigma = calibration_.sigma;
-  d.calibration = calibration_;
-  const std::vector<Segment> first = find_segments(recording_), second = find_segments(simulation_);
-  for (std::size_t k = 0; k < first.size(); ++k) {
-    if (!first[k].rotation) {
-      result_.attitude_difference =
-          std::max({result_.attitude_difference, std::abs(std::remainder(first[k].outer - second[k].outer, 2 * std::numbers::pi)),
-                    std::abs(std::remainder(first[k].inner - second[k].inner, 2 * std::numbers::pi))});
-    }
-  }
-  const Eigen::AngleAxisd start(calibration_.C_nb_start.transpose() * reference_.C_nb_start);
-  result_.attitude_difference = std::max(result_.attitude_difference, std::abs(start.angle()));
-  return std::move(result_);
+  result_.attitude_difference = attitude_difference();
+  return {std::move(result_), {}};
 }
 
 }  // namespace
@@ -266,18 +271,7 @@ ComparisonOutcome compare(const ImuData& recording, const ImuData& simulation, c
   if (std::string differ = schedules_differ(recording, simulation); !differ.empty()) {
     return {std::nullopt, std::move(differ)};
   }
-  if (progress) {
-    progress("calibrations");
-  }
-  CalibrationOutcome first = calibrate_still(recording, options.calibration);
-  CalibrationOutcome second = calibrate_still(simulation, options.calibration);
-  if (!first.result || !second.result) {
-    return {std::nullopt, first.result ? "the simulation: " + second.failure.message : first.failure.message};
-  }
-  if (progress) {
-    progress("difference");
-  }
-  return {Comparer(recording, simulation, options, std::move(*first.result), std::move(*second.result)).run(), {}};
+  return Comparer(recording, simulation, options, progress).run();
 }
 
 }  // namespace selfcal::diagnosis

@@ -61,8 +61,6 @@ Finding describe(const Chosen& chosen, double rows) {
   return f;
 }
 
-namespace {
-
 Finding describe(const WalkTest& walk, double rows) {
   Finding f;
   f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
@@ -78,6 +76,8 @@ Finding describe(const WalkTest& walk, double rows) {
   f.stochastic = true;
   return f;
 }
+
+namespace {
 
 // 1 sigma of a triad's density over itself: what the fit states (gyros beside a quantum), or of a fit to the mean spectrum.
 // Gyros: pieces of 32 s, accelerometers: of 3.2 s (sensor_noise.cpp); of each,

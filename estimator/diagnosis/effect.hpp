@@ -20,7 +20,7 @@ struct EffectContext {
   double dt = 0.0;
   Vector3 angle, velocity;               // integrals of rate and specific force: rad, m/s
   Vector3 rate, force, u;                // means: rad/s, m/s^2, force in g
-  Vector3 rate_change;                   // rate at the end less rate at the start: rad/s, zero in dwells
+  Vector3 rate_change;                   // rate at the end less rate at the start: rad/s, zero inside dwells
   Matrix3 C_nb;
   double since_turn_start_s = 0.0;       // part of the stretch after the end of the first turn, since the last one's
   double since_turn_end_s = 0.0;         // equal: none

@@ -7,6 +7,7 @@
 namespace selfcal::diagnosis {
 
 Finding describe(const Chosen& chosen, double rows);
+Finding describe(const WalkTest& walk, double rows);
 
 // `alpha`: false-alarm rate of the whole recording. `motion_fitted`: of a moored base.
 Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted);

@@ -81,6 +81,9 @@ void IntervalNavigator::sample(std::size_t index, double length, Moments& m, Int
                        (previous_angle_.cross(velocity_) + previous_velocity_.cross(angle_)) / 12.0;
   const Eigen::Quaterniond step = quaternion_from_rotation_vector(turn);
 
+  if (extra_ != nullptr && m.open && extra_->block_ends_before(sign_ > 0.0 ? index : index + 1)) {
+    close_block(m, length);
+  }
   if (!m.open) {
     m.open = true;
     m.block = SensorBlock{};

@@ -29,6 +29,8 @@ class ExtraSignatures {
  public:
   virtual ~ExtraSignatures() = default;
   virtual int count() const = 0;
+  // Whether no block may hold both this sample and the one before: a signature counts as spread evenly over its block.
+  virtual bool block_ends_before(std::size_t /*sample*/) const { return false; }
   // Integrals over the block of d(df)/d(parameter) [3 x count] m/s and d(dw)/d(parameter) [3 x count] rad, in b.
   virtual void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
                      Eigen::Ref<Eigen::Matrix3Xd> angle) = 0;

@@ -114,6 +114,14 @@ ordered_json comparison_json(const diagnosis::Comparison& c, double false_alarm_
                                                     {"sigma", c.sigma(k) / p.si_per_unit}};
   }
   j["attitude_difference_deg"] = c.attitude_difference / units::degree;
+  j["in_both"] = ordered_json::array();
+  for (const Finding& f : c.in_both) {
+    ordered_json parameters = ordered_json::array();
+    for (const auto& p : f.parameters) {
+      parameters.push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"sigma", p.sigma}});
+    }
+    j["in_both"].push_back({{"effect", f.effect}, {"parameters", parameters}});
+  }
   return j;
 }
 
@@ -132,6 +140,13 @@ std::string comparison_text(const diagnosis::Comparison& c) {
                           d.located[k].words, d.located[k].size,
                           d.located[k].axis.starts_with("gyro") ? "deg/h" : "ug");
     }
+  }
+  if (!c.in_both.empty()) {
+    text += "what the simulation holds was taken out of both:";
+    for (const Finding& f : c.in_both) {
+      text += " " + f.effect;
+    }
+    text += "\n";
   }
   if (!d.findings.empty()) {
     text += "the recording has more of:\n";
@@ -155,7 +170,7 @@ std::string comparison_text(const diagnosis::Comparison& c) {
   text += differing == 0 ? " none\n" : "\n";
   constexpr double noticeable = 0.2 * units::degree;
   if (c.attitude_difference > noticeable) {
-    text += fmt::format("attitudes differ by up to {:.2f} deg: effects that both hold cancel only to that degree\n",
+    text += fmt::format("attitudes differ by up to {:.2f} deg: what both hold and no name was found for cancels only to that degree\n",
                         c.attitude_difference / units::degree);
   }
   return text;
