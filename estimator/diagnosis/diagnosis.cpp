@@ -20,7 +20,7 @@ namespace {
 constexpr double share_names = 0.45, share_map = 0.1, share_structure = 0.1, share_white = 0.1, share_size = 0.1,
                  share_noise = 0.15;
 constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
-constexpr double remainder_rate = 0.01;        // and by map, whiteness and size
+constexpr double remainder_rate = 0.01;        // and by map, whiteness and size, and by biases that they have no part in
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
 
@@ -254,8 +254,9 @@ void Diagnoser::decide(const Naming& naming) {
   d_.before = adequacy(naming.square_before(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_before(),
                        naming.map_before(), alpha, d_.calibration.moored);
   const bool nothing_found = naming.chosen().empty() && naming.walks().empty();
-  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after,
-                      nothing_found ? alpha : std::max(alpha, remainder_rate), d_.calibration.moored);
+  const double of_remainder = nothing_found ? alpha : std::max(alpha, remainder_rate);
+  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after, of_remainder,
+                      d_.calibration.moored);
   if (!nothing_found || !d_.before.accepted) {
     const Naming::ByQuantity by = naming.locate_by_quantities();
     d_.located_by = by.before;
@@ -273,11 +274,13 @@ void Diagnoser::decide(const Naming& naming) {
     (real ? named : d_.rejected).push_back(describe(w, naming.rows()));
   }
   std::stable_sort(named.begin(), named.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
-  // What was named must explain: it is held to more than a recording in which nothing was found.
+  // What was named must explain: where it makes most of what is seen it is held to more than a recording in which nothing
+  // was found. What it has no part in speaks neither for it nor against it.
   if (!d_.calibration.moored) {
-    d_.after.log_p_structure = naming.log_p_structure();
-    d_.after.accepted = d_.after.accepted && d_.after.log_p_structure >
-                                                 std::log(named.empty() ? share_structure * alpha : rejection_rate);
+    const Naming::Structure left = naming.structure();
+    d_.after.log_p_structure = left.log_p();
+    d_.after.accepted = d_.after.accepted && left.log_p_named > std::log(rejection_rate) &&
+                        left.log_p_elsewhere > std::log(share_structure * of_remainder);
   }
   // Beside an effect of hundreds of sigma the linearisation leaves a thousandth of it: not worth a verdict.
   constexpr double numerical_share = 1e-3;

@@ -95,6 +95,11 @@ Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_m
   return result;
 }
 
+double square_within(const Evidence& e, const std::vector<int>& place, const std::vector<int>& named,
+                     const Eigen::VectorXd& size) {
+  return named.empty() ? 0.0 : fit_columns(e.information(place, place), e.information(place, named) * size).gain;
+}
+
 std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double interval_s) {
   std::vector<InnovationLine> lines;
   const Eigen::Index epochs = rows.residual.size() / 3;

@@ -52,6 +52,10 @@ struct Map {
 Map locate(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column,
            const std::vector<int>& fitted);
 
+// Square of the signature that columns `named` of these sizes make, as far as the columns `place` can stand for it.
+double square_within(const Evidence& evidence, const std::vector<int>& place, const std::vector<int>& named,
+                     const Eigen::VectorXd& size);
+
 // A line in the innovations of one axis of n: sum of both quadratures' squares over the mean.
 struct InnovationLine {
   int axis = 0;

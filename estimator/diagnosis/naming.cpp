@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/multiplicity.hpp"
+#include "estimator/diagnosis/velocity_noise.hpp"
 #include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
@@ -413,11 +414,22 @@ void Naming::run(const std::function<void(const std::string&)>& progress, const 
     }
   }
   sharpen_observation();
+  refit_noise();
   while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
   }
   average();
   test_likenesses();
   judge();
+}
+
+// Under noise that no longer holds them the names are tested again; where one falls the noise is fitted without it.
+void Naming::refit_noise() {
+  const auto log_likelihood = [&](const PassInput& trial) { return log_likelihood_as_named(trial); };
+  bool fallen = !chosen_.empty() || !walks_.empty();
+  while (fallen && refit_velocity_noise(input_, log_likelihood)) {
+    relinearise();
+    fallen = drop_weak();
+  }
 }
 
 std::vector<Suspect> Naming::suspects() const {

@@ -1,6 +1,7 @@
 // Forward selection over the catalogue, with a refit about the corrected recording after every step.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <stop_token>
@@ -66,8 +67,14 @@ class Naming {
   // explanation of it.
   bool entangled() const;
   // Of the biases that dwells, rotations, times since a turn and times of the recording still show, axis by axis: the
-  // smallest p, corrected. A single one is the map's; this is what many together leave.
-  double log_p_structure() const;
+  // smallest p, corrected. A single one is the map's; this is what many together leave. `log_p_named`: where what is named
+  // makes at least as much as is left (a walk: anywhere in its triad); 0: nowhere.
+  struct Structure {
+    double log_p_named = 0.0, log_p_elsewhere = 0.0;
+    double log_p() const { return std::min(log_p_named, log_p_elsewhere); }
+  };
+  Structure structure() const;
+  double log_p_structure() const { return structure().log_p(); }
   // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts
   // with the attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some.
   double log_p_likeness() const { return log_p_likeness_; }
@@ -86,6 +93,8 @@ class Naming {
   bool drop_weak();
   bool exchange();
   void sharpen_observation();
+  void refit_noise();
+  double log_likelihood_as_named(const PassInput& input) const;
   int append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine);
   void append_constants();
   void test_likenesses();

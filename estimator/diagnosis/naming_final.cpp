@@ -2,6 +2,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
@@ -54,22 +55,13 @@ void Naming::sharpen_observation() {
   if ((chosen_.empty() && walks_.empty()) || input_.noise.observation.state_count() > 0) {
     return;
   }
-  const auto log_likelihood = [&](const SignatureRows& rows) {
-    Evidence evidence(rows);
-    const double raw = evidence.square;
-    evidence.restore(applied_columns_, applied_);
-    for (const WalkTest& walk : walks_) {
-      evidence.absorb(walk.columns, walk.covariance);
-    }
-    return rows.pass.log_likelihood + 0.5 * (raw - evidence.square + evidence.fit(chosen_columns()).gain);
-  };
-  double best = log_likelihood(rows_);
+  double best = log_likelihood_as_named(input_);
   bool better = false;
   double sigma = input_.noise.observation.sigma;
   while ((sigma *= factor) > least) {
     PassInput trial = input_;
     trial.noise.observation.sigma = sigma;
-    const double found = log_likelihood(pass_.run(trial));
+    const double found = log_likelihood_as_named(trial);
     if (found < best) {
       break;
     }
@@ -80,6 +72,35 @@ void Naming::sharpen_observation() {
   if (better) {
     relinearise();
   }
+}
+
+// Of the recording, corrected as it is, with the sizes of what is named fitted under the noise of `input`.
+double Naming::log_likelihood_as_named(const PassInput& input) const {
+  if (chosen_.empty() && walks_.empty()) {
+    return run_pass(input).log_likelihood;
+  }
+  std::vector<Candidate> named = correction_.effects;
+  for (const Chosen& c : chosen_) {
+    named.push_back(c.candidate);
+  }
+  SignaturePass pass(context_, named, !walks_.empty());
+  const SignatureRows rows = pass.run(input);
+  Evidence evidence(rows);
+  const double raw = evidence.square;
+  const auto corrected = static_cast<int>(correction_.size.size());
+  std::vector<int> columns(static_cast<std::size_t>(pass.first_map_column()));
+  std::iota(columns.begin(), columns.end(), 0);
+  const std::vector<int> applied(columns.begin(), columns.begin() + corrected);
+  evidence.restore(applied, correction_.size);
+  for (const WalkTest& walk : walks_) {
+    std::vector<int> own = walk.columns;
+    for (int& column : own) {
+      column += pass.first_map_column() - pass_.first_map_column();
+    }
+    evidence.absorb(own, walk.covariance);
+  }
+  columns.erase(columns.begin(), columns.begin() + corrected);
+  return rows.pass.log_likelihood + 0.5 * (raw - evidence.square + evidence.fit(columns).gain);
 }
 
 bool Naming::entangled() const {
@@ -175,10 +196,11 @@ void Naming::test_likenesses() {
   }
 }
 
-double Naming::log_p_structure() const {
+Naming::Structure Naming::structure() const {
   using Kind = LocatedColumn::Kind;
   const std::vector<int> others = chosen_columns();
-  double smallest = 0.0;
+  const Eigen::VectorXd size = evidence_.fit(others).value;
+  Structure found;
   int tests = 0;
   for (const Kind kind : {Kind::dwell, Kind::rotation, Kind::after_turn, Kind::time}) {
     for (int axis = 0; axis < 6; ++axis) {
@@ -188,11 +210,17 @@ double Naming::log_p_structure() const {
           group.push_back(pass_.first_map_column() + static_cast<int>(k));
         }
       }
-      smallest = std::min(smallest, test_group(evidence_, group, others).log_p);
+      const GroupTest left = test_group(evidence_, group, others);
+      const bool walks = std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis / 3 == axis / 3; });
+      const bool named = walks || (!others.empty() && square_within(evidence_, group, others, size) >= left.gain);
+      double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
+      smallest = std::min(smallest, left.log_p);
       ++tests;
     }
   }
-  return log_corrected(smallest, tests);
+  found.log_p_named = log_corrected(found.log_p_named, tests);
+  found.log_p_elsewhere = log_corrected(found.log_p_elsewhere, tests);
+  return found;
 }
 
 Map Naming::map_after() const {

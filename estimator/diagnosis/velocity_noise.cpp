@@ -1,7 +1,8 @@
 #include "estimator/diagnosis/velocity_noise.hpp"
 
-#include <array>
 #include <cmath>
+#include <functional>
+#include <vector>
 
 namespace selfcal::diagnosis {
 namespace {
@@ -13,16 +14,43 @@ constexpr double correlation_s = 1e5;   // of the walk: far beyond any recording
 // Walk of `density` (m/sqrt(s)) as an oscillation that never turns: variance 2 sigma^2 T/decay per interval.
 MotionModel walk(double density) { return {{{0.0, correlation_s, density * std::sqrt(0.5 * correlation_s)}}}; }
 
-// The densities of angle and force, and of the walk.
-PassInput with(const PassInput& input, const std::array<double, 3>& d) {
+// Climbs from `best` along one density after the other, by ever smaller factors; `top` is the value there.
+template <std::size_t N>
+void climb(NoiseDensities& best, double& top, const std::array<double, N>& steps,
+           const std::function<double(const NoiseDensities&)>& log_likelihood) {
+  constexpr int rounds = 2;
+  for (const double step : steps) {
+    for (int round = 0; round < rounds; ++round) {
+      for (double& value : best) {
+        for (const double factor : {1.0 / step, step}) {
+          const double start = value;
+          for (double last = value;; last = value) {
+            value *= factor;
+            const double found = log_likelihood(best);
+            if (found <= top) {
+              value = last;
+              break;
+            }
+            top = found;
+          }
+          if (value != start) {
+            break;   // the top lies on this side
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& d) {
   PassInput changed = input;
   changed.noise.gyro_arw = d[0];
   changed.noise.accel_vrw = d[1];
   changed.noise.observation.motion.fill(walk(d[2]));
   return changed;
 }
-
-}  // namespace
 
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
   constexpr int accelerometers = 3;
@@ -37,35 +65,34 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
     return false;
   }
   const double before = run_pass(input).log_likelihood;
-  std::array<double, 3> best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
-  double top = run_pass(with(input, best)).log_likelihood;
-  constexpr std::array<double, 2> steps = {2.0, 1.25};
-  constexpr int rounds = 2;
-  for (const double step : steps) {
-    for (int round = 0; round < rounds; ++round) {
-      for (double& value : best) {
-        for (const double factor : {1.0 / step, step}) {
-          const double start = value;
-          for (double last = value;; last = value) {
-            value *= factor;
-            const double found = run_pass(with(input, best)).log_likelihood;
-            if (found <= top) {
-              value = last;
-              break;
-            }
-            top = found;
-          }
-          if (value != start) {
-            break;   // the top lies on this side
-          }
-        }
-      }
-    }
-  }
+  const auto log_likelihood = [&](const NoiseDensities& d) {
+    return run_pass(with_velocity_noise(input, d)).log_likelihood;
+  };
+  NoiseDensities best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
+  double top = log_likelihood(best);
+  climb(best, top, std::array{2.0, 1.25, 1.06}, log_likelihood);
   if (top < before + least_log_gain) {
     return false;
   }
-  input = with(input, best);
+  input = with_velocity_noise(input, best);
+  return true;
+}
+
+bool refit_velocity_noise(PassInput& input, const std::function<double(const PassInput&)>& log_likelihood) {
+  const std::vector<Oscillation>& north = input.noise.observation.motion.front().oscillations;
+  if (north.size() != 1 || north.front().decay_s != correlation_s) {
+    return false;
+  }
+  const double density = north.front().sigma / std::sqrt(0.5 * correlation_s);
+  const NoiseDensities before = {input.noise.gyro_arw, input.noise.accel_vrw, density};
+  const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(input, d)); };
+  NoiseDensities best = before;
+  double top = of_densities(best);
+  climb(best, top, std::array{1.25, 1.06}, of_densities);
+  if (best == before) {
+    return false;
+  }
+  input = with_velocity_noise(input, best);
   return true;
 }
 
