@@ -133,8 +133,8 @@ std::string Comparer::take_out_common() {
   return failure.empty() ? recording_.take_out(common, options_) : "the simulation: " + failure;
 }
 
-// With the mean of both variances in the filter of either, the difference has twice what each predicts. The motion of a moored
-// base is each one's own.
+// With the mean of both variances in the filter of either, the difference has twice what each predicts. The motion of a
+// moored base is each one's own.
 NoiseModel Comparer::common_noise() const {
   NoiseModel noise = recording_.calibration.noise;
   if (!moored()) {
@@ -169,7 +169,8 @@ void Comparer::judge(const Naming& naming) {
   d.log_p_limit = naming.log_p_limit();
   d.located = naming.map_before().places;
   d.remaining = after.places;
-  d.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha, moored());
+  d.before =
+      adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha, moored());
   d.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
   for (const Chosen& c : naming.chosen()) {
     d.findings.push_back(describe(c, naming.rows()));
@@ -181,13 +182,15 @@ void Comparer::judge(const Naming& naming) {
     jumps = jumps || !real;
     (real ? d.findings : d.rejected).push_back(describe(w, naming.rows()));
   }
-  std::stable_sort(d.findings.begin(), d.findings.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
+  std::stable_sort(d.findings.begin(), d.findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
   if (!moored()) {
     d.after.log_p_structure = naming.log_p_structure();
     d.after.accepted = d.after.accepted &&
                        d.after.log_p_structure > std::log(d.findings.empty() ? share_structure * alpha : rejection_rate);
   }
-  d.after.accepted = d.after.accepted && !jumps && naming.log_p_likeness() > std::log(rejection_rate) && !naming.entangled();
+  const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
+  d.after.accepted = d.after.accepted && !jumps && itself && !naming.entangled();
   d.unexplained = !d.after.accepted;
   constexpr double tolerable_share = 0.1;   // names must explain all but this much of the misfit
   if (d.unexplained && d.after.misfit > tolerable_share * d.before.misfit) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <unsupported/Eigen/FFT>
 
 #include "estimator/diagnosis/statistics.hpp"
@@ -11,18 +12,31 @@
 namespace selfcal::diagnosis {
 namespace {
 
-// Samples of a piece: the power of two next below 21 s, at most 2048; a dwell of a minute then holds two or more.
-Eigen::Index piece_length(double rate_hz) {
+constexpr double margin_s = 5.0;
+constexpr double lowest_hz = 0.25;           // slower: drifts of all kinds
+constexpr int most_pieces_per_dwell = 8;
+
+int pieces_of(const Segment& s, Eigen::Index length, double rate_hz) {
+  const auto margin = static_cast<std::ptrdiff_t>(margin_s * rate_hz);
+  const std::ptrdiff_t inside = static_cast<std::ptrdiff_t>(s.last - s.first) - 2 * margin;
+  return s.rotation ? 0 : static_cast<int>(std::clamp<std::ptrdiff_t>(inside / length, 0, most_pieces_per_dwell));
+}
+
+// Samples of a piece: the power of two next below 21 s, at most 2048; a dwell of a minute then holds two or more. Shorter
+// where the dwells do not hold enough: chance is stated by the number of pieces and bins, only slow lines are then not seen.
+Eigen::Index piece_length(double rate_hz, const std::vector<Segment>& segments) {
   constexpr double longest_s = 21.0;
+  constexpr Eigen::Index shortest = 256;
+  const auto total = [&](Eigen::Index length) {
+    return std::accumulate(segments.begin(), segments.end(), 0,
+                           [&](int sum, const Segment& s) { return sum + pieces_of(s, length, rate_hz); });
+  };
   Eigen::Index length = 2048;
-  while (length > 256 && static_cast<double>(length) > longest_s * rate_hz) {
+  while (length > shortest && (static_cast<double>(length) > longest_s * rate_hz || total(length) < enough_noise_pieces)) {
     length /= 2;
   }
   return length;
 }
-constexpr double margin_s = 5.0;
-constexpr double lowest_hz = 0.25;           // slower: drifts of all kinds
-constexpr int most_pieces_per_dwell = 8;
 
 using Spectrum = Eigen::ArrayXd;
 
@@ -31,9 +45,8 @@ struct DwellSpectra {
   std::vector<int> pieces;
 };
 
-DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis) {
+DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis, Eigen::Index piece) {
   DwellSpectra result;
-  const Eigen::Index piece = piece_length(data.sample_rate_hz);
   const double dt = 1.0 / data.sample_rate_hz;
   Eigen::VectorXd window(piece);
   for (Eigen::Index i = 0; i < piece; ++i) {
@@ -45,14 +58,10 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
   Eigen::VectorXcd transform;
   const auto margin = static_cast<std::size_t>(margin_s * data.sample_rate_hz);
   for (const Segment& s : segments) {
-    if (s.rotation) {
-      continue;
-    }
     Spectrum sum = Spectrum::Zero(piece / 2);
-    int count = 0;
-    for (std::size_t first = s.first + margin;
-         first + static_cast<std::size_t>(piece) + margin <= s.last && count < most_pieces_per_dwell;
-         first += static_cast<std::size_t>(piece)) {
+    const int count = pieces_of(s, piece, data.sample_rate_hz);
+    for (int k = 0; k < count; ++k) {
+      const std::size_t first = s.first + margin + static_cast<std::size_t>(k * piece);
       for (Eigen::Index i = 0; i < piece; ++i) {
         const std::size_t at = first + static_cast<std::size_t>(i);
         x(i) = (axis < 3 ? data.delta_theta[at][axis] : data.delta_v[at][axis - 3]) / dt;
@@ -61,7 +70,6 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
       x = x.cwiseProduct(window);
       fft.fwd(transform, x);
       sum += transform.head(piece / 2).array().abs2() * scale;
-      ++count;
     }
     if (count > 0) {
       result.dwells.emplace_back(sum / count);
@@ -146,15 +154,16 @@ void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<Vib
 
 NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments) {
   NoiseCheck check;
+  const Eigen::Index length = piece_length(data.sample_rate_hz, segments);
   for (std::size_t axis = 0; axis < 6; ++axis) {
-    const DwellSpectra s = spectra(data, segments, axis);
-    Spectrum mean = Spectrum::Zero(piece_length(data.sample_rate_hz) / 2);
+    const DwellSpectra s = spectra(data, segments, axis, length);
+    Spectrum mean = Spectrum::Zero(length / 2);
     check.pieces = 0;
     for (std::size_t d = 0; d < s.dwells.size(); ++d) {
       mean += s.dwells[d] * s.pieces[d];
       check.pieces += s.pieces[d];
     }
-    if (check.pieces < 20) {
+    if (check.pieces < enough_noise_pieces) {
       return check;
     }
     check.axes[axis] = fit_noise(mean / check.pieces, check.pieces, 1.0 / data.sample_rate_hz);

@@ -31,15 +31,17 @@ struct VibrationLine {
   double log_p = 0.0;           // corrected for frequencies and axes
 };
 
+constexpr int enough_noise_pieces = 20;
+
 struct NoiseCheck {
   std::array<AxisNoise, 6> axes;
   std::vector<VibrationLine> lines;
-  int pieces = 0;               // of spectra averaged; below 20 nothing is judged
+  int pieces = 0;               // of spectra averaged; below enough_noise_pieces nothing is judged
 };
 
-// Periodograms of pieces of the dwells (Hann). White rate plus white angle are fitted where lines are not; a line must
-// stand out in the median over the dwells, so that the beat of a coarse quantum with a steady rate, which moves with
-// the attitude, is none.
+// Periodograms of pieces of the dwells (Hann), shorter where the dwells are. White rate plus white angle are fitted where
+// lines are not; a line must stand out in the median over the dwells, so that the beat of a coarse quantum with a steady
+// rate, which moves with the attitude, is none.
 NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments);
 
 }  // namespace selfcal::diagnosis

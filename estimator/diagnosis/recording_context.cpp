@@ -14,8 +14,8 @@ constexpr double creeping_s = 15.0;
 constexpr std::size_t creeping_divisions = 10;
 constexpr double margin_s = 0.5;   // between a turn as found and as it was
 
-// Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a trapezoid,
-// a smooth ramp), whichever fits better. NaN where there are less than three.
+// Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a
+// trapezoid, a smooth ramp), whichever fits better. NaN where there are less than three.
 double rate_runs_out(const std::vector<double>& time, const std::vector<double>& rate, double length_s) {
   const auto n = static_cast<Eigen::Index>(time.size());
   if (n < 3) {
@@ -80,12 +80,13 @@ bool RecordingContext::divides(std::size_t sample) const {
     return false;
   }
   const double t = data_.time_s[std::min(sample, data_.size() - 1)];
-  const bool creeps = sample % (creeping_divisions * samples_per_division_) == 0 && segment_at(t - creeping_s) != segment_at(t);
+  const bool creeps = sample % (creeping_divisions * samples_per_division_) == 0 &&
+                      segment_at(t - creeping_s) != segment_at(t);
   return creeps || turns_around(t);
 }
 
-// Segments are told apart by quarters of a second. A creep of 400 ug that is taken to begin 10 ms late leaves 40 um/s, which
-// the position shows within a second: the end is where the rate runs out, to a millisecond.
+// Segments are told apart by quarters of a second. A creep of 400 ug that is taken to begin 10 ms late leaves 40 um/s,
+// which the position shows within a second: the end is where the rate runs out, to a millisecond.
 double RecordingContext::end_of_turn(const Segment& rotation) const {
   constexpr double least = 2e-3, most = 0.03;   // rad/s: a hundred quanta; within tenths of a second of the end
   constexpr double later_s = 0.25;              // than the segment at most
