@@ -1,10 +1,10 @@
 #include "estimator/diagnosis/data_faults.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/diagnosis/data_axes.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/models/segments.hpp"
 
@@ -30,11 +30,11 @@ bool same(const ImuData& d, std::size_t i, std::size_t j) {
 }
 
 // Zero increments never come by chance: gravity is always there. Repeated ones do, where the quantum is coarse: their
-// number is held against that of samples equal to the last but one.
+// number is held against that of samples equal to the last but one, and so is the length of a run.
 void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
   constexpr Triple zero{};
   DataFault zeros{"lost_samples", {}, 0, 0}, repeats{"lost_samples", {}, 0, 0}, gaps{"lost_samples", {}, 0, 0};
-  std::size_t by_chance = 0;
+  std::size_t by_chance = 0, run = 0, longest = 0, longest_first = 0;
   double missing = 0.0;
   for (std::size_t i = 0; i < data.size(); ++i) {
     if (data.delta_v[i] == zero) {
@@ -43,6 +43,11 @@ void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
       note(repeats, i);
     } else if (i > 1 && same(data, i, i - 2)) {
       ++by_chance;
+    }
+    run = i > 0 && same(data, i, i - 1) ? run + 1 : 0;
+    if (run > longest) {
+      longest = run;
+      longest_first = i + 1 - run;
     }
     const double steps = i > 0 ? (data.time_s[i] - data.time_s[i - 1]) * data.sample_rate_hz : 1.0;
     if (steps > 1.5) {
@@ -62,6 +67,15 @@ void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
     repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
                            static_cast<double>(repeats.count), chance);
     faults.push_back(repeats);
+  } else if (zeros.count == 0) {
+    // Of n samples a run of r comes by chance n p^r times; where p is too small to be counted, 2 %.
+    const auto n = static_cast<double>(data.size());
+    constexpr double least_p = 0.02, never = 1e-4;
+    const double p = std::max(least_p, (chance + 3.0) / n);
+    if (p < 0.5 && n * std::pow(p, static_cast<double>(longest)) < never) {
+      faults.push_back({"lost_samples", number("%.0f samples in a row repeat the one before", static_cast<double>(longest)),
+                        longest_first, longest});
+    }
   }
   if (gaps.count > 0) {
     gaps.words = number("%.0f gaps, %.0f samples missing", static_cast<double>(gaps.count), missing);
@@ -82,26 +96,62 @@ void time_base(const ImuData& data, std::vector<DataFault>& faults) {
   }
 }
 
-// An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds; accelerometers do not.
-void frozen_axes(const ImuData& data, std::vector<DataFault>& faults) {
-  constexpr double gyro_s = 30.0, accel_s = 2.0;
+// Median of the changes from sample to sample: the quantum where it is coarse.
+template <typename Value>
+double usual_step(std::size_t samples, const Value& value) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < samples; ++i) {
+    if (value(i) != value(i - 1)) {
+      steps.push_back(std::abs(value(i) - value(i - 1)));
+    }
+  }
+  if (steps.empty()) {
+    return HUGE_VAL;
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+// An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds where they hardly turn; if the
+// rest of the dwell turns them by more than a few counts in that time, they were stuck. Accelerometers never rest.
+void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  constexpr double gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7;
   for (std::size_t axis = 0; axis < 6; ++axis) {
-    const auto value = [&](std::size_t i) { return axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
-    const double longest = (axis < 3 ? gyro_s : accel_s) * data.sample_rate_hz;
-    std::size_t start = 0;
+    const bool gyro = axis < 3;
+    const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
+    const double count = usual_step(data.size(), value);
+    const auto margin = static_cast<std::size_t>(data.sample_rate_hz);   // a dwell's edge may hold part of a turn
     DataFault fault{"frozen_axis", {}, 0, 0};
-    for (std::size_t i = 1; i <= data.size(); ++i) {
-      if (i < data.size() && value(i) == value(start)) {
-        continue;
+    const auto stuck = [&](std::size_t first, std::size_t last) {
+      fault.first_sample = fault.count == 0 ? first : fault.first_sample;
+      fault.count += last - first;
+    };
+    for (const Segment& s : segments) {
+      const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
+      double sum = 0.0;
+      for (std::size_t i = first; i < last; ++i) {
+        sum += value(i);
       }
-      if (static_cast<double>(i - start) > longest) {
-        fault.first_sample = fault.count == 0 ? start : fault.first_sample;
-        fault.count += i - start;
+      const auto n = static_cast<double>(last - first);
+      std::size_t start = first;
+      for (std::size_t i = first + 1; i <= last; ++i) {
+        if (i < last && value(i) == value(start)) {
+          continue;
+        }
+        const auto length = static_cast<double>(i - start);
+        const double length_s = length / data.sample_rate_hz;
+        const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
+        const bool left_behind = gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s &&
+                                 std::abs(turned) > counts * count;
+        if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
+          stuck(start, i);
+        }
+        start = i;
       }
-      start = i;
     }
     if (fault.count > 0) {
-      fault.words = std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +
+      fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +
                     number(" gives one value for %.1f s", static_cast<double>(fault.count) / data.sample_rate_hz);
       faults.push_back(fault);
     }
@@ -128,13 +178,16 @@ std::size_t steeply_met(const ImuData& data, const Value& value, double largest)
   return met;
 }
 
-// Single samples far from both neighbours in dwells; and extreme values that are met again and again.
+// Single samples far from their neighbours in dwells (fourth differences: a turn's smooth beginning has none to speak of);
+// and extreme values that are met again and again.
 void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  const auto margin = static_cast<std::size_t>(0.5 * data.sample_rate_hz);   // a dwell's edge may hold part of a turn
+  // A dwell's edge may hold part of a turn, and by the gyros alone all of its beginning.
+  const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
+  const auto margin = static_cast<std::size_t>((gimbal ? 0.5 : 3.0) * data.sample_rate_hz);
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const auto value = [&](std::size_t i) { return axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
     const std::string name = std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3];
-    std::vector<std::pair<double, std::size_t>> curvature;
+    std::vector<std::pair<double, std::size_t>> off;   // in time's order
     double largest = 0.0;
     std::size_t met = 0, first_met = 0;
     for (std::size_t i = 0; i < data.size(); ++i) {
@@ -146,21 +199,23 @@ void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segm
       met += std::abs(value(i)) == largest ? 1 : 0;
     }
     for (const Segment& s : segments) {
-      for (std::size_t i = s.first + 1 + margin; !s.rotation && i + 1 + margin < s.last; ++i) {
-        curvature.emplace_back(std::abs(value(i) - 0.5 * (value(i - 1) + value(i + 1))), i);
+      for (std::size_t i = s.first + 2 + margin; !s.rotation && i + 2 + margin < s.last; ++i) {
+        const double around = (4.0 * (value(i - 1) + value(i + 1)) - value(i - 2) - value(i + 2)) / 6.0;
+        off.emplace_back(std::abs(value(i) - around), i);
       }
     }
-    if (curvature.size() < 1000) {
+    if (off.size() < 1000) {
       continue;
     }
-    auto middle = curvature.begin() + static_cast<std::ptrdiff_t>(curvature.size() * 9 / 10);
-    std::nth_element(curvature.begin(), middle, curvature.end());
+    std::vector<std::pair<double, std::size_t>> sorted = off;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
+    std::nth_element(sorted.begin(), middle, sorted.end());
     const double limit = 12.0 * middle->first / 1.645;   // the 90 % point is 1.645 sigma: 12 sigma
-    DataFault spike{"spike", {}, data.size(), 0};
-    for (const auto& [size, i] : curvature) {
-      if (size > limit && limit > 0.0) {
-        ++spike.count;
-        spike.first_sample = std::min(spike.first_sample, i);
+    DataFault spike{"spike", {}, 0, 0};
+    for (std::size_t k = 2; k + 2 < off.size(); ++k) {   // its neighbours stand out too, by two thirds of it
+      const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
+      if (off[k].first > limit && limit > 0.0 && largest_around) {
+        note(spike, off[k].second);
       }
     }
     if (spike.count > 0) {
@@ -179,74 +234,6 @@ void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segm
   }
 }
 
-// What the gyros integrate to in every rotation against the gimbal's read-outs, in b: angle = M * expected.
-void axes_against_gimbal(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  if (data.gimbal_outer.empty() || data.gimbal_inner.empty()) {
-    return;
-  }
-  Matrix3 cross = Matrix3::Zero(), normal = Matrix3::Zero();
-  for (const Segment& s : segments) {
-    if (!s.rotation || s.first == 0 || s.last >= data.size()) {
-      continue;
-    }
-    Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
-    for (std::size_t i = s.first; i < s.last; ++i) {
-      q = q * quaternion_from_rotation_vector(Eigen::Map<const Vector3>(data.delta_theta[i].data()));
-    }
-    const Matrix3 from = gimbal_matrix(data.gimbal_outer[s.first - 1], data.gimbal_inner[s.first - 1]);
-    const Matrix3 to = gimbal_matrix(data.gimbal_outer[s.last], data.gimbal_inner[s.last]);
-    const Vector3 expected = rotation_vector_from_matrix(from.transpose() * to);
-    const Vector3 measured = rotation_vector_from_matrix(q.toRotationMatrix());
-    cross += measured * expected.transpose();
-    normal += expected * expected.transpose();
-  }
-  const Eigen::JacobiSVD<Matrix3> svd(normal, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (svd.singularValues()(0) == 0.0) {
-    return;
-  }
-  Vector3 inverse = Vector3::Zero();
-  Matrix3 seen = Matrix3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    if (svd.singularValues()(k) > 0.05 * svd.singularValues()(0)) {
-      inverse(k) = 1.0 / svd.singularValues()(k);
-      seen += svd.matrixV().col(k) * svd.matrixV().col(k).transpose();
-    }
-  }
-  const Matrix3 M = cross * svd.matrixV() * inverse.asDiagonal() * svd.matrixU().transpose();
-  constexpr double plausible = 0.05;   // gimbal good to 1 deg in 90, sensors to 1 deg
-  const Matrix3 off = M - seen;
-  if (off.cwiseAbs().maxCoeff() > plausible) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "gyros against gimbal: turns along b come out as [%.3f %.3f %.3f; %.3f %.3f %.3f; %.3f %.3f %.3f]",
-                  M(0, 0), M(0, 1), M(0, 2), M(1, 0), M(1, 1), M(1, 2), M(2, 0), M(2, 1), M(2, 2));
-    faults.push_back({"wrong_axes", text, 0, data.size()});
-  }
-}
-
-// Mean size of the specific force in dwells against normal gravity; sensors are within 5000 ppm.
-void gravity_size(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  const double expected = earth::normal_gravity(data.site.latitude, data.site.height);
-  double sum = 0.0;
-  int dwells = 0;
-  for (const Segment& s : segments) {
-    if (s.rotation || s.last <= s.first) {
-      continue;
-    }
-    Vector3 velocity = Vector3::Zero();
-    for (std::size_t i = s.first; i < s.last; ++i) {
-      velocity += Eigen::Map<const Vector3>(data.delta_v[i].data());
-    }
-    sum += velocity.norm() * data.sample_rate_hz / static_cast<double>(s.last - s.first);
-    ++dwells;
-  }
-  constexpr double plausible = 0.015;
-  if (dwells > 0 && std::abs(sum / dwells / expected - 1.0) > plausible) {
-    faults.push_back({"wrong_scale", number("specific force at rest is %.5f m/s^2, gravity there is %.5f m/s^2",
-                                            sum / dwells, expected), 0, data.size()});
-  }
-}
-
 }  // namespace
 
 std::vector<DataFault> find_data_faults(const ImuData& data) {
@@ -254,10 +241,11 @@ std::vector<DataFault> find_data_faults(const ImuData& data) {
   const std::vector<Segment> segments = find_segments(data);
   lost_samples(data, faults);
   time_base(data, faults);
-  frozen_axes(data, faults);
+  frozen_axes(data, segments, faults);
   spikes_and_saturation(data, segments, faults);
-  axes_against_gimbal(data, segments, faults);
-  gravity_size(data, segments, faults);
+  if (faults.empty()) {   // else what a turn adds up to is no question of axes
+    find_wrong_axes(data, segments, faults);
+  }
   return faults;
 }
 

@@ -9,7 +9,8 @@
 namespace selfcal::diagnosis {
 
 struct DataFault {
-  std::string id;               // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_gravity
+  // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_sign, wrong_scale, wrong_site
+  std::string id;
   std::string words;
   std::size_t first_sample = 0;
   std::size_t count = 0;        // samples concerned

@@ -199,6 +199,7 @@ class Diagnoser {
  private:
   ImuData quiet_dwells();
   void name();
+  void leave_unjudged();
   void decide(const Naming& naming);
   void say(const std::string& words) const {
     if (say_) {
@@ -318,10 +319,8 @@ void Diagnoser::decide(const Naming& naming) {
   const bool only_motion = d_.calibration.moored &&
                            std::all_of(d_.findings.begin(), d_.findings.end(),
                                        [](const Finding& f) { return f.effect == "base_sway"; });
-  d_.mismatch = (!d_.findings.empty() && !only_motion) || d_.unexplained || !d_.faults.empty();
-  if (!d_.faults.empty()) {
-    d_.verdict = DiagnosisVerdict::data_fault;
-  } else if (!d_.findings.empty() && !only_motion) {
+  d_.mismatch = (!d_.findings.empty() && !only_motion) || d_.unexplained;
+  if (!d_.findings.empty() && !only_motion) {
     d_.verdict = DiagnosisVerdict::named;
   } else if (d_.unexplained) {
     d_.verdict = DiagnosisVerdict::none_of_the_above;
@@ -330,16 +329,32 @@ void Diagnoser::decide(const Naming& naming) {
   }
 }
 
+// What faulty data do to the filter looks like anything: nothing else is concluded from them.
+void Diagnoser::leave_unjudged() {
+  d_.verdict = DiagnosisVerdict::data_fault;
+  d_.mismatch = true;
+  d_.before.nis = d_.after.nis = d_.calibration.consistency.nis_mean;
+  d_.before.accepted = d_.after.accepted = false;
+  d_.value = d_.value_as_named = d_.calibration.value;
+  d_.covariance = d_.calibration.covariance;
+  d_.sigma = d_.calibration.sigma;
+}
+
 DiagnosisOutcome Diagnoser::run() {
   say("data");
   d_.faults = find_data_faults(data_);
+  const bool faulty = !d_.faults.empty();
   d_.noise = check_noise(data_, find_segments(data_));
   say("calibration");
   CalibrationOutcome calibration = calibrate_still(data_, options_.calibration, options_.stop);
   if (!calibration.result) {
-    return {std::nullopt, calibration.failure.message};
+    return {std::nullopt, (faulty ? d_.faults.front().words + "; " : std::string()) + calibration.failure.message};
   }
   d_.calibration = std::move(*calibration.result);
+  if (faulty) {
+    leave_unjudged();
+    return {std::move(d_), {}};
+  }
   name();
   if (options_.stop.stop_requested()) {
     return {std::nullopt, "stopped"};

@@ -145,6 +145,19 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
   return write_file_atomically(arguments.split_schedule, text).map([&] { return splits; });
 }
 
+// There is no physics to try on another recording, to split or to write.
+Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis) {
+  fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate).dump() + "\n"
+                                  : diagnosis_text(diagnosis));
+  for (const std::string* asked : {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
+    if (!asked->empty()) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}: nothing to do with {}", arguments.recording,
+                                                    diagnosis.faults.front().words, *asked));
+    }
+  }
+  return 1;
+}
+
 Expected<int> diagnose(const DiagnoseArguments& arguments) {
   const Expected<std::unique_ptr<Opened>> opened = open(arguments.recording);
   if (!opened) {
@@ -163,6 +176,9 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.recording, outcome.failure));
   }
   const diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
+  if (!diagnosis.faults.empty()) {
+    return tell_faults(arguments, diagnosis);
+  }
   const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
   if (!holdout) {
     return tl::unexpected(holdout.error());
@@ -172,7 +188,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     return tl::unexpected(splits.error());
   }
   std::optional<diagnosis::EmpiricalDescription> description;
-  if (diagnosis.unexplained && diagnosis.faults.empty()) {
+  if (diagnosis.unexplained) {
     description = diagnosis::describe_empirically(data, diagnosis, arguments.false_alarm_rate);
   }
   if (arguments.json) {

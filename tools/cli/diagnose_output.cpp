@@ -46,6 +46,9 @@ std::string diagnosis_text(const diagnosis::Diagnosis& d) {
   for (const auto& f : d.faults) {
     text += fmt::format("data fault: {}: {} (first: sample {})\n", f.id, f.words, f.first_sample);
   }
+  if (!d.faults.empty()) {
+    return text + "nothing else is concluded from faulty data\n";
+  }
   text += fmt::format("before: NIS {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n", d.before.nis,
                       d.before.largest_sigma, d.before.log_p_white / std::log(10.0));
   text += fmt::format("after:  NIS {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n", d.after.nis,
