@@ -189,7 +189,7 @@ class Score:
 
     def strengths(self):
         groups = collections.defaultdict(list)
-        drawn = self.of("range")
+        drawn = [(c, a) for c, a in self.of("range") if c["effects"][0]["sigmas"] >= 5.9]   # some cannot be made so strong
         for c, a in self.of("single", "invisible"):
             s = c["effects"][0]["sigmas"]
             low = max((b for b in (0.0, 0.2, 0.6, 1.8, 5.9, 9.5, 20.0) if s >= b), default=0.0)
@@ -391,7 +391,8 @@ class Score:
                 continue
             rightly = self.judged(c, a) in ("right", "class")
             stated = [(v - t) / s for v, t, s in zip(a["value"], c["truth"], a["sigma"])]
-            for of, chosen in (("all", True), ("rightly named", rightly)):
+            alone = rightly and len(class_of(a["findings"][0])) == 1
+            for of, chosen in (("all", True), ("rightly named", rightly), ("rightly named, no other in its class", alone)):
                 if chosen:
                     sizes[of, "known before"] += errors(c, a["value_without"])
                     sizes[of, "known"] += errors(c, a["value"])
@@ -400,7 +401,7 @@ class Score:
                     sizes[of, "stated"] += stated
         self.say()
         self.say("error of the 24, 6 sigma and more, rms over (median of the sizes; one normal error: 0.67)")
-        for of in ("all", "rightly named"):
+        for of in ("all", "rightly named", "rightly named, no other in its class"):
             told = {k: f"{rms(v):.2f} ({middle(v):.2f})" for (o, k), v in sizes.items() if o == of}
             if told:
                 self.say(f"  {of}: bound with all of the effect's coefficients unknown: before "
