@@ -96,10 +96,10 @@ double relative_density_sigma(const CalibrationResult& calibration, bool gyro) {
   return std::max(least, 1.0 / std::sqrt(21.0 * pieces));
 }
 
-// Densities, quanta and lines against what the simulation assumes. Densities and quanta are judged beyond 5 sigma: their
-// sigma is that of a fit to smoothed spectra, and good to some tens of per cent itself.
-void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, const AssumedNoise& assumed, double log_threshold,
-                 std::vector<Finding>& findings) {
+// Densities (`fitted`), quanta and lines against what the simulation assumes. Densities and quanta are judged beyond 5 sigma:
+// their sigma is that of a fit to smoothed spectra, and good to some tens of per cent itself.
+void judge_noise(const CalibrationResult& calibration, const NoiseModel& fitted, const NoiseCheck& noise,
+                 const AssumedNoise& assumed, double log_threshold, std::vector<Finding>& findings) {
   if (noise.pieces < 20) {
     return;
   }
@@ -113,9 +113,9 @@ void judge_noise(const CalibrationResult& calibration, const NoiseCheck& noise, 
     level.equation = "white noise of another density";
     coarse.effect = "quantisation";
     coarse.equation = "white noise of the integral of another size: quantum = sqrt(12) times";
-    // Densities are those of the calibration, mean of the axes: a coarse quantum at a slow rate is far from white,
+    // Densities are those of the filter, mean of the axes: a coarse quantum at a slow rate is far from white,
     // and a fit to the whole spectrum of one axis takes it for noise.
-    const double density = gyro ? calibration.gyro_arw : calibration.accel_vrw;
+    const double density = gyro ? fitted.gyro_arw : fitted.accel_vrw;
     const double density_sigma = relative_density_sigma(calibration, gyro);
     const double z = (density / expected - 1.0) / density_sigma;
     // On a moored base the gyros' density hides behind the motion.
@@ -294,7 +294,7 @@ void Diagnoser::decide(const Naming& naming) {
   // A name that leaves something behind is the best fitting, not the truth.
   std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;
   destination.insert(destination.end(), named.begin(), named.end());
-  judge_noise(d_.calibration, d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
+  judge_noise(d_.calibration, naming.noise(), d_.noise, options_.assumed, std::log(share_noise * alpha), d_.findings);
   d_.value = naming.value();
   d_.value_as_named = naming.value_as_named();
   d_.covariance = naming.covariance();

@@ -59,6 +59,8 @@ class Naming {
   double square_before() const { return square_before_; }
   double square_after() const;
   double rows() const { return evidence_.rows; }
+  // As filtered, beside what is named.
+  const NoiseModel& noise() const { return input_.noise; }
   // Of one test's p, not corrected: as many independent ones as the catalogue and the walks count for share the rate.
   double log_p_limit() const { return log_threshold_ - std::log(independent_tests()); }
   double log_p_white_before() const { return white_before_; }

@@ -14,13 +14,16 @@ constexpr double correlation_s = 1e5;   // of the walk: far beyond any recording
 // Walk of `density` (m/sqrt(s)) as an oscillation that never turns: variance 2 sigma^2 T/decay per interval.
 MotionModel walk(double density) { return {{{0.0, correlation_s, density * std::sqrt(0.5 * correlation_s)}}}; }
 
-// Climbs from `best` along one density after the other, by ever smaller factors; `top` is the value there.
+// Climbs from `best` along one density after the other, by ever smaller factors; `top` is the value there. Velocity and
+// position trade against each other along a ridge: that takes many rounds.
 template <std::size_t N>
 void climb(NoiseDensities& best, double& top, const std::array<double, N>& steps,
            const std::function<double(const NoiseDensities&)>& log_likelihood) {
-  constexpr int rounds = 2;
+  constexpr int most_rounds = 20;
   for (const double step : steps) {
-    for (int round = 0; round < rounds; ++round) {
+    double before = -HUGE_VAL;
+    for (int round = 0; round < most_rounds && top > before; ++round) {
+      before = top;
       for (double& value : best) {
         for (const double factor : {1.0 / step, step}) {
           const double start = value;
