@@ -20,7 +20,7 @@ namespace {
 constexpr double share_names = 0.45, share_map = 0.1, share_structure = 0.1, share_white = 0.1, share_size = 0.1,
                  share_noise = 0.15;
 constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
-constexpr double remainder_rate = 0.01;        // and by map, whiteness and size, and by biases that they have no part in
+constexpr double remainder_rate = 0.01;        // and by map, whiteness and size
 constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
 constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
 
@@ -170,14 +170,17 @@ void judge_noise(const CalibrationResult& calibration, const NoiseModel& fitted,
 
 }  // namespace
 
-Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted) {
+Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted,
+                  double alpha_elsewhere) {
   Adequacy a;
   a.nis = square / rows;
   a.log_p_white = log_p_white;
   a.largest_sigma = map.largest_sigma;
   a.misfit = std::max(0.0, square - rows);
-  const bool map_good = log_corrected(log_normal_tail(map.largest_sigma), std::max(1, map.tests)) >
-                        std::log(share_map * alpha);
+  const auto good = [&](double sigma, double rate) {
+    return log_corrected(log_normal_tail(sigma), std::max(1, map.tests)) > std::log(share_map * rate);
+  };
+  const bool map_good = good(map.largest_named_sigma, alpha) && good(map.largest_sigma, std::min(alpha, alpha_elsewhere));
   // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
   const bool white = motion_fitted || log_p_white > std::log(share_white * alpha);
   const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
@@ -255,9 +258,8 @@ void Diagnoser::decide(const Naming& naming) {
   d_.before = adequacy(naming.square_before(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_before(),
                        naming.map_before(), alpha, d_.calibration.moored);
   const bool nothing_found = naming.chosen().empty() && naming.walks().empty();
-  const double of_remainder = nothing_found ? alpha : std::max(alpha, remainder_rate);
-  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after, of_remainder,
-                      d_.calibration.moored);
+  d_.after = adequacy(naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(), after,
+                      nothing_found ? alpha : std::max(alpha, remainder_rate), d_.calibration.moored, alpha);
   if (!nothing_found || !d_.before.accepted) {
     const Naming::ByQuantity by = naming.locate_by_quantities();
     d_.located_by = by.before;
@@ -281,7 +283,7 @@ void Diagnoser::decide(const Naming& naming) {
     const Naming::Structure left = naming.structure();
     d_.after.log_p_structure = left.log_p();
     d_.after.accepted = d_.after.accepted && left.log_p_named > std::log(rejection_rate) &&
-                        left.log_p_elsewhere > std::log(share_structure * of_remainder);
+                        left.log_p_elsewhere > std::log(share_structure * alpha);
   }
   // Beside an effect of hundreds of sigma the linearisation leaves a thousandth of it: not worth a verdict.
   constexpr double numerical_share = 1e-3;

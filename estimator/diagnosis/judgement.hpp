@@ -9,7 +9,9 @@ namespace selfcal::diagnosis {
 Finding describe(const Chosen& chosen, double rows);
 Finding describe(const WalkTest& walk, double rows);
 
-// `alpha`: false-alarm rate of the whole recording. `motion_fitted`: of a moored base.
-Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted);
+// `alpha`: false-alarm rate of the whole recording; `alpha_elsewhere`: of places that the names have no part in, if less.
+// `motion_fitted`: of a moored base.
+Adequacy adequacy(double square, double rows, double log_p_white, const Map& map, double alpha, bool motion_fitted,
+                  double alpha_elsewhere = 1.0);
 
 }  // namespace selfcal::diagnosis

@@ -60,14 +60,19 @@ Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_m
            const std::vector<int>& fitted) {
   Map result;
   const SingleTest test(e, fitted);
+  const Eigen::VectorXd sizes = e.fit(fitted).value;
   for (std::size_t k = 0; k < map.size(); ++k) {
-    const auto bias = test(first_map_column + static_cast<int>(k));
+    const int column = first_map_column + static_cast<int>(k);
+    const auto bias = test(column);
     if (!bias) {
       continue;
     }
     ++result.tests;
     const double significance = std::abs(bias->z);
     result.largest_sigma = std::max(result.largest_sigma, significance);
+    if (square_within(e, {column}, fitted, sizes) >= significance * significance) {
+      result.largest_named_sigma = std::max(result.largest_named_sigma, significance);
+    }
     if (significance < least_sigma) {
       continue;
     }

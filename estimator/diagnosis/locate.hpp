@@ -45,6 +45,7 @@ class SingleTest {
 struct Map {
   std::vector<Located> places;     // largest first, those above 3 sigma (at most 12)
   double largest_sigma = 0.0;
+  double largest_named_sigma = 0.0;   // of places where what is fitted makes at least as much as is left
   int tests = 0;
 };
 
