@@ -49,6 +49,7 @@ const std::vector<Effect>& catalogue() {
       accel_cross_coupling(),
       base_settling(),
       base_sway(),
+      wrong_site(),
   };
   return all;
 }

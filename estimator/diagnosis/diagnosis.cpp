@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <span>
 
 #include "estimator/diagnosis/catalogue.hpp"
@@ -192,6 +193,15 @@ Adequacy adequacy(double square, double rows, double log_p_white, const Map& map
 
 namespace {
 
+DataFault wrong_latitude(const Chosen& chosen, const ImuData& data) {
+  const double unit = chosen.candidate.effect->parameters.front().typical;
+  const double stated = data.site.latitude / units::degree;
+  char words[160];
+  std::snprintf(words, sizeof words, "the Earth's rate as sensed stands as at latitude %.3f +- %.3f deg, the site's is %.3f deg",
+                stated + chosen.size(0) * unit, std::sqrt(chosen.covariance(0, 0)) * unit, stated);
+  return {"wrong_site", words, 0, data.size()};
+}
+
 class Diagnoser {
  public:
   Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
@@ -267,6 +277,11 @@ void Diagnoser::decide(const Naming& naming) {
   }
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
+    if (c.candidate.effect->id == "wrong_site" && d_.after.accepted) {
+      d_.faults.push_back(wrong_latitude(c, data_));
+      leave_unjudged();
+      return;
+    }
     named.push_back(describe(c, naming.rows()));
     d_.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
   }

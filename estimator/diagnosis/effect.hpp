@@ -28,7 +28,7 @@ struct EffectContext {
   double outer = NAN, inner = NAN;       // gimbal read-outs at the middle, rad; NaN: none
   double temperature = NAN;              // less its mean over the recording, degC; NaN: no channel
   Vector3 field_b;                       // magnetic field of an axial dipole Earth, gauss
-  Vector3 earth_rate_b;                  // direction of the Earth's rate, unit length
+  Vector3 earth_rate_b = Vector3::Zero();   // direction of the Earth's rate, unit length; zero: not known
 };
 
 struct EffectParameter {

@@ -30,5 +30,6 @@ Effect triad_flexure();
 Effect accel_cross_coupling();
 Effect base_settling();
 Effect base_sway();
+Effect wrong_site();
 
 }  // namespace selfcal::diagnosis
