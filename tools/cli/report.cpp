@@ -67,7 +67,9 @@ Expected<Json> diagnosis_document(const Recording& recording, const std::string&
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, outcome.failure));
   }
   Json document = diagnosis_json(*outcome.diagnosis, false_alarm_rate);
-  document["map"] = report::misfit_map(data, *outcome.diagnosis);
+  if (outcome.diagnosis->faults.empty()) {
+    document["map"] = report::misfit_map(data, *outcome.diagnosis);
+  }
   return document;
 }
 

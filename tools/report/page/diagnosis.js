@@ -102,10 +102,9 @@ function showDiagnosis(report) {
   if (d.data_faults.length > 0) {
     add('Faults of the data', element('ul', {}, ...d.data_faults.map(
         (f) => element('li', {class: 'bad'}, `${f.words} (first at sample ${f.first_sample}, ${f.count} in all)`))));
+    return;
   }
-  if (d.data_faults.length === 0) {
-    add('Before and after', adequacyTable(d.adequacy));
-  }
+  add('Before and after', adequacyTable(d.adequacy));
   if (d.findings.length > 0) {
     add('Effects left out, best first', findingsTable(d.findings, 'findings'));
   }
