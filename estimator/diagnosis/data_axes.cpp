@@ -183,39 +183,60 @@ std::vector<Rest> rests(const ImuData& data, const std::vector<Segment>& segment
   return all;
 }
 
+// rms over g of how gravity, turned back by the gyros, differs from one dwell to the next.
+double gravity_scatter(const std::vector<Rest>& dwells, const AxisOrder& order) {
+  double differences = 0.0, square = 0.0;
+  for (std::size_t k = 1; k < dwells.size(); ++k) {
+    const Vector3 before = dwells[k - 1].C_ib * order.truth(dwells[k - 1].force);
+    differences += 0.5 * (dwells[k].C_ib * order.truth(dwells[k].force) - before).squaredNorm();
+    square += dwells[k].force.squaredNorm();
+  }
+  return std::sqrt(differences / square);
+}
+
+// With the least scatter; gravity and its opposite are as steady: of each pair the one with fewer changes of sign.
+AxisOrder steadiest(const std::vector<Rest>& dwells) {
+  double least = HUGE_VAL;
+  AxisOrder best;
+  for (const AxisOrder& order : all_orders()) {
+    const auto minus = std::count(order.sign.begin(), order.sign.end(), -1);
+    const double found = gravity_scatter(dwells, order) + 1e-9 * static_cast<double>(minus);
+    if (found < least) {
+      least = found;
+      best = order;
+    }
+  }
+  return best;
+}
+
+bool upside_down(const ImuData& data, const std::vector<Segment>& segments) {
+  double up = 0.0;
+  int dwells = 0;
+  for (const Segment& s : segments) {
+    const std::size_t middle = (s.first + s.last) / 2;
+    if (!s.rotation) {
+      const Matrix3 C_vb = gimbal_matrix(data.gimbal_outer[middle], data.gimbal_inner[middle]);
+      up += (C_vb * Eigen::Map<const Vector3>(data.delta_v[middle].data()))(1) * data.sample_rate_hz;
+      ++dwells;
+    }
+  }
+  return dwells > 0 && up / dwells < -0.5 * units::standard_gravity;
+}
+
 // Gravity, turned back by the gyros, must point the same way in one dwell and the next, but for the 15 deg/h of the Earth;
 // by the gimbal, where there is one, upwards. Whether the accelerometers' axes are right.
 bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segments, const std::vector<Rest>& dwells,
                           std::vector<DataFault>& faults) {
-  constexpr double inconsistent = 0.15;   // rms over g: half an hour on the Earth, a gimbal off by degrees
+  constexpr double inconsistent = 0.15;   // half an hour on the Earth, a gimbal off by degrees
   constexpr double far_better = 0.3, longest_s = 1200.0;
   const double each_s = (data.time_s.back() - data.time_s.front()) / static_cast<double>(dwells.size());
   if (dwells.size() < 2 || each_s > longest_s) {
     return true;
   }
-  const auto scatter = [&](const AxisOrder& order) {
-    double differences = 0.0, square = 0.0;
-    for (std::size_t k = 1; k < dwells.size(); ++k) {
-      differences += 0.5 * (dwells[k].C_ib * order.truth(dwells[k].force) -
-                            dwells[k - 1].C_ib * order.truth(dwells[k - 1].force)).squaredNorm();
-      square += dwells[k].force.squaredNorm();
-    }
-    return std::sqrt(differences / square);
-  };
-  const double as_given = scatter({});
+  const double as_given = gravity_scatter(dwells, {});
   if (as_given > inconsistent) {
-    double least = as_given;
-    AxisOrder best;
-    for (const AxisOrder& order : all_orders()) {
-      // Gravity and its opposite are as steady: of each pair the one with fewer changes of sign.
-      const int minus = (order.sign[0] < 0) + (order.sign[1] < 0) + (order.sign[2] < 0);
-      const double found = scatter(order) + 1e-9 * minus;
-      if (found < least) {
-        least = found;
-        best = order;
-      }
-    }
-    if (least < far_better * as_given) {
+    const AxisOrder best = steadiest(dwells);
+    if (gravity_scatter(dwells, best) < far_better * as_given) {
       faults.push_back(wrong_order("accelerometers", best, ", by where gravity points after the turns", data.size()));
     } else {
       faults.push_back({"wrong_axes", number("accelerometers against gyros: gravity wanders by %.0f deg from dwell to dwell",
@@ -223,18 +244,8 @@ bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segme
     }
     return false;
   }
-  if (data.gimbal_outer.empty() || data.gimbal_inner.empty()) {
-    return true;
-  }
-  double up = 0.0;
-  for (const Segment& s : segments) {
-    const std::size_t middle = (s.first + s.last) / 2;
-    if (!s.rotation) {
-      const Matrix3 C_vb = gimbal_matrix(data.gimbal_outer[middle], data.gimbal_inner[middle]);
-      up += (C_vb * Eigen::Map<const Vector3>(data.delta_v[middle].data()))(1) * data.sample_rate_hz;
-    }
-  }
-  if (up / static_cast<double>(dwells.size()) < -0.5 * units::standard_gravity) {
+  const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
+  if (gimbal && upside_down(data, segments)) {
     faults.push_back(wrong_order("accelerometers", {{0, 1, 2}, {-1, -1, -1}}, ": the base would be upside down", data.size()));
     return false;
   }
@@ -243,57 +254,62 @@ bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segme
 
 // ---- site
 
+struct SensedEarth {
+  Vector3 drift;
+  double latitude = 0.0, sigma = 0.0;   // rad; of the scatter from dwell to dwell
+};
+
 // Mean rates of dwells are w_k = C_k' w + drift, w the Earth's in space; with gravity's direction in the same dwell the
-// latitude is the arc sine of their product.
-void latitude_by_gyros(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  constexpr double earth_rate = earth::rotation_rate;
-  constexpr double steady = 0.05;                       // of it: a base that sways is no place to tell
-  constexpr double plausible = 0.5 * units::degree, sigmas = 6.0;
+// latitude is the arc sine of their product. None where dwells are few or alike, or the base sways.
+std::optional<SensedEarth> sense_earth(const std::vector<Rest>& dwells) {
   constexpr std::size_t enough = 6;
-  Vector3 drift = Vector3::Zero();
-  double latitude = 0.0, sigma = HUGE_VAL;
-  for (int round = 0; round < 3; ++round) {
-    const std::vector<Rest> dwells = rests(data, segments, drift);
-    if (dwells.size() < enough) {
-      return;
-    }
-    Matrix6 normal = Matrix6::Zero();
-    Vector6 right = Vector6::Zero();
-    for (const Rest& r : dwells) {
-      Eigen::Matrix<double, 3, 6> row;
-      row << r.C_ib.transpose(), Matrix3::Identity();
-      normal += row.transpose() * row;
-      right += row.transpose() * r.rate;
-    }
-    constexpr double told_apart = 0.1;
-    const Eigen::SelfAdjointEigenSolver<Matrix6> solver(normal);
-    if (solver.eigenvalues()(0) < told_apart * static_cast<double>(dwells.size())) {
-      return;
-    }
-    const Vector6 fit = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
-                        (solver.eigenvectors().transpose() * right);
-    drift = fit.tail<3>();
-    const Vector3 axis = fit.head<3>().normalized();
-    double misfit = 0.0, sum = 0.0, square = 0.0;
-    for (const Rest& r : dwells) {
-      misfit += (r.rate - r.C_ib.transpose() * fit.head<3>() - drift).squaredNorm();
-      const double angle = std::asin(std::clamp((r.C_ib.transpose() * axis).dot(r.force.normalized()), -1.0, 1.0));
-      sum += angle;
-      square += angle * angle;
-    }
-    const auto n = static_cast<double>(dwells.size());
-    const double rms = std::sqrt(misfit / n);
-    if (rms > steady * earth_rate || std::abs(fit.head<3>().norm() / earth_rate - 1.0) > steady) {
-      return;
-    }
-    latitude = sum / n;
-    // Of the product's scatter, and of the Earth's rate in the mean of the dwells.
-    sigma = std::sqrt(std::max(0.0, square / n - latitude * latitude) / n + rms * rms / (earth_rate * earth_rate * n));
+  constexpr double told_apart = 0.1;                    // of the information that dwells all about have
+  constexpr double steady = 0.05 * earth::rotation_rate;
+  Matrix6 normal = Matrix6::Zero();
+  Vector6 right = Vector6::Zero();
+  for (const Rest& r : dwells) {
+    Eigen::Matrix<double, 3, 6> row;
+    row << r.C_ib.transpose(), Matrix3::Identity();
+    normal += row.transpose() * row;
+    right += row.transpose() * r.rate;
   }
-  if (std::abs(latitude - data.site.latitude) > std::max(plausible, sigmas * sigma)) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solver(normal);
+  const auto n = static_cast<double>(dwells.size());
+  if (dwells.size() < enough || solver.eigenvalues()(0) < told_apart * n) {
+    return std::nullopt;
+  }
+  const Vector6 fit = solver.eigenvectors() * solver.eigenvalues().cwiseInverse().asDiagonal() *
+                      (solver.eigenvectors().transpose() * right);
+  const Vector3 rate = fit.head<3>();
+  SensedEarth sensed{fit.tail<3>()};
+  double misfit = 0.0, square = 0.0;
+  for (const Rest& r : dwells) {
+    const Vector3 own = r.C_ib.transpose() * rate;
+    misfit += (r.rate - own - sensed.drift).squaredNorm() / n;
+    const double angle = std::asin(std::clamp(own.normalized().dot(r.force.normalized()), -1.0, 1.0));
+    sensed.latitude += angle / n;
+    square += angle * angle / n;
+  }
+  if (misfit > steady * steady || std::abs(rate.norm() - earth::rotation_rate) > steady) {
+    return std::nullopt;
+  }
+  const double scatter = std::max(0.0, square - sensed.latitude * sensed.latitude);
+  sensed.sigma = std::sqrt((scatter + misfit / (earth::rotation_rate * earth::rotation_rate)) / n);
+  return sensed;
+}
+
+void latitude_by_gyros(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  constexpr double plausible = 0.5 * units::degree, sigmas = 6.0;
+  constexpr int rounds = 3;                             // a drift of 1 deg/h turns the attitude by as much
+  std::optional<SensedEarth> sensed = SensedEarth{Vector3::Zero()};
+  for (int round = 0; round < rounds && sensed; ++round) {
+    sensed = sense_earth(rests(data, segments, sensed->drift));
+  }
+  if (sensed && std::abs(sensed->latitude - data.site.latitude) > std::max(plausible, sigmas * sensed->sigma)) {
     faults.push_back({"wrong_site", number("gravity and the Earth's rate as sensed stand as at latitude %.2f deg (+- %.2f), the "
-                                           "site's is %.2f deg", latitude / units::degree, sigma / units::degree,
-                                           data.site.latitude / units::degree), 0, data.size()});
+                                           "site's is %.2f deg", sensed->latitude / units::degree,
+                                           sensed->sigma / units::degree, data.site.latitude / units::degree),
+                      0, data.size()});
   }
 }
 
