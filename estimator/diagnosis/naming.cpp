@@ -259,7 +259,7 @@ bool Naming::add_best() {
     });
     const bool same = std::any_of(chosen_.begin(), chosen_.end(),
                                   [&](const Chosen& x) { return x.candidate.first == c.first; });
-    if (taken || same) {
+    if (taken || same || fell(c)) {
       continue;
     }
     const GroupTest test = test_group(evidence_, columns_of(c), others);
@@ -321,10 +321,19 @@ bool Naming::add_best() {
   return true;
 }
 
+// What fell once is not taken again: what was seen may be another's, and it would fall and be taken for ever.
+bool Naming::fell(const Candidate& candidate) const {
+  return std::any_of(fallen_.begin(), fallen_.end(), [&](const Candidate& f) {
+    const bool line = f.effect->constants.empty();   // of a sway, one of several
+    return f.effect == candidate.effect && (!line || f.first == candidate.first);
+  });
+}
+
 bool Naming::drop_weak() {
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     const GroupTest test = test_group(evidence_, columns_of(chosen_[i].candidate), chosen_columns(i));
     if (corrected(test.log_detection, chosen_[i].candidate.effect->id) > log_threshold_) {
+      fallen_.push_back(chosen_[i].candidate);
       chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(i));
       relinearise();
       return true;

@@ -93,6 +93,7 @@ class Naming {
   void refine_constant(Chosen& chosen);
   bool add_best();
   bool drop_weak();
+  bool fell(const Candidate& candidate) const;
   bool exchange();
   void sharpen_observation();
   void refit_noise();
@@ -117,6 +118,7 @@ class Naming {
   SignatureRows rows_;
   Evidence evidence_;                  // with what the correction took out added back, walks integrated out
   std::vector<Chosen> chosen_;
+  std::vector<Candidate> fallen_;      // chosen once, too weak beside others
   std::vector<WalkTest> walks_;
   std::vector<Suspect> prospects_;
   Map map_before_;
