@@ -121,10 +121,10 @@ std::vector<Candidate> quantity_bins(const RecordingContext& context) {
     const auto [least, most] = std::minmax_element(data.temperature.begin(), data.temperature.end());
     const double low = *least - context.mean_temperature(), high = *most - context.mean_temperature();
     for (const TemperatureBins& t : temperatures()) {
-      const double first = std::floor(low / t.width_c), last = std::floor(high / t.width_c);
+      const auto first = static_cast<int>(std::floor(low / t.width_c)), last = static_cast<int>(std::floor(high / t.width_c));
       if (last - first < most_temperature_bins) {
-        for (double k = first; k <= last; k += 1.0) {
-          bins.push_back({&t.effect, k, 0, 0});
+        for (int k = first; k <= last; ++k) {
+          bins.push_back({&t.effect, static_cast<double>(k), 0, 0});
         }
         break;
       }
