@@ -20,10 +20,16 @@ namespace fs = std::filesystem;
 // So that the quota may take either run's file without the other's.
 Expected<void> keep_copy(const fs::path& from, const fs::path& to) {
   std::error_code error;
-  if (fs::exists(to, error)) return {};   // of an attempt before the daemon was restarted
+  if (fs::exists(to, error)) {
+    return {};  // of an attempt before the daemon was restarted
+  }
   fs::create_hard_link(from, to, error);
-  if (error) fs::copy_file(from, to, error);
-  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", to.string(), error.message()));
+  if (error) {
+    fs::copy_file(from, to, error);
+  }
+  if (error) {
+    return fail(ErrorKind::device, fmt::format("{}: {}", to.string(), error.message()));
+  }
   return {};
 }
 
@@ -39,11 +45,13 @@ CalibrationResult amended_result(const diagnosis::Diagnosis& diagnosis, const Ca
   consistency.nis_mean = diagnosis.after.nis;
   consistency.whiteness_p_value = std::exp(diagnosis.after.log_p_white);
   std::vector<std::string> names;
-  for (const diagnosis::Finding& finding : diagnosis.findings) names.push_back(finding.effect);
-  consistency.words = fmt::format("With {} fitted too the recording and the model {}: NIS {:.3f}, before {:.3f}.",
-                                  names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", ")),
-                                  diagnosis.after.accepted ? "agree" : "disagree still", diagnosis.after.nis,
-                                  diagnosis.before.nis);
+  for (const diagnosis::Finding& finding : diagnosis.findings) {
+    names.push_back(finding.effect);
+  }
+  consistency.words =
+      fmt::format("With {} fitted too the recording and the model {}: NIS {:.3f}, before {:.3f}.",
+                  names.empty() ? "nothing" : fmt::format("{}", fmt::join(names, ", ")),
+                  diagnosis.after.accepted ? "agree" : "disagree still", diagnosis.after.nis, diagnosis.before.nis);
   return result;
 }
 
@@ -53,9 +61,9 @@ std::vector<std::string> diagnosis_objections(const diagnosis::Diagnosis& diagno
     found.push_back(fmt::format("data fault in run {}: {}", amends, fault.words));
   }
   if (diagnosis.unexplained) {
-    found.push_back(fmt::format("nothing in the catalogue explains run {}: {}", amends,
-                                diagnosis.remaining.empty() ? "what remains is not white"
-                                                            : diagnosis.remaining.front().words));
+    found.push_back(
+        fmt::format("nothing in the catalogue explains run {}: {}", amends,
+                    diagnosis.remaining.empty() ? "what remains is not white" : diagnosis.remaining.front().words));
   } else if (diagnosis.model.empty()) {
     found.push_back(fmt::format("nothing to amend: no equation was named in run {}", amends));
   }
@@ -68,7 +76,9 @@ std::string story(const diagnosis::Finding& finding) {
   for (const diagnosis::FindingParameter& p : finding.parameters) {
     text += fmt::format(" {} {:.4g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
   }
-  if (!finding.equivalent.empty()) text += fmt::format("; or {}", fmt::join(finding.equivalent, ", "));
+  if (!finding.equivalent.empty()) {
+    text += fmt::format("; or {}", fmt::join(finding.equivalent, ", "));
+  }
   return text;
 }
 
@@ -76,7 +86,9 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
                                  const std::stop_token& stop) {
   const auto begun = std::chrono::steady_clock::now();
   const auto loaded = read_kept_recording(request.recording);
-  if (!loaded) return tl::unexpected(loaded.error());
+  if (!loaded) {
+    return tl::unexpected(loaded.error());
+  }
   if (auto kept = keep_copy(request.recording, recording_path(request.folder)); !kept) {
     return tl::unexpected(kept.error());
   }
@@ -86,7 +98,7 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
   options.calibration = calibration_options(request.config);
   options.stop = stop;
   CalibrationProgress step;
-  step.value.setZero();   // the diagnosis has no estimate to show on its way
+  step.value.setZero();  // the diagnosis has no estimate to show on its way
   step.sigma.setZero();
   diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, options, [&](const std::string&) {
     ++step.pass;
@@ -112,7 +124,9 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
   estimate.objections = diagnosis_objections(diagnosis, request.amends);
   const std::vector<std::string> further = gate_objections(estimate.result, request.config);
   estimate.objections.insert(estimate.objections.end(), further.begin(), further.end());
-  for (const diagnosis::Finding& finding : diagnosis.findings) estimate.notes.push_back(story(finding));
+  for (const diagnosis::Finding& finding : diagnosis.findings) {
+    estimate.notes.push_back(story(finding));
+  }
   estimate.recording = recording_path(request.folder).string();
   nlohmann::ordered_json document = result_json(estimate.result, options, recording, {});
   document["acceptable"] = estimate.objections.empty();

@@ -11,9 +11,9 @@
 namespace selfcal {
 
 struct AmendmentRequest {
-  RunId amends = 0;                    // the run whose recording it is
-  std::filesystem::path recording;     // of that run
-  std::filesystem::path folder;        // of this run; gets a recording of its own (a link, where the disk can)
+  RunId amends = 0;                 // the run whose recording it is
+  std::filesystem::path recording;  // of that run
+  std::filesystem::path folder;     // of this run; gets a recording of its own (a link, where the disk can)
   InsConfig config;
 };
 

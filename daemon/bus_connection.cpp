@@ -16,8 +16,12 @@ Expected<std::unique_ptr<sdbus::IConnection>> open_bus(const std::string& config
   const char* chosen = std::getenv(operator_api::bus_variable);
   const std::string bus = chosen != nullptr && *chosen != '\0' ? chosen : configured;
   try {
-    if (bus == "system") return sdbus::createSystemBusConnection();
-    if (bus == "session") return sdbus::createSessionBusConnection();
+    if (bus == "system") {
+      return sdbus::createSystemBusConnection();
+    }
+    if (bus == "session") {
+      return sdbus::createSessionBusConnection();
+    }
     return sdbus::createSessionBusConnectionWithAddress(bus);
   } catch (const sdbus::Error& error) {
     return fail(ErrorKind::device, fmt::format("D-Bus ({}): {}", bus, error.getMessage()));
@@ -39,14 +43,20 @@ BusPump::~BusPump() {
 }
 
 void BusPump::serve() {
-  if (lost_) return;
+  if (lost_) {
+    return;
+  }
   try {
     while (connection_.processPendingRequest()) {
     }
     const auto poll = connection_.getEventLoopPollData();
     unsigned events = 0;
-    if ((poll.events & POLLIN) != 0) events |= EPOLLIN;
-    if ((poll.events & POLLOUT) != 0) events |= EPOLLOUT;
+    if ((poll.events & POLLIN) != 0) {
+      events |= EPOLLIN;
+    }
+    if ((poll.events & POLLOUT) != 0) {
+      events |= EPOLLOUT;
+    }
     io_->want(events);
     loop_.cancel(timer_);
     timer_ = 0;

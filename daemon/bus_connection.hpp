@@ -1,9 +1,9 @@
 // The D-Bus connection on the daemon's own loop: no second thread.
 #pragma once
 
+#include <sdbus-c++/sdbus-c++.h>
 #include <functional>
 #include <memory>
-#include <sdbus-c++/sdbus-c++.h>
 #include <string>
 
 #include "daemon/event_loop.hpp"
@@ -19,7 +19,7 @@ class BusPump {
  public:
   BusPump(EventLoop& loop, sdbus::IConnection& connection, std::function<void()> on_lost);
   ~BusPump();
-  void serve();   // after anything was sent or may have arrived
+  void serve();  // after anything was sent or may have arrived
 
  private:
   EventLoop& loop_;

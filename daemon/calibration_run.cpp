@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto report_interval = 200ms;
-constexpr auto bus_event_interval = 10s;   // the same is not said more often
+constexpr auto bus_event_interval = 10s;  // the same is not said more often
 
 // What an operator should know at once; the rest is for the story of the run.
 bool alarming(can::BusEvent event) {
@@ -27,8 +27,8 @@ journal::Fields journal_fields(const RunRecord& run) {
 
 }  // namespace
 
-CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule schedule, UnlockKey key,
-                               RunRecord record, std::filesystem::path folder)
+CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule schedule, UnlockKey key, RunRecord record,
+                               std::filesystem::path folder)
     : context_(context),
       config_(std::move(config)),
       schedule_(std::move(schedule)),
@@ -58,7 +58,9 @@ void CalibrationRun::begin() { post(Event::begin); }
 
 void CalibrationRun::resume() {
   remember("resume", fmt::format("the daemon was restarted while {}", words(record_.state)));
-  if (const auto kept = context_.store.set(record_.id, SetRole::written); kept && *kept) new_set_ = **kept;
+  if (const auto kept = context_.store.set(record_.id, SetRole::written); kept && *kept) {
+    new_set_ = **kept;
+  }
   // Estimating and judging need no INS, only the pages on disk.
   if (record_.state == State::estimating || record_.state == State::judging) {
     record_.state = State::estimating;
@@ -69,7 +71,9 @@ void CalibrationRun::resume() {
 }
 
 void CalibrationRun::abort(const std::string& reason) {
-  if (record_.abort_wanted || is_final(record_.state)) return;
+  if (record_.abort_wanted || is_final(record_.state)) {
+    return;
+  }
   const Transition* row =
       find_transition(record_.state, Event::abort_requested, [this](Guard guard) { return holds(guard); });
   // Declined without an event: the step under way is not to be broken off.
@@ -78,7 +82,9 @@ void CalibrationRun::abort(const std::string& reason) {
   }
   record_.abort_wanted = true;
   remember("operator", reason);
-  if (record_.reason.empty()) record_.reason = reason;
+  if (record_.reason.empty()) {
+    record_.reason = reason;
+  }
   // At once, so that it is stored before the operator is told: a daemon that is killed now must not forget it. What the
   // step had to say meanwhile is dropped with the step.
   context_.timers.cancel(event_timer_);
@@ -101,12 +107,18 @@ void CalibrationRun::post(Event event) {
 
 void CalibrationRun::fire(Event event) {
   const Transition* row = find_transition(record_.state, event, [this](Guard guard) { return holds(guard); });
-  if (row == nullptr) return;   // late: the state it belongs to has been left
+  if (row == nullptr) {
+    return;  // late: the state it belongs to has been left
+  }
   const State from = record_.state;
   record_.state = row->next;
-  if (is_final(row->next)) close_record();
+  if (is_final(row->next)) {
+    close_record();
+  }
   if (auto stored = context_.store.update_run(record_); !stored) {
-    if (!storage_lost_) return storage_failed(stored.error(), from);
+    if (!storage_lost_) {
+      return storage_failed(stored.error(), from);
+    }
   } else if (row->next != from) {
     remember("state", fmt::format("{}: {}", name(row->next), words(row->next)));
   }
@@ -120,7 +132,9 @@ void CalibrationRun::storage_failed(const Error& error, State from) {
   storage_lost_ = true;
   fail_with(error.message);
   record_.state = gimbal_may_turn(from) ? State::stopping : from;
-  if (record_.state == State::stopping) return perform(Action::stop_gimbal);
+  if (record_.state == State::stopping) {
+    return perform(Action::stop_gimbal);
+  }
   fire(Event::step_failed);
 }
 
@@ -192,22 +206,28 @@ Task<CalibrationRun::Step> CalibrationRun::step(Action action) {
 }
 
 void CalibrationRun::settle(const Step& step) {
-  if (step) return post(*step);
+  if (step) {
+    return post(*step);
+  }
   link_trouble_ = step.error().message;
-  if (step.error().kind == PortError::Kind::link) return post(Event::link_lost);
+  if (step.error().kind == PortError::Kind::link) {
+    return post(Event::link_lost);
+  }
   last_nrc_ = step.error().kind == PortError::Kind::negative ? step.error().nrc : -1;
-  if (session_lost(last_nrc_)) return post(Event::link_lost);
+  if (session_lost(last_nrc_)) {
+    return post(Event::link_lost);
+  }
   fail_with(step.error().message);
   post(Event::step_failed);
 }
 
 // An INS that restarted faster than a request times out shows in what it allows no more.
 bool CalibrationRun::session_lost(int nrc) {
-  constexpr int at_most = 5;   // in one run; more often it is no accident
+  constexpr int at_most = 5;  // in one run; more often it is no accident
   const bool unlocked_before = record_.state != State::connecting && record_.state != State::unlocking;
   const bool forgot = nrc == static_cast<int>(uds::Nrc::service_not_supported_in_session) ||
                       nrc == static_cast<int>(uds::Nrc::security_access_denied) ||
-                      nrc == static_cast<int>(uds::Nrc::request_sequence_error);   // of a transfer it knows nothing of
+                      nrc == static_cast<int>(uds::Nrc::request_sequence_error);  // of a transfer it knows nothing of
   return unlocked_before && forgot && ++sessions_lost_ <= at_most;
 }
 
@@ -242,7 +262,9 @@ void CalibrationRun::conclude() {
 
 void CalibrationRun::remember(const std::string& kind, const std::string& text) {
   journal::write(kind == "error" ? journal::Level::error : journal::Level::info, text, journal_fields(record_));
-  if (storage_lost_) return;
+  if (storage_lost_) {
+    return;
+  }
   if (auto stored = context_.store.add_event(record_.id, {utc_now(), kind, text}); !stored) {
     journal::write(journal::Level::error, stored.error().message, journal_fields(record_));
   }
@@ -255,7 +277,9 @@ void CalibrationRun::warn(const std::string& text) {
 
 void CalibrationRun::report_progress(bool at_once) {
   const SteadyTime now = context_.timers.now();
-  if (!at_once && now - reported_at_ < report_interval) return;
+  if (!at_once && now - reported_at_ < report_interval) {
+    return;
+  }
   reported_at_ = now;
   progress_.lost_frames = context_.port.lost_frames();
   context_.observer.on_progress(record_);
@@ -269,14 +293,20 @@ void CalibrationRun::on_status(const ins::Status& status) {
 }
 
 void CalibrationRun::on_bus_event(can::BusEvent event) {
-  if (is_final(record_.state)) return;
+  if (is_final(record_.state)) {
+    return;
+  }
   BusEventCount& seen = bus_events_[event];
   const SteadyTime now = context_.timers.now();
   const bool first = ++seen.count == 1;
-  if (!first && now - seen.said_at < bus_event_interval) return;
+  if (!first && now - seen.said_at < bus_event_interval) {
+    return;
+  }
   seen.said_at = now;
   std::string text = fmt::format("{}: {}", config_.interface, can::name(event));
-  if (!first) text += fmt::format(", {} times in this run", seen.count);
+  if (!first) {
+    text += fmt::format(", {} times in this run", seen.count);
+  }
   alarming(event) ? warn(text) : remember("bus", text);
 }
 
@@ -285,7 +315,9 @@ void CalibrationRun::sum_up_bus_events() {
   for (const auto& [event, seen] : bus_events_) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", seen.count, can::name(event));
   }
-  if (!text.empty()) remember("bus", fmt::format("{}: error frames in this run: {}", config_.interface, text));
+  if (!text.empty()) {
+    remember("bus", fmt::format("{}: error frames in this run: {}", config_.interface, text));
+  }
 }
 
 std::chrono::nanoseconds CalibrationRun::ins_time(double seconds) const {

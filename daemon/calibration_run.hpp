@@ -23,20 +23,20 @@ namespace selfcal {
 struct RunProgress {
   RunId run = 0;
   State state = State::connecting;
-  ins::Status ins;                     // as last reported
+  ins::Status ins;  // as last reported
   int positions = 0;
   std::uint32_t pages_pulled = 0;
   std::uint32_t pages_expected = 0;
-  std::uint32_t pages_refetched = 0;   // for a wrong CRC
+  std::uint32_t pages_refetched = 0;  // for a wrong CRC
   int pass = 0;
   double pass_fraction = 0.0;
   bool estimate_known = false;
-  std::array<double, sensor_parameter_count> value{}, sigma{}, tolerance{};   // in the unit of sensor_parameters
-  int tolerances_met = 0;              // parameters whose sigma is below its tolerance
-  bool running = false;                // the estimate is one of data that still come
-  double data_s = 0.0;                 // then: it is made of so much
-  double met_at_s = -1.0;              // and every tolerance is foreseen to be met so far into the schedule; -1: not
-  double finish_in_s = -1.0;           // until the rotation ends, on the operator's clock; -1: it does not turn
+  std::array<double, sensor_parameter_count> value{}, sigma{}, tolerance{};  // in the unit of sensor_parameters
+  int tolerances_met = 0;     // parameters whose sigma is below its tolerance
+  bool running = false;       // the estimate is one of data that still come
+  double data_s = 0.0;        // then: it is made of so much
+  double met_at_s = -1.0;     // and every tolerance is foreseen to be met so far into the schedule; -1: not
+  double finish_in_s = -1.0;  // until the rotation ends, on the operator's clock; -1: it does not turn
   bool link_up = true;
   std::uint64_t lost_frames = 0;
 };
@@ -47,7 +47,7 @@ class RunObserver {
   virtual void on_state(const RunRecord& run) = 0;
   virtual void on_progress(const RunRecord& run) = 0;
   virtual void on_warning(const RunRecord& run, const std::string& text) = 0;
-  virtual void on_finished(const RunRecord& run) = 0;   // the run may be destroyed later, from the loop
+  virtual void on_finished(const RunRecord& run) = 0;  // the run may be destroyed later, from the loop
 };
 
 // All that a run needs; outlives it.
@@ -68,8 +68,8 @@ class CalibrationRun {
   CalibrationRun(const CalibrationRun&) = delete;
   CalibrationRun& operator=(const CalibrationRun&) = delete;
 
-  void begin();       // a new run
-  void resume();      // after a restart of the daemon
+  void begin();   // a new run
+  void resume();  // after a restart of the daemon
   void abort(const std::string& reason);
   const RunRecord& record() const { return record_; }
   const RunProgress& progress() const { return progress_; }
@@ -94,7 +94,7 @@ class CalibrationRun {
   void on_status(const ins::Status& status);
   void on_bus_event(can::BusEvent event);
   void sum_up_bus_events();
-  std::chrono::nanoseconds ins_time(double seconds) const;   // real time in which the INS's clock runs so long
+  std::chrono::nanoseconds ins_time(double seconds) const;  // real time in which the INS's clock runs so long
 
   // Steps, in the order of the table; each answers with the event that follows.
   Task<Step> identify();
@@ -117,14 +117,14 @@ class CalibrationRun {
 
   // Parts of steps.
   Task<Answer<Done>> check_serial();
-  Task<Answer<Done>> take_stock();            // the INS's state and the set in force
+  Task<Answer<Done>> take_stock();  // the INS's state and the set in force
   Task<Answer<Done>> look_for_data();
   Task<Answer<Done>> check_space();
   Task<Answer<Done>> poll_state();
   Task<Answer<Done>> open_pages();
   Task<Answer<Done>> pull(std::uint32_t end);  // what is missing below `end`, once
   Task<Answer<Done>> bring_to_rest();
-  Task<Answer<Done>> stop_check();            // whoever began it; without one nothing is done
+  Task<Answer<Done>> stop_check();  // whoever began it; without one nothing is done
   Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
   void note_bad_page(std::uint32_t page, const std::string& why);
   void estimate();
@@ -161,19 +161,19 @@ class CalibrationRun {
     SteadyTime said_at{};
   };
   std::map<can::BusEvent, BusEventCount> bus_events_;
-  std::map<std::uint32_t, int> bad_pages_;    // page, how often it came wrong
+  std::map<std::uint32_t, int> bad_pages_;  // page, how often it came wrong
   std::optional<Error> storage_error_;
   std::optional<Estimate> estimate_;
   std::vector<std::string> objections_;
-  ins::StateRecord stock_;                    // the INS as it was found after recovery
+  ins::StateRecord stock_;  // the INS as it was found after recovery
   std::shared_ptr<RunningEstimator> running_estimator_;
   std::optional<RunningEstimate> running_;
   bool running_busy_ = false;
-  double running_begun_s_ = 0.0;              // of data, when the last one was begun
+  double running_begun_s_ = 0.0;  // of data, when the last one was begun
   SteadyTime running_not_before_{};
-  double page_s_ = 0.0;                       // of data in a full page
+  double page_s_ = 0.0;  // of data in a full page
   bool out_of_reach_said_ = false;
-  Bytes in_force_;                            // coefficient records, as on the bus
+  Bytes in_force_;  // coefficient records, as on the bus
   Bytes new_set_;
   SteadyTime lost_at_{};
   SteadyTime status_at_{};
@@ -182,7 +182,7 @@ class CalibrationRun {
   int failure_status_ = static_cast<int>(ErrorKind::device);
   int last_nrc_ = -1;
   int sessions_lost_ = 0;
-  bool data_complete_ = false;   // the FLASH holds all of the last rotation, whatever the INS has done since
+  bool data_complete_ = false;  // the FLASH holds all of the last rotation, whatever the INS has done since
   bool failed_ = false;
   bool storage_lost_ = false;
 };

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 constexpr std::size_t frames_per_send = 64;
 // Batches taken in one turn of the loop, so that one busy bus does not starve the others.
 constexpr int batches_per_turn = 16;
-constexpr auto full_queue_retry = 1ms;   // ENOBUFS has no event
+constexpr auto full_queue_retry = 1ms;  // ENOBUFS has no event
 
 isotp::Options transport_options(const InsConfig& config) {
   isotp::Options options;
@@ -54,7 +54,9 @@ void CanPort::open() {
     options.filters.push_back({id, exact, config_.extended_ids});
   }
   auto socket = can::Socket::open(options);
-  if (!socket) return down(socket.error());
+  if (!socket) {
+    return down(socket.error());
+  }
   socket_ = std::move(*socket);
   trouble_.clear();
   io_ = std::make_unique<EventLoop::Io>(loop_, socket_->fd(), EPOLLIN, [this](unsigned) { on_readable(); });
@@ -65,10 +67,14 @@ void CanPort::open() {
 void CanPort::down(const Error& error) {
   trouble_ = error.message;
   // The watch goes with the next reopening: it may be what called us. Without events it is silent.
-  if (io_) io_->want(0);
+  if (io_) {
+    io_->want(0);
+  }
   client_.cancel();
   client_.keep_session(false, loop_.now());
-  if (done_) answer(tl::unexpected(link_error(trouble_)));
+  if (done_) {
+    answer(tl::unexpected(link_error(trouble_)));
+  }
 }
 
 void CanPort::reopen() {
@@ -78,10 +84,14 @@ void CanPort::reopen() {
   }
   reopen_wanted_ = false;
   io_.reset();
-  if (socket_) lost_before_ += socket_->lost_frames();
+  if (socket_) {
+    lost_before_ += socket_->lost_frames();
+  }
   socket_.reset();
   client_.cancel();
-  if (done_) answer(tl::unexpected(link_error("connection opened anew")));
+  if (done_) {
+    answer(tl::unexpected(link_error("connection opened anew")));
+  }
   open();
 }
 
@@ -90,13 +100,17 @@ std::uint64_t CanPort::lost_frames() const { return lost_before_ + (socket_ ? so
 void CanPort::request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) {
   done_ = std::move(done);
   service_ = payload.front();
-  if (!trouble_.empty()) return answer(tl::unexpected(link_error(trouble_)));
-  if (!client_.request(payload, loop_.now())) {
-    return answer(tl::unexpected(PortError{PortError::Kind::protocol, 0,
-                                           fmt::format("{}: a request of {} bytes cannot be sent", config_.interface,
-                                                       payload.size())}));
+  if (!trouble_.empty()) {
+    return answer(tl::unexpected(link_error(trouble_)));
   }
-  if (!receiving_) pump();
+  if (!client_.request(payload, loop_.now())) {
+    return answer(tl::unexpected(
+        PortError{PortError::Kind::protocol, 0,
+                  fmt::format("{}: a request of {} bytes cannot be sent", config_.interface, payload.size())}));
+  }
+  if (!receiving_) {
+    pump();
+  }
 }
 
 void CanPort::cancel() {
@@ -112,7 +126,9 @@ void CanPort::answer(Answer<Bytes> result) {
   answer_timer_ = loop_.after(0ns, [this, result = std::move(result)]() mutable {
     answer_timer_ = 0;
     const auto done = std::exchange(done_, {});
-    if (done) done(std::move(result));
+    if (done) {
+      done(std::move(result));
+    }
   });
 }
 
@@ -121,7 +137,9 @@ void CanPort::on_readable() {
   for (int i = 0; i < batches_per_turn && receive_batch(); ++i) {
   }
   receiving_ = false;
-  if (reopen_wanted_) return reopen();
+  if (reopen_wanted_) {
+    return reopen();
+  }
   pump();
 }
 
@@ -133,44 +151,66 @@ bool CanPort::receive_batch() {
     return false;
   }
   bool status_news = false;
-  const SteadyTime now = loop_.now();   // one reading of the clock for all frames of a system call
+  const SteadyTime now = loop_.now();  // one reading of the clock for all frames of a system call
   for (const can::ReceivedFrame& received : *batch) {
     if (received.event) {
-      if (on_bus_event) on_bus_event(*received.event);
+      if (on_bus_event) {
+        on_bus_event(*received.event);
+      }
       continue;
     }
     if (!client_.accepts(received.frame)) {
       take_status(received.frame, status_news);
     } else if (const auto outcome = client_.on_frame(received.frame, now)) {
       deliver(*outcome);
-      if (reopen_wanted_ || !trouble_.empty()) return false;
+      if (reopen_wanted_ || !trouble_.empty()) {
+        return false;
+      }
     }
   }
   // The answer to a first frame is due at once: flow control waits for nobody.
-  if (!batch->empty()) pump();
-  if (status_news && on_status) on_status(status_);
+  if (!batch->empty()) {
+    pump();
+  }
+  if (status_news && on_status) {
+    on_status(status_);
+  }
   return !batch->empty() && trouble_.empty();
 }
 
 void CanPort::take_status(const can::CanFrame& frame, bool& news) {
-  if (frame.extended != config_.extended_ids) return;
+  if (frame.extended != config_.extended_ids) {
+    return;
+  }
   can::CanFrame named = frame;
   named.extended = false;
-  if (frame.id == config_.status_id) named.id = ins::can_id::status;
-  if (frame.id == config_.status_id + 1) named.id = ins::can_id::gimbal;
+  if (frame.id == config_.status_id) {
+    named.id = ins::can_id::status;
+  }
+  if (frame.id == config_.status_id + 1) {
+    named.id = ins::can_id::gimbal;
+  }
   news = ins::apply_status_frame(named, status_) || news;
 }
 
 void CanPort::pump() {
-  if (!socket_ || !trouble_.empty()) return;
+  if (!socket_ || !trouble_.empty()) {
+    return;
+  }
   std::array<can::CanFrame, frames_per_send> frames;
   while (true) {
     const SteadyTime now = loop_.now();
     const std::size_t count = client_.pending(frames, now);
-    if (count == 0) break;
+    if (count == 0) {
+      break;
+    }
     const auto taken = socket_->send(std::span(frames).first(count));
-    if (!taken) return down(taken.error());
-    if (const auto outcome = client_.sent(*taken, now)) deliver(*outcome);
+    if (!taken) {
+      return down(taken.error());
+    }
+    if (const auto outcome = client_.sent(*taken, now)) {
+      deliver(*outcome);
+    }
     if (*taken < count) {
       loop_.cancel(timer_);
       timer_ = loop_.after(full_queue_retry, [this] { on_deadline(); });
@@ -184,21 +224,31 @@ void CanPort::schedule() {
   loop_.cancel(timer_);
   timer_ = 0;
   const auto deadline = client_.next_deadline();
-  if (!deadline) return;
+  if (!deadline) {
+    return;
+  }
   timer_ = loop_.after(std::max(*deadline - loop_.now(), SteadyTime(0)), [this] { on_deadline(); });
 }
 
 void CanPort::on_deadline() {
   timer_ = 0;
-  if (!trouble_.empty()) return;
-  if (const auto outcome = client_.on_time(loop_.now())) deliver(*outcome);
+  if (!trouble_.empty()) {
+    return;
+  }
+  if (const auto outcome = client_.on_time(loop_.now())) {
+    deliver(*outcome);
+  }
   pump();
 }
 
 void CanPort::deliver(const uds::Outcome& outcome) {
   const auto done = std::exchange(done_, {});
-  if (!done) return;
-  if (outcome.kind == uds::Outcome::Kind::positive) return done(Bytes(outcome.response.begin(), outcome.response.end()));
+  if (!done) {
+    return;
+  }
+  if (outcome.kind == uds::Outcome::Kind::positive) {
+    return done(Bytes(outcome.response.begin(), outcome.response.end()));
+  }
   done(tl::unexpected(explain(outcome)));
 }
 

@@ -47,8 +47,8 @@ class CanPort : public InsPort {
   std::function<void(Answer<Bytes>)> done_;
   std::uint8_t service_ = 0;
   ins::Status status_;
-  std::string trouble_;               // why the socket is not open
-  std::uint64_t lost_before_ = 0;     // by sockets of the past
+  std::string trouble_;            // why the socket is not open
+  std::uint64_t lost_before_ = 0;  // by sockets of the past
   bool receiving_ = false;
   bool reopen_wanted_ = false;
 };

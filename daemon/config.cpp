@@ -24,8 +24,12 @@ template <typename Target>
 Key<Target> text(std::string_view name, std::string Target::*member, bool may_be_empty = false) {
   return {name, [=](const toml::node& node, Target& target) -> std::string {
             const auto value = node.value_exact<std::string>();
-            if (!value) return "must be a string";
-            if (value->empty() && !may_be_empty) return "must not be empty";
+            if (!value) {
+              return "must be a string";
+            }
+            if (value->empty() && !may_be_empty) {
+              return "must not be empty";
+            }
             target.*member = *value;
             return {};
           }};
@@ -35,7 +39,9 @@ template <typename Target>
 Key<Target> number(std::string_view name, double Target::*member, double low, double high) {
   return {name, [=](const toml::node& node, Target& target) -> std::string {
             const auto value = node.value<double>();
-            if (!value || node.is_boolean()) return "must be a number";
+            if (!value || node.is_boolean()) {
+              return "must be a number";
+            }
             if (!(*value >= low && *value <= high)) {
               return fmt::format("is {}, must lie between {} and {}", *value, low, high);
             }
@@ -48,7 +54,9 @@ template <typename Target>
 Key<Target> flag(std::string_view name, bool Target::*member) {
   return {name, [=](const toml::node& node, Target& target) -> std::string {
             const auto value = node.value_exact<bool>();
-            if (!value) return "must be true or false";
+            if (!value) {
+              return "must be true or false";
+            }
             target.*member = *value;
             return {};
           }};
@@ -57,7 +65,9 @@ Key<Target> flag(std::string_view name, bool Target::*member) {
 Key<InsConfig> can_id(std::string_view name, std::uint32_t InsConfig::*member) {
   return {name, [=](const toml::node& node, InsConfig& ins) -> std::string {
             const auto value = node.value_exact<std::int64_t>();
-            if (!value || *value < 0 || *value > 0x1FFFFFFF) return "must be a CAN identifier, 0 to 0x1FFFFFFF";
+            if (!value || *value < 0 || *value > 0x1FFFFFFF) {
+              return "must be a CAN identifier, 0 to 0x1FFFFFFF";
+            }
             ins.*member = static_cast<std::uint32_t>(*value);
             return {};
           }};
@@ -68,10 +78,14 @@ using Limits = std::array<std::optional<double>, sensor_parameter_count>;
 // A table of parameter names, or of groups ("gyro_scale" for its three axes), with a positive figure each.
 Key<InsConfig> parameter_figures(std::string_view name, Limits InsConfig::*member) {
   return {name, [=](const toml::node& node, InsConfig& ins) -> std::string {
-            if (!node.is_table()) return "must be a table of parameter names";
+            if (!node.is_table()) {
+              return "must be a table of parameter names";
+            }
             for (const auto& [key, value] : *node.as_table()) {
               const auto figure = value.value<double>();
-              if (!figure || !(*figure > 0)) return fmt::format("{} must be a positive number", key.str());
+              if (!figure || !(*figure > 0)) {
+                return fmt::format("{} must be a positive number", key.str());
+              }
               bool known = false;
               for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
                 const std::string_view full = sensor_parameters[i].name;
@@ -80,7 +94,9 @@ Key<InsConfig> parameter_figures(std::string_view name, Limits InsConfig::*membe
                   known = true;
                 }
               }
-              if (!known) return fmt::format("{} is no parameter and no group of parameters", key.str());
+              if (!known) {
+                return fmt::format("{} is no parameter and no group of parameters", key.str());
+              }
             }
             return {};
           }};
@@ -132,12 +148,15 @@ class Reader {
   explicit Reader(std::string file) : file_(std::move(file)) {}
 
   template <typename Target>
-  void read(const toml::table& table, const std::string& section, const std::vector<Key<Target>>& keys, Target& target) {
+  void read(const toml::table& table, const std::string& section, const std::vector<Key<Target>>& keys,
+            Target& target) {
     for (const auto& [key, node] : table) {
       const std::string full = section + "." + std::string(key.str());
       const Key<Target>* known = nullptr;
       for (const auto& candidate : keys) {
-        if (candidate.name == key.str()) known = &candidate;
+        if (candidate.name == key.str()) {
+          known = &candidate;
+        }
       }
       if (known == nullptr) {
         complain(key.source().begin.line, full, "unknown key");
@@ -148,7 +167,9 @@ class Reader {
   }
 
   void complain(toml::source_index line, const std::string& key, const std::string& what) {
-    if (!complaints_.empty()) complaints_ += '\n';
+    if (!complaints_.empty()) {
+      complaints_ += '\n';
+    }
     complaints_ += fmt::format("{}:{}: {}: {}", file_, line, one_line(key), one_line(what));
   }
 
@@ -165,19 +186,25 @@ void check_instruments(const toml::table& sections, Config& config, Reader& read
     const toml::table& table = *sections.get_as<toml::table>(ins.name);
     const auto line = table.source().begin.line;
     const std::string section = "ins." + ins.name;
-    if (ins.interface.empty()) reader.complain(line, section + ".interface", "missing");
+    if (ins.interface.empty()) {
+      reader.complain(line, section + ".interface", "missing");
+    }
     ins.site_given = table.contains("latitude_deg");
     if (table.contains("longitude_deg") != ins.site_given || table.contains("height_m") != ins.site_given) {
       reader.complain(line, section, "latitude_deg, longitude_deg and height_m belong together");
     }
     const std::uint32_t highest = ins.extended_ids ? 0x1FFFFFFFu : 0x7FFu;
-    for (const auto& [key, id] : {std::pair{"request_id", ins.request_id}, std::pair{"response_id", ins.response_id},
-                                  std::pair{"functional_id", ins.functional_id},
-                                  std::pair{"status_id", ins.status_id}}) {
-      if (id > highest) reader.complain(line, section + "." + key, fmt::format("{:#x} needs extended_ids = true", id));
+    for (const auto& [key, id] :
+         {std::pair{"request_id", ins.request_id}, std::pair{"response_id", ins.response_id},
+          std::pair{"functional_id", ins.functional_id}, std::pair{"status_id", ins.status_id}}) {
+      if (id > highest) {
+        reader.complain(line, section + "." + key, fmt::format("{:#x} needs extended_ids = true", id));
+      }
     }
     for (const InsConfig& other : config.instruments) {
-      if (&other == &ins) break;
+      if (&other == &ins) {
+        break;
+      }
       if (other.interface == ins.interface && other.request_id == ins.request_id) {
         reader.complain(line, section, fmt::format("same interface and request_id as ins.{}", other.name));
       }
@@ -189,14 +216,18 @@ void check_instruments(const toml::table& sections, Config& config, Reader& read
 
 const InsConfig* Config::find(std::string_view name) const {
   for (const InsConfig& ins : instruments) {
-    if (ins.name == name) return &ins;
+    if (ins.name == name) {
+      return &ins;
+    }
   }
   return nullptr;
 }
 
 Expected<Config> parse_config(std::string_view content, const std::string& file) {
   const Expected<toml::table> root = parse_toml(content, file);
-  if (!root) return tl::unexpected(root.error());
+  if (!root) {
+    return tl::unexpected(root.error());
+  }
 
   Config config;
   Reader reader(file);
@@ -228,13 +259,17 @@ Expected<Config> parse_config(std::string_view content, const std::string& file)
   } else {
     check_instruments(*root->get_as<toml::table>("ins"), config, reader);
   }
-  if (!reader.complaints().empty()) return fail(ErrorKind::bad_input, reader.complaints());
+  if (!reader.complaints().empty()) {
+    return fail(ErrorKind::bad_input, reader.complaints());
+  }
   return config;
 }
 
 Expected<Config> load_config(const std::string& file) {
   std::ifstream in(file);
-  if (!in) return fail(ErrorKind::bad_input, fmt::format("{}: cannot be opened", file));
+  if (!in) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: cannot be opened", file));
+  }
   std::stringstream content;
   content << in.rdbuf();
   return parse_config(content.str(), file);
@@ -242,8 +277,12 @@ Expected<Config> load_config(const std::string& file) {
 
 std::vector<std::string> config_keys() {
   std::vector<std::string> keys;
-  for (const auto& key : daemon_keys()) keys.push_back("daemon." + std::string(key.name));
-  for (const auto& key : ins_keys()) keys.push_back("ins.*." + std::string(key.name));
+  for (const auto& key : daemon_keys()) {
+    keys.push_back("daemon." + std::string(key.name));
+  }
+  for (const auto& key : ins_keys()) {
+    keys.push_back("ins.*." + std::string(key.name));
+  }
   return keys;
 }
 

@@ -14,25 +14,25 @@
 namespace selfcal {
 
 struct InsConfig {
-  std::string name;                 // the section's: [ins.NAME]
-  std::string interface;            // CAN network interface
+  std::string name;       // the section's: [ins.NAME]
+  std::string interface;  // CAN network interface
   std::uint32_t request_id = 0x640;
   std::uint32_t response_id = 0x648;
   std::uint32_t functional_id = 0x7DF;
   std::uint32_t status_id = 0x650;  // of the state frame; the gimbal frame has the next one
   bool extended_ids = false;        // 29-bit identifiers
   bool fd = false;                  // CAN FD frames with bit rate switch
-  std::string key_file;             // SecurityAccess key, 16 bytes as 32 hex digits; empty: credential "NAME.key", then "ins.key"
+  std::string key_file;  // SecurityAccess key, 16 bytes as 32 hex digits; empty: credential "NAME.key", then "ins.key"
   std::string schedule = "horizontal";
   double dwell_s = 150.0;
   double rotation_s = 5.0;
-  double request_timeout_s = 1.0;   // P2 client
-  double lost_after_s = 30.0;       // link lost for longer: the run fails
-  double running_estimate_s = 60.0; // estimate anew while turning, after so much data more; 0: only at the end
-  double drift_check_s = 300.0;     // free-inertial drift before and after; 0: not measured
-  double time_scale = 1.0;          // the INS's clock runs so many times faster (virtual INS only)
+  double request_timeout_s = 1.0;    // P2 client
+  double lost_after_s = 30.0;        // link lost for longer: the run fails
+  double running_estimate_s = 60.0;  // estimate anew while turning, after so much data more; 0: only at the end
+  double drift_check_s = 300.0;      // free-inertial drift before and after; 0: not measured
+  double time_scale = 1.0;           // the INS's clock runs so many times faster (virtual INS only)
   double latitude_deg = 0.0, longitude_deg = 0.0, height_m = 0.0;
-  bool site_given = false;          // else the INS's own site is used
+  bool site_given = false;  // else the INS's own site is used
   // 1 sigma beyond which a parameter counts as not determined, and |value| beyond which it is implausible for this
   // type of INS; in the parameters' JSON units. Absent: the estimator's own.
   std::array<std::optional<double>, sensor_parameter_count> tolerance;
@@ -41,11 +41,11 @@ struct InsConfig {
 
 struct Config {
   std::string state_directory = "/var/lib/selfcal";
-  std::string bus = "system";       // system, session, or a D-Bus address
-  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";   // empty: no LCM
+  std::string bus = "system";                               // system, session, or a D-Bus address
+  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";  // empty: no LCM
   double recordings_quota_mib = 20000.0;
-  double recordings_keep_days = 0.0;        // 0: for ever
-  double free_space_mib = 256.0;            // a run is not started with less
+  double recordings_keep_days = 0.0;  // 0: for ever
+  double free_space_mib = 256.0;      // a run is not started with less
   std::vector<InsConfig> instruments;
 
   const InsConfig* find(std::string_view name) const;

@@ -30,7 +30,9 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
                                 const std::stop_token& stop) {
   Estimate estimate;
   auto recording = recording_from_pages(request, estimate.warnings);
-  if (!recording) return tl::unexpected(recording.error());
+  if (!recording) {
+    return tl::unexpected(recording.error());
+  }
   // What was set aside behind the pages is wanted now (truncating to the present size frees it).
   std::error_code ignored;
   fs::resize_file(page_path(request.folder), fs::file_size(page_path(request.folder), ignored), ignored);
@@ -42,11 +44,15 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   }
   estimate.recording = recording_path(request.folder).string();
   const auto suspect = check_recording(*recording);
-  if (!suspect) return tl::unexpected(with_warnings(suspect.error(), estimate.warnings));
+  if (!suspect) {
+    return tl::unexpected(with_warnings(suspect.error(), estimate.warnings));
+  }
   estimate.warnings.insert(estimate.warnings.end(), suspect->begin(), suspect->end());
   const CalibrationOptions options = calibration_options(request.config);
   auto result = calibrate_recording(*recording, options, progress, stop);
-  if (!result) return tl::unexpected(result.error());
+  if (!result) {
+    return tl::unexpected(result.error());
+  }
   estimate.result = std::move(*result);
   estimate.objections = gate_objections(estimate.result, request.config);
   estimate.result_json = result_json_text(estimate.result, options, *recording, estimate.warnings);
@@ -80,8 +86,12 @@ std::vector<std::string> gate_objections(const CalibrationResult& result, const 
 
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings) {
   auto pages = PageRecording::begin(request);
-  if (!pages) return tl::unexpected(pages.error());
-  if (auto taken = pages->take(pages->pages_expected()); !taken) return tl::unexpected(taken.error());
+  if (!pages) {
+    return tl::unexpected(pages.error());
+  }
+  if (auto taken = pages->take(pages->pages_expected()); !taken) {
+    return tl::unexpected(taken.error());
+  }
   if (pages->saturated_pages() > 0) {
     warnings.push_back(fmt::format("a sensor was saturated in {} pages", pages->saturated_pages()));
   }

@@ -17,7 +17,9 @@ constexpr int background_nice = 10;
 }  // namespace
 
 EstimateWorker::Mailbox::~Mailbox() {
-  if (wake_fd >= 0) close(wake_fd);
+  if (wake_fd >= 0) {
+    close(wake_fd);
+  }
 }
 
 void EstimateWorker::Mailbox::put(Delivery Mailbox::*slot, Delivery delivery) {
@@ -50,7 +52,7 @@ void EstimateWorker::start_running(RunningJob job, RunningDone on_done) {
     // Of this thread alone; without it the estimate is only less polite.
     setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), background_nice);
     auto answer = std::make_shared<Expected<RunningEstimate>>(job(stop));
-    timespec used{};   // by this thread, which does nothing else
+    timespec used{};  // by this thread, which does nothing else
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
     const double cpu_s = static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
     mailbox.put(&Mailbox::answer, [on_done, answer, cpu_s] { on_done(std::move(*answer), cpu_s); });
@@ -61,7 +63,9 @@ void EstimateWorker::launch(std::function<void(Mailbox&, std::stop_token)> work)
   cancel();
   auto mailbox = std::make_shared<Mailbox>();
   mailbox->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (mailbox->wake_fd < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  if (mailbox->wake_fd < 0) {
+    throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
   mailbox_ = mailbox;
   wake_ = std::make_unique<EventLoop::Io>(loop_, mailbox->wake_fd, EPOLLIN, [this](unsigned) { collect(); });
   thread_ = std::jthread([mailbox, work = std::move(work)](std::stop_token stop) { work(*mailbox, std::move(stop)); });
@@ -86,9 +90,13 @@ void EstimateWorker::collect() {
     progress.swap(mailbox_->progress);
     answer.swap(mailbox_->answer);
   }
-  if (progress) progress();
+  if (progress) {
+    progress();
+  }
   // The last word: it may start the next job or end this worker.
-  if (answer) answer();
+  if (answer) {
+    answer();
+  }
 }
 
 }  // namespace selfcal

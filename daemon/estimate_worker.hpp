@@ -18,11 +18,11 @@ namespace selfcal {
 // What the estimator's thread hands back.
 struct Estimate {
   CalibrationResult result;
-  std::vector<std::string> objections;   // of the gate, empty: acceptable
-  std::vector<std::string> warnings;     // of the recording
-  std::vector<std::string> notes;        // for the story of the run
+  std::vector<std::string> objections;  // of the gate, empty: acceptable
+  std::vector<std::string> warnings;    // of the recording
+  std::vector<std::string> notes;       // for the story of the run
   std::string result_json;
-  std::string recording;                 // path
+  std::string recording;  // path
 };
 
 using EstimateProgress = std::function<void(const CalibrationProgress&)>;
@@ -46,17 +46,16 @@ class EstimateWorker : public Estimators {
   explicit EstimateWorker(EventLoop& loop);
   ~EstimateWorker() override;
 
-  void start(EstimateJob job, EstimateProgress on_progress,
-             std::function<void(Expected<Estimate>)> on_done) override;
+  void start(EstimateJob job, EstimateProgress on_progress, std::function<void(Expected<Estimate>)> on_done) override;
   void start_running(RunningJob job, RunningDone on_done) override;
   void cancel() override;
 
  private:
-  using Delivery = std::function<void()>;   // to be called on the loop
+  using Delivery = std::function<void()>;  // to be called on the loop
   // Shared with the thread, which may outlive the interest in its answer.
   struct Mailbox {
     std::mutex mutex;
-    Delivery progress;   // the latest
+    Delivery progress;  // the latest
     Delivery answer;
     int wake_fd = -1;
     ~Mailbox();

@@ -11,7 +11,9 @@ namespace {
 
 // The loop's own calls fail for want of memory or file descriptors only: the daemon cannot run then.
 void require(int result, const char* what) {
-  if (result < 0) throw std::runtime_error(fmt::format("event loop: {}: {}", what, std::strerror(-result)));
+  if (result < 0) {
+    throw std::runtime_error(fmt::format("event loop: {}: {}", what, std::strerror(-result)));
+  }
 }
 
 }  // namespace
@@ -69,7 +71,9 @@ int EventLoop::Io::on_ready(sd_event_source*, int, unsigned events, void* self) 
 }
 
 void EventLoop::Io::want(unsigned events) {
-  if (events == events_) return;
+  if (events == events_) {
+    return;
+  }
   events_ = events;
   require(sd_event_source_set_io_events(source_.get(), events), "change events");
 }

@@ -49,9 +49,9 @@ class EventLoop : public Timers {
   // Runs before each wait of the loop.
   void before_wait(std::function<void()> callback);
 
-  bool enable_watchdog();   // feeds systemd's watchdog from this loop, if the unit asks for one
+  bool enable_watchdog();  // feeds systemd's watchdog from this loop, if the unit asks for one
   int run();
-  void turn(std::chrono::microseconds longest);   // serves one event, if one comes in this time
+  void turn(std::chrono::microseconds longest);  // serves one event, if one comes in this time
   void stop(int exit_status);
 
  private:

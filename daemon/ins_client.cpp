@@ -18,7 +18,9 @@ class Exchange {
   Exchange(const Exchange&) = delete;
   Exchange& operator=(const Exchange&) = delete;
   ~Exchange() {
-    if (waiting_) port_.cancel();
+    if (waiting_) {
+      port_.cancel();
+    }
   }
 
   bool await_ready() const noexcept { return false; }
@@ -47,15 +49,19 @@ tl::unexpected<PortError> senseless(const InsPort& port, const Error& error) {
 
 template <typename Record>
 Answer<Record> decoded(const InsPort& port, const Answer<Bytes>& bytes, Expected<Record> (*decode)(ins::ByteView)) {
-  if (!bytes) return tl::unexpected(bytes.error());
+  if (!bytes) {
+    return tl::unexpected(bytes.error());
+  }
   auto record = decode(*bytes);
-  if (!record) return senseless(port, record.error());
+  if (!record) {
+    return senseless(port, record.error());
+  }
   return std::move(*record);
 }
 
 std::string text(const Bytes& bytes) {
   std::string result(bytes.begin(), bytes.end());
-  std::erase_if(result, [](char c) { return c < 0x20 || c > 0x7E; });   // padding, and what no serial number holds
+  std::erase_if(result, [](char c) { return c < 0x20 || c > 0x7E; });  // padding, and what no serial number holds
   return result;
 }
 
@@ -71,54 +77,88 @@ Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
   constexpr int attempts = 4;
   for (int attempt = 1;; ++attempt) {
     const Answer<Bytes> response = co_await ask(uds::read_request(did));
-    if (!response) co_return tl::unexpected(response.error());
+    if (!response) {
+      co_return tl::unexpected(response.error());
+    }
     const auto record = uds::read_read_response(*response, did);
-    if (record) co_return Bytes(record->begin(), record->end());
-    if (attempt == attempts) co_return senseless(port_, record.error());
+    if (record) {
+      co_return Bytes(record->begin(), record->end());
+    }
+    if (attempt == attempts) {
+      co_return senseless(port_, record.error());
+    }
   }
 }
 
 Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
   const Answer<Bytes> response = co_await ask(uds::write_request(did, record));
-  if (!response) co_return tl::unexpected(response.error());
-  if (const auto well = uds::read_write_response(*response, did); !well) co_return senseless(port_, well.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (const auto well = uds::read_write_response(*response, did); !well) {
+    co_return senseless(port_, well.error());
+  }
   co_return Done{};
 }
 
 Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t routine, Bytes option) {
   const Answer<Bytes> response = co_await ask(uds::routine_request(action, routine, option));
-  if (!response) co_return tl::unexpected(response.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
   const auto record = uds::read_routine_response(*response, action, routine);
-  if (!record) co_return senseless(port_, record.error());
+  if (!record) {
+    co_return senseless(port_, record.error());
+  }
   co_return Bytes(record->begin(), record->end());
 }
 
 Task<Answer<InsClient::Identity>> InsClient::identify() {
   const Answer<Bytes> serial = co_await read_record(ins::did::serial_number);
-  if (!serial) co_return tl::unexpected(serial.error());
+  if (!serial) {
+    co_return tl::unexpected(serial.error());
+  }
   const Answer<Bytes> software = co_await read_record(ins::did::software_version);
-  if (!software) co_return tl::unexpected(software.error());
+  if (!software) {
+    co_return tl::unexpected(software.error());
+  }
   Identity identity{text(*serial), text(*software)};
-  if (identity.serial.empty()) co_return senseless(port_, {ErrorKind::device, "the INS tells an empty serial number"});
+  if (identity.serial.empty()) {
+    co_return senseless(port_, {ErrorKind::device, "the INS tells an empty serial number"});
+  }
   co_return identity;
 }
 
 Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended));
-  if (!response) co_return tl::unexpected(response.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
   if (auto well = uds::read_session_response(*response, uds::Session::extended); !well) {
     co_return senseless(port_, well.error());
   }
   response = co_await ask(uds::seed_request());
-  if (!response) co_return tl::unexpected(response.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
   const auto seed = uds::read_seed_response(*response);
-  if (!seed) co_return senseless(port_, seed.error());
-  if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) co_return Done{};
+  if (!seed) {
+    co_return senseless(port_, seed.error());
+  }
+  if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) {
+    co_return Done{};
+  }
   const auto secret = uds::answer_seed(key, *seed);
-  if (!secret) co_return senseless(port_, secret.error());
+  if (!secret) {
+    co_return senseless(port_, secret.error());
+  }
   response = co_await ask(uds::key_request(*secret));
-  if (!response) co_return tl::unexpected(response.error());
-  if (auto well = uds::read_key_response(*response); !well) co_return senseless(port_, well.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (auto well = uds::read_key_response(*response); !well) {
+    co_return senseless(port_, well.error());
+  }
   co_return Done{};
 }
 
@@ -144,7 +184,9 @@ Task<Answer<ins::SiteRecord>> InsClient::read_site() {
 
 Task<Answer<Done>> InsClient::reset() {
   const Answer<Bytes> response = co_await ask(uds::reset_request(uds::ResetType::hard));
-  if (!response) co_return tl::unexpected(response.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
   if (const auto well = uds::read_reset_response(*response, uds::ResetType::hard); !well) {
     co_return senseless(port_, well.error());
   }
@@ -154,16 +196,24 @@ Task<Answer<Done>> InsClient::reset() {
 Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
   const std::size_t wanted = std::size_t{count} * flash::page_bytes;
   Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)));
-  if (!response) co_return tl::unexpected(response.error());
-  if (const auto longest = uds::read_upload_response(*response); !longest) co_return senseless(port_, longest.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (const auto longest = uds::read_upload_response(*response); !longest) {
+    co_return senseless(port_, longest.error());
+  }
   Bytes data;
   data.reserve(wanted);
   std::uint32_t whole = 0;
   for (std::uint8_t block = 1; data.size() < wanted; ++block) {
     response = co_await ask(uds::transfer_request(block));
-    if (!response) co_return tl::unexpected(response.error());
+    if (!response) {
+      co_return tl::unexpected(response.error());
+    }
     const auto part = uds::read_transfer_response(*response, block);
-    if (!part) co_return senseless(port_, part.error());
+    if (!part) {
+      co_return senseless(port_, part.error());
+    }
     if (part->empty() || data.size() + part->size() > wanted) {
       co_return senseless(port_, {ErrorKind::device, "transferData: more or less data than was asked for"});
     }
@@ -173,7 +223,9 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
     }
   }
   response = co_await ask(uds::transfer_exit_request());
-  if (!response) co_return tl::unexpected(response.error());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
   co_return Done{};
 }
 

@@ -25,7 +25,7 @@ class InsClient {
     std::string software;
   };
   Task<Answer<Identity>> identify();
-  Task<Answer<Done>> unlock(UnlockKey key);   // extended session, then SecurityAccess
+  Task<Answer<Done>> unlock(UnlockKey key);  // extended session, then SecurityAccess
   Task<Answer<ins::StateRecord>> read_state();
   Task<Answer<ins::DirectoryRecord>> read_directory();
   Task<Answer<ins::SampleFormatRecord>> read_sample_format();

@@ -19,9 +19,9 @@ namespace selfcal {
 // Why a request has no positive answer.
 struct PortError {
   enum class Kind {
-    link,       // no answer, or the interface is down: worth trying again later
-    negative,   // the INS said no, with nrc
-    protocol,   // it answered something that makes no sense
+    link,      // no answer, or the interface is down: worth trying again later
+    negative,  // the INS said no, with nrc
+    protocol,  // it answered something that makes no sense
   };
   Kind kind = Kind::link;
   std::uint8_t nrc = 0;
@@ -40,10 +40,10 @@ class InsPort {
   // Sends a UDS request (service identifier first). The callback gets the positive response, or why there is none;
   // it comes later, from the loop, never from inside this call. One request at a time.
   virtual void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) = 0;
-  virtual void cancel() = 0;    // forget the request in progress
-  virtual void reopen() = 0;    // after the link was lost: a fresh socket and transport
+  virtual void cancel() = 0;  // forget the request in progress
+  virtual void reopen() = 0;  // after the link was lost: a fresh socket and transport
   virtual std::uint64_t lost_frames() const = 0;
-  virtual std::string_view interface() const = 0;   // begins every message about it
+  virtual std::string_view interface() const = 0;  // begins every message about it
 
   // What the CAN controller says of itself and the bus (error frames), as it comes.
   std::function<void(can::BusEvent)> on_bus_event;

@@ -9,7 +9,7 @@
 
 namespace selfcal::journal {
 
-enum class Level { error = 3, warning = 4, notice = 5, info = 6 };   // syslog's numbers
+enum class Level { error = 3, warning = 4, notice = 5, info = 6 };  // syslog's numbers
 
 // Fields SELFCAL_RUN, SELFCAL_INS, SELFCAL_SERIAL, SELFCAL_STATE, SELFCAL_NRC; empty or negative: left out.
 struct Fields {

@@ -27,14 +27,20 @@ constexpr std::string_view software_version = SELFCAL_VERSION;
 // Whether the kernel knows a way to the group of udpm://GROUP:PORT?…; true for any other provider.
 bool has_route(const std::string& url) {
   constexpr std::string_view scheme = "udpm://";
-  if (!url.starts_with(scheme)) return true;
+  if (!url.starts_with(scheme)) {
+    return true;
+  }
   const std::string group = url.substr(scheme.size(), url.find_first_of(":?", scheme.size()) - scheme.size());
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_port = htons(1);   // connecting a datagram socket sends nothing
-  if (inet_pton(AF_INET, group.c_str(), &address.sin_addr) != 1) return true;
+  address.sin_port = htons(1);  // connecting a datagram socket sends nothing
+  if (inet_pton(AF_INET, group.c_str(), &address.sin_addr) != 1) {
+    return true;
+  }
   const int descriptor = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (descriptor < 0) return true;
+  if (descriptor < 0) {
+    return true;
+  }
   const bool reached = connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   close(descriptor);
   return reached;
@@ -50,23 +56,36 @@ LcmPublisher::~LcmPublisher() = default;
 void LcmPublisher::open() {
   tried_ = true;
   tried_at_ = timers_.now();
-  if (!has_route(url_)) return;   // LCM would write a page of advice for each attempt
+  if (!has_route(url_)) {
+    return;  // LCM would write a page of advice for each attempt
+  }
   lcm_ = std::make_unique<lcm::LCM>(url_);
-  if (lcm_->good()) return;
+  if (lcm_->good()) {
+    return;
+  }
   lcm_.reset();
 }
 
 template <typename Message>
 void LcmPublisher::publish(const std::string& channel, const Message& message) {
-  if (url_.empty()) return;
-  if (!lcm_ && (!tried_ || timers_.now() - tried_at_ >= retry_interval)) open();
+  if (url_.empty()) {
+    return;
+  }
+  if (!lcm_ && (!tried_ || timers_.now() - tried_at_ >= retry_interval)) {
+    open();
+  }
   const bool sent = lcm_ && lcm_->publish(channel, &message) == 0;
-  if (!sent) lcm_.reset();
-  if (sent == !down_said_) return;
+  if (!sent) {
+    lcm_.reset();
+  }
+  if (sent == !down_said_) {
+    return;
+  }
   down_said_ = !sent;
   journal::write(journal::Level::warning, sent ? fmt::format("LCM: publishing on {} again", url_)
                                                : fmt::format("LCM: nothing can be published on {} (no route?); "
-                                                             "calibration goes on without it", url_));
+                                                             "calibration goes on without it",
+                                                             url_));
 }
 
 void LcmPublisher::publish_service(int instruments, int runs_in_progress) {
@@ -104,7 +123,9 @@ void LcmPublisher::publish_ins(const PublishedIns& ins) {
 }
 
 void LcmPublisher::publish_estimate(const PublishedIns& ins) {
-  if (ins.progress == nullptr || !ins.progress->estimate_known) return;
+  if (ins.progress == nullptr || !ins.progress->estimate_known) {
+    return;
+  }
   const RunProgress& progress = *ins.progress;
   selfcal_lcm::estimate message;
   message.schema = estimate_schema;

@@ -25,7 +25,7 @@ struct PublishedIns {
 
 class LcmPublisher {
  public:
-  LcmPublisher(Timers& timers, std::string url);   // empty url: publishes nothing
+  LcmPublisher(Timers& timers, std::string url);  // empty url: publishes nothing
   ~LcmPublisher();
 
   void publish_service(int instruments, int runs_in_progress);

@@ -20,18 +20,24 @@ int complain(const Error& error) {
 
 int serve(const std::string& config_file) {
   auto config = load_config(config_file);
-  if (!config) return complain(config.error());
+  if (!config) {
+    return complain(config.error());
+  }
 
   // Signals come through the loop only; blocked before any thread exists, so that all inherit it.
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, signal);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+    sigaddset(&signals, signal);
+  }
   sigprocmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
 
   EventLoop loop;
   auto service = Service::create(loop, std::move(*config), config_file);
-  if (!service) return complain(service.error());
+  if (!service) {
+    return complain(service.error());
+  }
 
   for (const int number : {SIGTERM, SIGINT}) {
     loop.on_signal(number, [&] {
@@ -67,7 +73,9 @@ int run(int argc, char** argv) {
   }
   if (check_only) {
     const auto config = load_config(config_file);
-    if (!config) return complain(config.error());
+    if (!config) {
+      return complain(config.error());
+    }
     fmt::print("{}: well-formed, {} INS\n", config_file, config->instruments.size());
     return 0;
   }
@@ -80,7 +88,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "selfcald: %s\n", error.what());   // unlike fmt::print it cannot throw
+    std::fprintf(stderr, "selfcald: %s\n", error.what());  // unlike fmt::print it cannot throw
     return static_cast<int>(ErrorKind::internal);
   }
 }

@@ -1,9 +1,9 @@
 #include "daemon/operator_service.hpp"
 
 #include <fmt/format.h>
+#include <pwd.h>
 #include <operator_api/ins1_adaptor.hpp>
 #include <operator_api/manager1_adaptor.hpp>
-#include <pwd.h>
 
 #include "protocol/operator_api/names.hpp"
 
@@ -14,7 +14,9 @@ using Entries = std::map<std::string, sdbus::Variant>;
 
 template <typename T>
 T granted(Granted<T> answer) {
-  if (!answer) throw sdbus::Error(answer.error().name, answer.error().message);
+  if (!answer) {
+    throw sdbus::Error(answer.error().name, answer.error().message);
+  }
   return std::move(*answer);
 }
 
@@ -22,7 +24,9 @@ std::string user_name(uid_t uid) {
   passwd entry{};
   passwd* found = nullptr;
   char buffer[4096];
-  if (getpwuid_r(uid, &entry, buffer, sizeof buffer, &found) == 0 && found != nullptr) return found->pw_name;
+  if (getpwuid_r(uid, &entry, buffer, sizeof buffer, &found) == 0 && found != nullptr) {
+    return found->pw_name;
+  }
   return fmt::format("uid {}", uid);
 }
 
@@ -62,14 +66,18 @@ Entries entries(const RunProgress& progress) {
 template <typename T>
 T take(Entries& options, const std::string& key, T otherwise) {
   const auto found = options.find(key);
-  if (found == options.end()) return otherwise;
+  if (found == options.end()) {
+    return otherwise;
+  }
   T value = found->second.get<T>();
   options.erase(found);
   return value;
 }
 
 void refuse_others(const Entries& options) {
-  if (options.empty()) return;
+  if (options.empty()) {
+    return;
+  }
   throw sdbus::Error(operator_api::error_unknown, fmt::format("unknown option {}", options.begin()->first));
 }
 
@@ -119,9 +127,7 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
   std::uint64_t Rollback(const std::string& serial, const std::string& reason) override {
     return static_cast<std::uint64_t>(granted(operations_.rollback(serial, reason, caller())));
   }
-  std::string Show(const std::uint64_t& run) override {
-    return granted(operations_.show(static_cast<RunId>(run)));
-  }
+  std::string Show(const std::uint64_t& run) override { return granted(operations_.show(static_cast<RunId>(run))); }
   std::string History(const std::string& serial) override { return granted(operations_.history(serial)); }
   std::string CheckDatabase() override { return granted(operations_.check_database()); }
   std::string BackupDatabase(const std::string& file) override { return granted(operations_.backup_database(file)); }
@@ -169,11 +175,12 @@ OperatorService::~OperatorService() = default;
 
 void OperatorService::update_instruments() {
   const auto names = operations_.instruments();
-  std::erase_if(instruments_, [&](const auto& entry) {
-    return std::find(names.begin(), names.end(), entry.first) == names.end();
-  });
+  std::erase_if(instruments_,
+                [&](const auto& entry) { return std::find(names.begin(), names.end(), entry.first) == names.end(); });
   for (const std::string& ins : names) {
-    if (!instruments_.contains(ins)) instruments_[ins] = std::make_unique<Ins>(connection_, operations_, ins);
+    if (!instruments_.contains(ins)) {
+      instruments_[ins] = std::make_unique<Ins>(connection_, operations_, ins);
+    }
   }
 }
 
@@ -198,11 +205,15 @@ void OperatorService::progress_changed(const RunRecord& run) {
 }
 
 void OperatorService::warning(const RunRecord& run, const std::string& text) {
-  if (Ins* ins = find(run.ins)) ins->emitWarning(static_cast<std::uint64_t>(run.id), text);
+  if (Ins* ins = find(run.ins)) {
+    ins->emitWarning(static_cast<std::uint64_t>(run.id), text);
+  }
 }
 
 void OperatorService::finished(const RunRecord& run) {
-  if (Ins* ins = find(run.ins)) ins->emitFinished(static_cast<std::uint64_t>(run.id), run.exit_status, run.reason);
+  if (Ins* ins = find(run.ins)) {
+    ins->emitFinished(static_cast<std::uint64_t>(run.id), run.exit_status, run.reason);
+  }
 }
 
 }  // namespace selfcal

@@ -1,10 +1,10 @@
 // The operator interface on D-Bus (protocol/operator_api): turns calls into the service's, and its news into signals.
 #pragma once
 
+#include <sdbus-c++/sdbus-c++.h>
 #include <functional>
 #include <map>
 #include <memory>
-#include <sdbus-c++/sdbus-c++.h>
 #include <string>
 #include <vector>
 
@@ -22,7 +22,7 @@ struct AmendRequest {
 
 struct StartRequest {
   std::string ins;
-  std::string schedule;       // empty: the configured one
+  std::string schedule;  // empty: the configured one
   bool dry_run = false;
   bool stop_when_met = false;
   std::string force_reason;
@@ -63,7 +63,7 @@ class OperatorService {
   OperatorService(const OperatorService&) = delete;
   OperatorService& operator=(const OperatorService&) = delete;
 
-  void update_instruments();   // after a reload
+  void update_instruments();  // after a reload
   void state_changed(const RunRecord& run);
   void progress_changed(const RunRecord& run);
   void warning(const RunRecord& run, const std::string& text);

@@ -44,7 +44,7 @@ class PageFile {
   std::string name_;
   std::vector<bool> have_;
   std::uint32_t count_ = 0;
-  std::uint32_t full_below_ = 0;   // nothing is missing below this
+  std::uint32_t full_below_ = 0;  // nothing is missing below this
   flash::Page scratch_;
 };
 

@@ -40,9 +40,13 @@ void drop_pages(const fs::path& folder) {
   std::error_code ignored;
   std::vector<fs::path> useless;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    if (entry.path() != recording_path(folder)) useless.push_back(entry.path());
+    if (entry.path() != recording_path(folder)) {
+      useless.push_back(entry.path());
+    }
   }
-  for (const fs::path& path : useless) fs::remove(path, ignored);
+  for (const fs::path& path : useless) {
+    fs::remove(path, ignored);
+  }
 }
 
 Expected<void> write_page_context(const fs::path& folder, const PageContext& context) {
@@ -56,7 +60,9 @@ Expected<void> write_page_context(const fs::path& folder, const PageContext& con
 
 Expected<PageContext> read_page_context(const fs::path& folder) {
   const auto text = read_text_file(context_path(folder), 4096);
-  if (!text) return tl::unexpected(text.error());
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(text->data()), text->size());
   const std::size_t site_bytes = ins::encode(ins::SiteRecord{}).size();
   if (bytes.size() < 4 + site_bytes) {
@@ -65,9 +71,13 @@ Expected<PageContext> read_page_context(const fs::path& folder) {
   PageContext context;
   context.pages = ByteReader(bytes).get<std::uint32_t>();
   const auto site = ins::decode_site(bytes.subspan(4, site_bytes));
-  if (!site) return tl::unexpected(site.error());
+  if (!site) {
+    return tl::unexpected(site.error());
+  }
   const auto format = ins::decode_sample_format(bytes.subspan(4 + site_bytes));
-  if (!format) return tl::unexpected(format.error());
+  if (!format) {
+    return tl::unexpected(format.error());
+  }
   context.site = *site;
   context.format = *format;
   return context;
@@ -86,7 +96,9 @@ Schedule schedule_until(const Schedule& schedule, double seconds) {
 
 Expected<PageRecording> PageRecording::begin(const EstimateRequest& request) {
   auto context = read_page_context(request.folder);
-  if (!context) return tl::unexpected(context.error());
+  if (!context) {
+    return tl::unexpected(context.error());
+  }
   return PageRecording(request, *context);
 }
 
@@ -102,9 +114,7 @@ PageRecording::PageRecording(const EstimateRequest& request, PageContext context
   recording_.temperature_channels = 1;
 }
 
-double PageRecording::duration_s() const {
-  return static_cast<double>(recording_.size()) / recording_.sample_rate_hz;
-}
+double PageRecording::duration_s() const { return static_cast<double>(recording_.size()) / recording_.sample_rate_hz; }
 
 Expected<void> PageRecording::take(std::uint32_t end) {
   std::ifstream in(file_, std::ios::binary);
@@ -117,7 +127,9 @@ Expected<void> PageRecording::take(std::uint32_t end) {
     if (!whole || page.sequence != taken_ || page.first_sample != recording_.size()) {
       return fail(ErrorKind::device, fmt::format("{}: page {} is not what was pulled", file_.string(), taken_));
     }
-    if ((page.flags & flash::page_flag::sensor_saturated) != 0) ++saturated_;
+    if ((page.flags & flash::page_flag::sensor_saturated) != 0) {
+      ++saturated_;
+    }
     append(page, context_.format, recording_);
   }
   return {};

@@ -46,7 +46,7 @@ class PageRecording {
   // Takes up the pages below `end` that are not in it yet. The samples must follow each other without a gap.
   Expected<void> take(std::uint32_t end);
 
-  std::uint32_t pages_expected() const { return context_.pages; }   // or written, where the rotation is over
+  std::uint32_t pages_expected() const { return context_.pages; }  // or written, where the rotation is over
   std::uint32_t saturated_pages() const { return saturated_; }
   double duration_s() const;
   const Recording& recording() const { return recording_; }

@@ -11,7 +11,7 @@ namespace {
 constexpr double seconds_per_year = 365.2425 * 86400.0;
 // 24 parameters are tested in each run; 4 sigma keeps false alarms below one run in 600 (24 * 6.3e-5).
 constexpr double departure_sigma = 4.0;
-constexpr double near_limit = 0.8;        // of the limit
+constexpr double near_limit = 0.8;  // of the limit
 constexpr double look_ahead_years = 10.0;
 // Values closer together than this say nothing about a slope per year.
 constexpr double least_span_years = 0.05;
@@ -60,7 +60,9 @@ Line fit(const std::vector<Point>& points, double ageing, bool with_slope) {
 
 double year_of(const std::string& utc) {
   std::tm parts{};
-  if (strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts) == nullptr) return 0.0;
+  if (strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts) == nullptr) {
+    return 0.0;
+  }
   return static_cast<double>(timegm(&parts)) / seconds_per_year;
 }
 
@@ -71,9 +73,13 @@ double ParameterTrend::sigma_at(double year) const {
 std::optional<ParameterTrend> parameter_trend(const std::vector<ParameterRecord>& history) {
   std::vector<Point> points;
   for (const ParameterRecord& record : history) {
-    if (record.determined && record.sigma > 0) points.push_back({year_of(record.utc), record.value, record.sigma});
+    if (record.determined && record.sigma > 0) {
+      points.push_back({year_of(record.utc), record.value, record.sigma});
+    }
   }
-  if (points.size() < 2) return std::nullopt;
+  if (points.size() < 2) {
+    return std::nullopt;
+  }
   double first = points.front().year, last = first, lowest = points.front().value, highest = lowest;
   for (const Point& p : points) {
     first = std::min(first, p.year);
@@ -85,7 +91,9 @@ std::optional<ParameterTrend> parameter_trend(const std::vector<ParameterRecord>
   const double freedom = static_cast<double>(points.size()) - (with_slope ? 2.0 : 1.0);
 
   // chi^2 falls as ageing grows: bisection for the smallest ageing at which the past is no surprise.
-  if (const Line line = fit(points, 0.0, with_slope); line.chi2 <= freedom) return line.trend;
+  if (const Line line = fit(points, 0.0, with_slope); line.chi2 <= freedom) {
+    return line.trend;
+  }
   double low = 0.0, high = highest - lowest;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
@@ -98,7 +106,9 @@ std::vector<std::string> trend_warnings(const std::string& parameter, const std:
                                         const std::vector<ParameterRecord>& past, const ParameterRecord& value,
                                         double limit) {
   std::vector<std::string> warnings;
-  if (!value.determined) return warnings;
+  if (!value.determined) {
+    return warnings;
+  }
   const double now = year_of(value.utc);
   if (const auto trend = parameter_trend(past)) {
     const double sigma = std::hypot(value.sigma, trend->sigma_at(now));
@@ -108,7 +118,9 @@ std::vector<std::string> trend_warnings(const std::string& parameter, const std:
                                      parameter, value.value, unit, trend->at(now), std::abs(departure)));
     }
   }
-  if (limit <= 0) return warnings;
+  if (limit <= 0) {
+    return warnings;
+  }
   if (std::abs(value.value) > near_limit * limit) {
     warnings.push_back(fmt::format("{} {:.4g} {} is near its limit of {:.4g}", parameter, value.value, unit, limit));
   }
@@ -116,7 +128,9 @@ std::vector<std::string> trend_warnings(const std::string& parameter, const std:
   all.push_back(value);
   const auto trend = parameter_trend(all);
   // A prediction is made of a slope that is one: beyond three of its sigmas.
-  if (!trend || std::abs(trend->slope_per_year) < 3.0 * trend->slope_sigma || trend->slope_sigma <= 0) return warnings;
+  if (!trend || std::abs(trend->slope_per_year) < 3.0 * trend->slope_sigma || trend->slope_sigma <= 0) {
+    return warnings;
+  }
   const double target = trend->slope_per_year > 0 ? limit : -limit;
   const double years = (target - trend->at(now)) / trend->slope_per_year;
   if (years > 0 && years < look_ahead_years) {

@@ -27,7 +27,9 @@ double size_mib(const RunRecord& run) {
 bool older_than(const RunRecord& run, double days, fs::file_time_type now) {
   std::error_code error;
   const auto written = fs::last_write_time(run.recording, error);
-  if (error || days <= 0) return false;
+  if (error || days <= 0) {
+    return false;
+  }
   return std::chrono::duration<double>(now - written).count() > days * 86400.0;
 }
 
@@ -36,21 +38,31 @@ bool older_than(const RunRecord& run, double days, fs::file_time_type now) {
 Expected<std::vector<PrunedRecording>> prune_recordings(RunStore& store, const RecordingRules& rules,
                                                         fs::file_time_type now) {
   const auto runs = store.runs_with_recordings();
-  if (!runs) return tl::unexpected(runs.error());
+  if (!runs) {
+    return tl::unexpected(runs.error());
+  }
   double total = 0.0;
-  for (const RunRecord& run : *runs) total += size_mib(run);
+  for (const RunRecord& run : *runs) {
+    total += size_mib(run);
+  }
   std::vector<PrunedRecording> pruned;
   for (const RunRecord& run : *runs) {
     const bool too_old = older_than(run, rules.keep_days, now);
-    if (total <= rules.quota_mib && !too_old) continue;
+    if (total <= rules.quota_mib && !too_old) {
+      continue;
+    }
     const double size = size_mib(run);
     std::error_code error;
     fs::remove(run.recording, error);
-    if (error) continue;
+    if (error) {
+      continue;
+    }
     total -= size;
     RunRecord without = run;
     without.recording.clear();
-    if (auto stored = store.update_run(without); !stored) return tl::unexpected(stored.error());
+    if (auto stored = store.update_run(without); !stored) {
+      return tl::unexpected(stored.error());
+    }
     pruned.push_back({run, too_old ? "older than recordings_keep_days" : "over recordings_quota_mib"});
   }
   return pruned;
@@ -64,8 +76,12 @@ std::uint64_t bytes_of_a_run(std::uint64_t samples) {
 Expected<void> require_space(const fs::path& folder, std::uint64_t bytes, const std::string& what_for) {
   std::error_code error;
   const auto space = fs::space(folder, error);
-  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", folder.string(), error.message()));
-  if (space.available >= bytes) return {};
+  if (error) {
+    return fail(ErrorKind::device, fmt::format("{}: {}", folder.string(), error.message()));
+  }
+  if (space.available >= bytes) {
+    return {};
+  }
   return fail(ErrorKind::device, fmt::format("{}: {:.0f} MiB free, {} needs {:.0f} MiB", folder.string(),
                                              static_cast<double>(space.available) / mebibyte, what_for,
                                              static_cast<double>(bytes) / mebibyte));

@@ -11,11 +11,11 @@ namespace selfcal {
 
 struct RecordingRules {
   double quota_mib = 0.0;
-  double keep_days = 0.0;   // 0: for ever
+  double keep_days = 0.0;  // 0: for ever
 };
 
 struct PrunedRecording {
-  RunRecord run;            // as before
+  RunRecord run;  // as before
   std::string why;
 };
 

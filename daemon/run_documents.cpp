@@ -23,7 +23,9 @@ ordered_json summary(const RunRecord& run) {
       {"exit_status", run.exit_status < 0 ? ordered_json() : ordered_json(run.exit_status)},
       {"reason", run.reason},
       {"user", run.user},
-      {"kind", run.rollback ? "rollback" : run.amends != 0 ? "amendment" : "calibration"},
+      {"kind", run.rollback      ? "rollback"
+               : run.amends != 0 ? "amendment"
+                                 : "calibration"},
       {"amends", run.amends == 0 ? ordered_json() : ordered_json(run.amends)},
       {"schedule", run.schedule},
       {"dry_run", run.dry_run},
@@ -43,10 +45,16 @@ ordered_json summary(const RunRecord& run) {
 // A coefficient record as it went over the bus, or null where there is none or it cannot be read.
 Expected<ordered_json> set_document(const RunStore& store, RunId run, SetRole role) {
   const auto bytes = store.set(run, role);
-  if (!bytes) return tl::unexpected(bytes.error());
-  if (!*bytes) return ordered_json();
+  if (!bytes) {
+    return tl::unexpected(bytes.error());
+  }
+  if (!*bytes) {
+    return ordered_json();
+  }
   const auto set = ins::decode_coefficients(**bytes);
-  if (!set) return ordered_json();
+  if (!set) {
+    return ordered_json();
+  }
   ordered_json parameters = ordered_json::array();
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
     const SensorParameter& parameter = sensor_parameters[i];
@@ -64,16 +72,20 @@ Expected<ordered_json> set_document(const RunStore& store, RunId run, SetRole ro
 Expected<std::string> run_document(const RunStore& store, const RunRecord& run) {
   ordered_json document = summary(run);
   const auto events = store.events(run.id);
-  if (!events) return tl::unexpected(events.error());
+  if (!events) {
+    return tl::unexpected(events.error());
+  }
   document["events"] = ordered_json::array();
   for (const EventRecord& event : *events) {
     document["events"].push_back({{"utc", event.utc}, {"kind", event.kind}, {"text", event.text}});
   }
   ordered_json& sets = document["coefficients"];
-  for (const auto& [key, role] : {std::pair{"previous", SetRole::previous}, {"proposed", SetRole::written},
-                                  {"read_back", SetRole::read_back}}) {
+  for (const auto& [key, role] :
+       {std::pair{"previous", SetRole::previous}, {"proposed", SetRole::written}, {"read_back", SetRole::read_back}}) {
     auto set = set_document(store, run.id, role);
-    if (!set) return tl::unexpected(set.error());
+    if (!set) {
+      return tl::unexpected(set.error());
+    }
     sets[key] = std::move(*set);
   }
   // What the gate refused, or a dry run found, was proposed and never sent.
@@ -85,13 +97,21 @@ Expected<std::string> run_document(const RunStore& store, const RunRecord& run) 
 
 Expected<std::string> history_document(const RunStore& store, const std::string& serial, const Limits& limits) {
   const auto runs = store.runs_of_serial(serial);
-  if (!runs) return tl::unexpected(runs.error());
+  if (!runs) {
+    return tl::unexpected(runs.error());
+  }
   ordered_json document{{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}};
-  for (const RunRecord& run : *runs) document["runs"].push_back(summary(run));
-  if (serial.empty()) return document.dump();
+  for (const RunRecord& run : *runs) {
+    document["runs"].push_back(summary(run));
+  }
+  if (serial.empty()) {
+    return document.dump();
+  }
   for (int i = 0; i < sensor_parameter_count; ++i) {
     auto history = store.parameter_history(serial, i);
-    if (!history) return tl::unexpected(history.error());
+    if (!history) {
+      return tl::unexpected(history.error());
+    }
     const SensorParameter& parameter = sensor_parameters[static_cast<std::size_t>(i)];
     ordered_json values = ordered_json::array();
     for (const ParameterRecord& record : *history) {
@@ -113,7 +133,8 @@ Expected<std::string> history_document(const RunStore& store, const std::string&
     if (!history->empty()) {
       const ParameterRecord latest = history->back();
       history->pop_back();
-      entry["warnings"] = trend_warnings(std::string(parameter.name), std::string(parameter.unit), *history, latest, limit);
+      entry["warnings"] =
+          trend_warnings(std::string(parameter.name), std::string(parameter.unit), *history, latest, limit);
     }
     document["parameters"].push_back(std::move(entry));
   }

@@ -51,14 +51,18 @@ constexpr std::string_view run_columns =
 constexpr const char* final_states = "('completed','refused','failed','aborted')";
 
 Expected<void> execute(sqlite3* database, const char* sql) {
-  if (sqlite3_exec(database, sql, nullptr, nullptr, nullptr) != SQLITE_OK) return database_error(database, sql);
+  if (sqlite3_exec(database, sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    return database_error(database, sql);
+  }
   return {};
 }
 
 Expected<std::int64_t> single_integer(sqlite3* database, std::string_view sql) {
   Statement statement(database, sql);
   const auto row = statement.step();
-  if (!row) return tl::unexpected(row.error());
+  if (!row) {
+    return tl::unexpected(row.error());
+  }
   return *row ? statement.integer() : 0;
 }
 
@@ -95,8 +99,12 @@ Expected<std::vector<RunRecord>> read_runs(Statement& statement) {
   std::vector<RunRecord> runs;
   while (true) {
     const auto row = statement.step();
-    if (!row) return tl::unexpected(row.error());
-    if (!*row) return runs;
+    if (!row) {
+      return tl::unexpected(row.error());
+    }
+    if (!*row) {
+      return runs;
+    }
     runs.push_back(read_run(statement));
   }
 }
@@ -112,12 +120,17 @@ std::string role_name(SetRole role) {
 Expected<void> verify_integrity(sqlite3* database) {
   Statement statement(database, "PRAGMA integrity_check(1)");
   const auto row = statement.step();
-  if (!row) return tl::unexpected(row.error());
+  if (!row) {
+    return tl::unexpected(row.error());
+  }
   std::string verdict = statement.text();
-  if (verdict == "ok") return {};
-  std::replace(verdict.begin(), verdict.end(), '\n', ' ');   // an error is one line
-  return fail(ErrorKind::device, fmt::format("database {}: damaged: {}; restore a backup (selfcal db restore --offline NAME)",
-                                             sqlite3_db_filename(database, "main"), verdict));
+  if (verdict == "ok") {
+    return {};
+  }
+  std::replace(verdict.begin(), verdict.end(), '\n', ' ');  // an error is one line
+  return fail(ErrorKind::device,
+              fmt::format("database {}: damaged: {}; restore a backup (selfcal db restore --offline NAME)",
+                          sqlite3_db_filename(database, "main"), verdict));
 }
 
 struct Close {
@@ -140,13 +153,21 @@ Expected<Handle> open_handle(const std::filesystem::path& file, int flags) {
 
 Expected<std::unique_ptr<RunStore>> RunStore::open(const std::filesystem::path& file) {
   auto database = open_handle(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-  if (!database) return tl::unexpected(database.error());
-  if (auto ok = verify_integrity(database->get()); !ok) return tl::unexpected(ok.error());
+  if (!database) {
+    return tl::unexpected(database.error());
+  }
+  if (auto ok = verify_integrity(database->get()); !ok) {
+    return tl::unexpected(ok.error());
+  }
   for (const char* pragma : {"PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL", "PRAGMA foreign_keys=ON"}) {
-    if (auto ok = execute(database->get(), pragma); !ok) return tl::unexpected(ok.error());
+    if (auto ok = execute(database->get(), pragma); !ok) {
+      return tl::unexpected(ok.error());
+    }
   }
   const auto version = single_integer(database->get(), "PRAGMA user_version");
-  if (!version) return tl::unexpected(version.error());
+  if (!version) {
+    return tl::unexpected(version.error());
+  }
   if (*version > schema_version) {
     return fail(ErrorKind::device, fmt::format("database {}: schema version {} is newer than this program's {}",
                                                file.string(), *version, schema_version));
@@ -154,7 +175,9 @@ Expected<std::unique_ptr<RunStore>> RunStore::open(const std::filesystem::path& 
   for (auto step = *version; step < schema_version; ++step) {
     const std::string upgrade = fmt::format("BEGIN IMMEDIATE; {} PRAGMA user_version={}; COMMIT;",
                                             schema_steps.at(static_cast<std::size_t>(step)), step + 1);
-    if (auto ok = execute(database->get(), upgrade.c_str()); !ok) return tl::unexpected(ok.error());
+    if (auto ok = execute(database->get(), upgrade.c_str()); !ok) {
+      return tl::unexpected(ok.error());
+    }
   }
   return std::unique_ptr<RunStore>(new RunStore(database->release()));
 }
@@ -162,16 +185,19 @@ Expected<std::unique_ptr<RunStore>> RunStore::open(const std::filesystem::path& 
 RunStore::~RunStore() { sqlite3_close(database_); }
 
 Expected<RunId> RunStore::create_run(const RunRecord& run) {
-  Statement insert(database_,
-                   "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
-                   "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
-                   "result_json, drift_old_m, drift_new_m, stop_when_met, amends) "
-                   "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?)");
+  Statement insert(
+      database_,
+      "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
+      "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
+      "result_json, drift_old_m, drift_new_m, stop_when_met, amends) "
+      "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?)");
   insert.bind(run.ins).bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.user);
   insert.bind(run.schedule).bind(std::int64_t{run.dry_run}).bind(run.force_reason).bind(std::int64_t{run.rollback});
   insert.bind(run.started_utc).bind(run.software).bind(std::int64_t{run.stop_when_met});
   insert.bind(run.amends);
-  if (auto ok = insert.run(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = insert.run(); !ok) {
+    return tl::unexpected(ok.error());
+  }
   return sqlite3_last_insert_rowid(database_);
 }
 
@@ -198,10 +224,12 @@ Expected<void> RunStore::store_set(RunId run, SetRole role, const std::vector<st
 }
 
 Expected<void> RunStore::store_parameters(RunId run, const Parameters& parameters) {
-  if (auto ok = execute(database_, "BEGIN IMMEDIATE"); !ok) return ok;
+  if (auto ok = execute(database_, "BEGIN IMMEDIATE"); !ok) {
+    return ok;
+  }
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    Statement insert(database_,
-                     "INSERT OR REPLACE INTO parameters(run, name, unit, value, sigma, determined) VALUES(?,?,?,?,?,?)");
+    Statement insert(
+        database_, "INSERT OR REPLACE INTO parameters(run, name, unit, value, sigma, determined) VALUES(?,?,?,?,?,?)");
     insert.bind(run).bind(std::string(sensor_parameters[i].name)).bind(std::string(sensor_parameters[i].unit));
     insert.bind(parameters.value[i]).bind(parameters.sigma[i]).bind(std::int64_t{parameters.determined[i]});
     if (auto ok = insert.run(); !ok) {
@@ -216,8 +244,12 @@ Expected<std::optional<RunRecord>> RunStore::run(RunId id) const {
   Statement select(database_, fmt::format("SELECT {} FROM runs WHERE id=?", run_columns));
   select.bind(id);
   const auto row = select.step();
-  if (!row) return tl::unexpected(row.error());
-  if (!*row) return std::optional<RunRecord>();
+  if (!row) {
+    return tl::unexpected(row.error());
+  }
+  if (!*row) {
+    return std::optional<RunRecord>();
+  }
   return read_run(select);
 }
 
@@ -228,8 +260,7 @@ Expected<std::vector<RunRecord>> RunStore::unfinished_runs() const {
 }
 
 Expected<std::vector<RunRecord>> RunStore::runs_of_serial(const std::string& serial) const {
-  Statement select(database_,
-                   fmt::format("SELECT {} FROM runs WHERE ?1='' OR serial=?1 ORDER BY id", run_columns));
+  Statement select(database_, fmt::format("SELECT {} FROM runs WHERE ?1='' OR serial=?1 ORDER BY id", run_columns));
   select.bind(serial);
   return read_runs(select);
 }
@@ -240,8 +271,12 @@ Expected<std::vector<EventRecord>> RunStore::events(RunId run) const {
   std::vector<EventRecord> events;
   while (true) {
     const auto row = select.step();
-    if (!row) return tl::unexpected(row.error());
-    if (!*row) return events;
+    if (!row) {
+      return tl::unexpected(row.error());
+    }
+    if (!*row) {
+      return events;
+    }
     EventRecord event;
     event.utc = select.text();
     event.kind = select.text();
@@ -254,8 +289,12 @@ Expected<std::optional<std::vector<std::uint8_t>>> RunStore::set(RunId run, SetR
   Statement select(database_, "SELECT bytes FROM coefficient_sets WHERE run=? AND role=?");
   select.bind(run).bind(role_name(role));
   const auto row = select.step();
-  if (!row) return tl::unexpected(row.error());
-  if (!*row) return std::optional<std::vector<std::uint8_t>>();
+  if (!row) {
+    return tl::unexpected(row.error());
+  }
+  if (!*row) {
+    return std::optional<std::vector<std::uint8_t>>();
+  }
   return select.blob();
 }
 
@@ -267,8 +306,12 @@ Expected<std::vector<ParameterRecord>> RunStore::parameter_history(const std::st
   std::vector<ParameterRecord> history;
   while (true) {
     const auto row = select.step();
-    if (!row) return tl::unexpected(row.error());
-    if (!*row) return history;
+    if (!row) {
+      return tl::unexpected(row.error());
+    }
+    if (!*row) {
+      return history;
+    }
     ParameterRecord record;
     record.run = select.integer();
     record.utc = select.text();
@@ -287,27 +330,46 @@ Expected<std::vector<RunRecord>> RunStore::runs_with_recordings() const {
 
 Expected<void> RunStore::check(const std::filesystem::path& file) {
   auto database = open_handle(file, SQLITE_OPEN_READWRITE);
-  if (!database) return tl::unexpected(database.error());
-  if (auto ok = verify_integrity(database->get()); !ok) return ok;
-  const auto orphans = single_integer(
-      database->get(), "SELECT (SELECT count(*) FROM events WHERE run NOT IN (SELECT id FROM runs)) + (SELECT count(*) "
-                       "FROM parameters WHERE run NOT IN (SELECT id FROM runs)) + (SELECT count(*) FROM "
-                       "coefficient_sets WHERE run NOT IN (SELECT id FROM runs))");
-  if (!orphans) return tl::unexpected(orphans.error());
-  if (*orphans == 0) return {};
+  if (!database) {
+    return tl::unexpected(database.error());
+  }
+  if (auto ok = verify_integrity(database->get()); !ok) {
+    return ok;
+  }
+  const auto orphans =
+      single_integer(database->get(),
+                     "SELECT (SELECT count(*) FROM events WHERE run NOT IN (SELECT id FROM runs)) + (SELECT count(*) "
+                     "FROM parameters WHERE run NOT IN (SELECT id FROM runs)) + (SELECT count(*) FROM "
+                     "coefficient_sets WHERE run NOT IN (SELECT id FROM runs))");
+  if (!orphans) {
+    return tl::unexpected(orphans.error());
+  }
+  if (*orphans == 0) {
+    return {};
+  }
   return fail(ErrorKind::device, fmt::format("database {}: {} rows belong to no run", file.string(), *orphans));
 }
 
 Expected<void> RunStore::copy(const std::filesystem::path& from, const std::filesystem::path& to) {
   auto source = open_handle(from, SQLITE_OPEN_READWRITE);
-  if (!source) return tl::unexpected(source.error());
-  if (auto ok = verify_integrity(source->get()); !ok) return ok;
+  if (!source) {
+    return tl::unexpected(source.error());
+  }
+  if (auto ok = verify_integrity(source->get()); !ok) {
+    return ok;
+  }
   auto target = open_handle(to, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-  if (!target) return tl::unexpected(target.error());
+  if (!target) {
+    return tl::unexpected(target.error());
+  }
   sqlite3_backup* backup = sqlite3_backup_init(target->get(), "main", source->get(), "main");
-  if (backup == nullptr) return database_error(target->get(), "start copying");
+  if (backup == nullptr) {
+    return database_error(target->get(), "start copying");
+  }
   sqlite3_backup_step(backup, -1);
-  if (sqlite3_backup_finish(backup) != SQLITE_OK) return database_error(target->get(), "copy");
+  if (sqlite3_backup_finish(backup) != SQLITE_OK) {
+    return database_error(target->get(), "copy");
+  }
   return verify_integrity(target->get());
 }
 

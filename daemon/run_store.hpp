@@ -18,31 +18,31 @@ struct sqlite3;
 
 namespace selfcal {
 
-using RunId = std::int64_t;   // 1, 2, ...
+using RunId = std::int64_t;  // 1, 2, ...
 
 struct RunRecord {
   RunId id = 0;
-  std::string ins;              // section in selfcald.toml
-  std::string serial;           // empty until identified
+  std::string ins;     // section in selfcald.toml
+  std::string serial;  // empty until identified
   std::string ins_software;
   State state = State::connecting;
   std::string user;
-  std::string schedule;         // as asked for: name or file
+  std::string schedule;  // as asked for: name or file
   bool dry_run = false;
-  std::string force_reason;     // empty: not forced
-  bool rollback = false;        // writes a former set instead of calibrating
-  RunId amends = 0;             // estimates this run's recording again, with the physics named in it; 0: none
-  bool stop_when_met = false;   // the rotation may end as soon as every tolerance is met
+  std::string force_reason;    // empty: not forced
+  bool rollback = false;       // writes a former set instead of calibrating
+  RunId amends = 0;            // estimates this run's recording again, with the physics named in it; 0: none
+  bool stop_when_met = false;  // the rotation may end as soon as every tolerance is met
   std::string started_utc, ended_utc;
-  std::string software;         // of the daemon
-  int exit_status = -1;         // -1: not ended
-  std::string reason;           // one line, why it ended as it did
+  std::string software;  // of the daemon
+  int exit_status = -1;  // -1: not ended
+  std::string reason;    // one line, why it ended as it did
   bool abort_wanted = false;
-  std::uint32_t rotation = 0;   // the INS's own number of the rotation, 0: none yet
-  std::string recording;        // path, empty: none (yet, or pruned)
-  std::string result_json;      // selfcal estimate --json of the recording
-  double drift_old_m = -1.0, drift_new_m = -1.0;   // free-inertial, horizontal; -1: not measured
-  double early_end_s = -1.0;    // of data, where the rotation was ended before its schedule; -1: it was not
+  std::uint32_t rotation = 0;                     // the INS's own number of the rotation, 0: none yet
+  std::string recording;                          // path, empty: none (yet, or pruned)
+  std::string result_json;                        // selfcal estimate --json of the recording
+  double drift_old_m = -1.0, drift_new_m = -1.0;  // free-inertial, horizontal; -1: not measured
+  double early_end_s = -1.0;  // of data, where the rotation was ended before its schedule; -1: it was not
 };
 
 // Its coefficients went into force.
@@ -50,14 +50,14 @@ inline bool wrote_its_set(const RunRecord& run) { return run.state == State::com
 
 struct EventRecord {
   std::string utc;
-  std::string kind;             // transition, warning, operator, ...
+  std::string kind;  // transition, warning, operator, ...
   std::string text;
 };
 
 struct ParameterRecord {
   RunId run = 0;
   std::string utc;
-  double value = 0.0, sigma = 0.0;   // in the unit of sensor_parameters
+  double value = 0.0, sigma = 0.0;  // in the unit of sensor_parameters
   bool determined = false;
 };
 
@@ -72,8 +72,8 @@ class RunStore {
   RunStore(const RunStore&) = delete;
   RunStore& operator=(const RunStore&) = delete;
 
-  Expected<RunId> create_run(const RunRecord& run);           // id is given by the database
-  Expected<void> update_run(const RunRecord& run);            // all but id, ins, user, started
+  Expected<RunId> create_run(const RunRecord& run);  // id is given by the database
+  Expected<void> update_run(const RunRecord& run);   // all but id, ins, user, started
   Expected<void> add_event(RunId run, const EventRecord& event);
   Expected<void> store_set(RunId run, SetRole role, const std::vector<std::uint8_t>& bytes);
   // In the unit of sensor_parameters, their order.
@@ -85,15 +85,15 @@ class RunStore {
 
   Expected<std::optional<RunRecord>> run(RunId id) const;
   Expected<std::vector<RunRecord>> unfinished_runs() const;
-  Expected<std::vector<RunRecord>> runs_of_serial(const std::string& serial) const;   // empty serial: of all
+  Expected<std::vector<RunRecord>> runs_of_serial(const std::string& serial) const;  // empty serial: of all
   Expected<std::vector<EventRecord>> events(RunId run) const;
   Expected<std::optional<std::vector<std::uint8_t>>> set(RunId run, SetRole role) const;
   // Oldest first; completed runs that wrote their set.
   Expected<std::vector<ParameterRecord>> parameter_history(const std::string& serial, int index) const;
-  Expected<std::vector<RunRecord>> runs_with_recordings() const;   // oldest first
+  Expected<std::vector<RunRecord>> runs_with_recordings() const;  // oldest first
 
-  static Expected<void> check(const std::filesystem::path& file);                     // integrity and orphan states
-  static Expected<void> copy(const std::filesystem::path& from, const std::filesystem::path& to);   // backup, restore
+  static Expected<void> check(const std::filesystem::path& file);  // integrity and orphan states
+  static Expected<void> copy(const std::filesystem::path& from, const std::filesystem::path& to);  // backup, restore
 
  private:
   explicit RunStore(sqlite3* database) : database_(database) {}

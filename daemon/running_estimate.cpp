@@ -11,8 +11,8 @@
 namespace selfcal {
 namespace {
 
-constexpr double forecast_step_s = 60.0;   // dwells longer than this are looked at in pieces
-constexpr double most_loss = 10.0;         // the data gave less than the analysis by this at most
+constexpr double forecast_step_s = 60.0;  // dwells longer than this are looked at in pieces
+constexpr double most_loss = 10.0;        // the data gave less than the analysis by this at most
 
 // The same motion with longer dwells in pieces, a "move" to where the gimbal stands already between them.
 Schedule in_pieces(const Schedule& schedule) {
@@ -42,15 +42,15 @@ double common_loss(const ParameterVector& found, const ParameterVector& planned)
 
 }  // namespace
 
-Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, const earth::Position& site,
-                  double data_s, const ParameterVector& tolerance) {
+Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, const earth::Position& site, double data_s,
+                  const ParameterVector& tolerance) {
   Installation installation;
   installation.attitude = so_far.initial_attitude;
   installation.site = site;
   installation.gyro_arw = so_far.gyro_arw;
   installation.accel_vrw = so_far.accel_vrw;
   installation.position_sigma = so_far.position_sigma;
-  installation.tolerance.setConstant(HUGE_VAL);   // what is missing, and how to get it, is not asked here
+  installation.tolerance.setConstant(HUGE_VAL);  // what is missing, and how to get it, is not asked here
   const Plan planned_so_far = predict(schedule_until(schedule, data_s), installation);
   const double loss = common_loss(so_far.sigma, planned_so_far.sigma);
   const Plan whole = predict(in_pieces(schedule), installation);
@@ -58,14 +58,20 @@ Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, con
   Forecast answer;
   ParameterVector last = so_far.sigma;
   for (const PositionForecast& point : whole.history) {
-    if (point.end_s <= data_s) continue;
+    if (point.end_s <= data_s) {
+      continue;
+    }
     last = loss * point.sigma;
     const bool met = (last.array() <= early_end_margin * tolerance.array()).all();
-    if (met && answer.met_at_s < 0) answer.met_at_s = point.end_s;
+    if (met && answer.met_at_s < 0) {
+      answer.met_at_s = point.end_s;
+    }
   }
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (last(k) > tolerance(k)) answer.out_of_reach.emplace_back(sensor_parameters[i].name);
+    if (last(k) > tolerance(k)) {
+      answer.out_of_reach.emplace_back(sensor_parameters[i].name);
+    }
   }
   return answer;
 }
@@ -73,22 +79,28 @@ Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, con
 Expected<RunningEstimate> RunningEstimator::estimate(std::uint32_t pages, const std::stop_token& stop) {
   if (!recording_) {
     auto begun = PageRecording::begin(request_);
-    if (!begun) return tl::unexpected(begun.error());
+    if (!begun) {
+      return tl::unexpected(begun.error());
+    }
     recording_ = std::move(*begun);
   }
-  if (auto taken = recording_->take(pages); !taken) return tl::unexpected(taken.error());
+  if (auto taken = recording_->take(pages); !taken) {
+    return tl::unexpected(taken.error());
+  }
   const CalibrationOptions options = calibration_options(request_.config);
   const Recording& recording = recording_->recording();
   const auto result = calibrate_recording(recording, options, {}, stop);
-  if (!result) return tl::unexpected(result.error());
+  if (!result) {
+    return tl::unexpected(result.error());
+  }
   RunningEstimate answer;
   answer.data_s = recording_->duration_s();
   answer.value = result->value;
   answer.sigma = result->sigma;
   answer.tolerance = options.tolerance;
   answer.objections = gate_objections(*result, request_.config);
-  answer.met = answer.objections.empty() &&
-               (result->sigma.array() <= early_end_margin * options.tolerance.array()).all();
+  answer.met =
+      answer.objections.empty() && (result->sigma.array() <= early_end_margin * options.tolerance.array()).all();
   const earth::Position site{recording.latitude_deg * units::degree, recording.longitude_deg * units::degree,
                              recording.height_m};
   answer.forecast = answer.met ? Forecast{answer.data_s, {}}

@@ -26,11 +26,11 @@ struct Forecast {
 };
 
 struct RunningEstimate {
-  double data_s = 0.0;                    // it is made of so much
-  ParameterVector value, sigma;           // SI
-  ParameterVector tolerance;              // SI
-  std::vector<std::string> objections;    // of the gate, were the data to end here
-  bool met = false;                       // no objection, and every sigma below the tolerance by the margin
+  double data_s = 0.0;                  // it is made of so much
+  ParameterVector value, sigma;         // SI
+  ParameterVector tolerance;            // SI
+  std::vector<std::string> objections;  // of the gate, were the data to end here
+  bool met = false;                     // no objection, and every sigma below the tolerance by the margin
   Forecast forecast;
 };
 
@@ -40,8 +40,8 @@ using RunningDone = std::function<void(Expected<RunningEstimate>, double)>;
 
 // What the rest of `schedule` gives after `data_s` of it: covariance analysis with attitude and noise as found so far.
 // Where the data so far gave less than the analysis says (a moving base), the rest is taken to give less by as much.
-Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, const earth::Position& site,
-                  double data_s, const ParameterVector& tolerance);
+Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, const earth::Position& site, double data_s,
+                  const ParameterVector& tolerance);
 
 // The pages taken up so far; shared by the jobs of one rotation, which run one after the other.
 class RunningEstimator {

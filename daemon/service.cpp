@@ -32,12 +32,18 @@ Expected<std::unique_ptr<Service>> Service::create(EventLoop& loop, Config confi
     return fail(ErrorKind::device, fmt::format("{}: {}", config.state_directory, error.message()));
   }
   auto lock = StateLock::take(config.state_directory);
-  if (!lock) return tl::unexpected(lock.error());
+  if (!lock) {
+    return tl::unexpected(lock.error());
+  }
   auto store = RunStore::open(database_path(config.state_directory));
-  if (!store) return tl::unexpected(store.error());
+  if (!store) {
+    return tl::unexpected(store.error());
+  }
   std::unique_ptr<Service> service(
       new Service(loop, std::move(config), std::move(config_file), std::move(*lock), std::move(*store)));
-  if (auto ok = service->connect_bus(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = service->connect_bus(); !ok) {
+    return tl::unexpected(ok.error());
+  }
   return service;
 }
 
@@ -49,9 +55,13 @@ Service::Service(EventLoop& loop, Config config, std::string config_file, StateL
       lock_(std::move(lock)),
       store_(std::move(store)),
       publisher_(loop, config_.lcm_url) {
-  for (const InsConfig& ins : config_.instruments) sessions_[ins.name].config = ins;
+  for (const InsConfig& ins : config_.instruments) {
+    sessions_[ins.name].config = ins;
+  }
   loop_.before_wait([this] {
-    if (bus_) bus_->serve();
+    if (bus_) {
+      bus_->serve();
+    }
   });
   publish();
   prune_every_hour();
@@ -61,7 +71,9 @@ Service::~Service() = default;
 
 Expected<void> Service::connect_bus() {
   auto connection = open_bus(config_.bus);
-  if (!connection) return tl::unexpected(connection.error());
+  if (!connection) {
+    return tl::unexpected(connection.error());
+  }
   connection_ = std::move(*connection);
   try {
     operator_service_ = std::make_unique<OperatorService>(*connection_, *this);
@@ -76,7 +88,9 @@ Expected<void> Service::connect_bus() {
 
 // Runs go on without operators; the bus is tried again for ever.
 void Service::bus_lost() {
-  if (bus_) journal::write(journal::Level::warning, "D-Bus is gone: runs go on, the bus is tried again");
+  if (bus_) {
+    journal::write(journal::Level::warning, "D-Bus is gone: runs go on, the bus is tried again");
+  }
   bus_.reset();
   try {
     operator_service_.reset();
@@ -84,7 +98,9 @@ void Service::bus_lost() {
   }
   connection_.reset();
   loop_.after(bus_retry_interval, [this] {
-    if (stopping_) return;
+    if (stopping_) {
+      return;
+    }
     if (connect_bus()) {
       journal::write(journal::Level::notice, "D-Bus is back");
     } else {
@@ -96,11 +112,15 @@ void Service::bus_lost() {
 // A bus that has just gone shows in a failed send first.
 template <typename Call>
 void Service::tell_bus(Call call) {
-  if (!operator_service_) return;
+  if (!operator_service_) {
+    return;
+  }
   try {
     call(*operator_service_);
   } catch (const sdbus::Error&) {
-    if (bus_) bus_->serve();
+    if (bus_) {
+      bus_->serve();
+    }
   }
 }
 
@@ -120,7 +140,9 @@ fs::path Service::run_folder(RunId run) const {
 
 void Service::resume_unfinished() {
   const auto runs = store_->unfinished_runs();
-  if (!runs) return journal::write(journal::Level::error, runs.error().message);
+  if (!runs) {
+    return journal::write(journal::Level::error, runs.error().message);
+  }
   for (RunRecord run : *runs) {
     Session* owner = session(run.ins);
     const auto attached = owner == nullptr || owner->active()
@@ -135,7 +157,9 @@ void Service::resume_unfinished() {
     run.exit_status = static_cast<int>(ErrorKind::device);
     run.reason = "could not be resumed: " + attached.error().message;
     journal::write(journal::Level::error, run.reason, {run.id, run.ins, run.serial, "failed", -1});
-    if (auto stored = store_->update_run(run); !stored) journal::write(journal::Level::error, stored.error().message);
+    if (auto stored = store_->update_run(run); !stored) {
+      journal::write(journal::Level::error, stored.error().message);
+    }
   }
   sweep_run_folders();
   notify_status();
@@ -148,7 +172,9 @@ void Service::sweep_run_folders() {
     const bool in_use = std::any_of(sessions_.begin(), sessions_.end(), [&](const auto& session) {
       return session.second.active() && run_folder(session.second.run->record().id) == folder.path();
     });
-    if (!in_use) drop_pages(folder.path());
+    if (!in_use) {
+      drop_pages(folder.path());
+    }
   }
 }
 
@@ -160,7 +186,9 @@ void Service::reload() {
   std::map<std::string, Session> sessions;
   for (const InsConfig& ins : fresh->instruments) {
     Session& kept = sessions[ins.name];
-    if (auto node = sessions_.extract(ins.name)) kept = std::move(node.mapped());
+    if (auto node = sessions_.extract(ins.name)) {
+      kept = std::move(node.mapped());
+    }
     // A port is opened anew by the next run; one in use stays until then.
     if (!kept.active()) {
       kept.run.reset();
@@ -169,7 +197,9 @@ void Service::reload() {
     kept.config = ins;
   }
   for (auto& [name, old] : sessions_) {
-    if (!old.active()) continue;
+    if (!old.active()) {
+      continue;
+    }
     journal::write(journal::Level::warning, fmt::format("ins.{} was removed, but its run goes on", name));
     sessions[name] = std::move(old);
   }
@@ -201,7 +231,9 @@ void Service::on_warning(const RunRecord& run, const std::string& text) {
 
 void Service::on_finished(const RunRecord& run) {
   tell_bus([&](OperatorService& service) { service.finished(run); });
-  if (run.state == State::failed) publisher_.publish_alarm(run.ins, run.id, false, run.reason);
+  if (run.state == State::failed) {
+    publisher_.publish_alarm(run.ins, run.id, false, run.reason);
+  }
   notify_status();
   prune_recordings();
 }
@@ -209,7 +241,9 @@ void Service::on_finished(const RunRecord& run) {
 void Service::notify_status() {
   std::string text;
   for (const auto& [name, session] : sessions_) {
-    if (!session.active()) continue;
+    if (!session.active()) {
+      continue;
+    }
     const RunRecord& run = session.run->record();
     text += fmt::format("{}{}: run {}, {}", text.empty() ? "" : "; ", name, run.id, words(run.state));
   }
@@ -221,8 +255,12 @@ void Service::publish() {
   const bool full_second = publish_count_++ % publishes_per_second == 0;
   int active = 0;
   for (const auto& [name, session] : sessions_) {
-    if (session.active()) ++active;
-    if (!session.active() && !full_second) continue;
+    if (session.active()) {
+      ++active;
+    }
+    if (!session.active() && !full_second) {
+      continue;
+    }
     PublishedIns ins;
     ins.name = name;
     ins.state_idle = !session.active();
@@ -233,15 +271,18 @@ void Service::publish() {
     publisher_.publish_ins(ins);
     publisher_.publish_estimate(ins);
   }
-  if (full_second) publisher_.publish_service(static_cast<int>(sessions_.size()), active);
+  if (full_second) {
+    publisher_.publish_service(static_cast<int>(sessions_.size()), active);
+  }
   loop_.after(publish_interval, [this] { publish(); });
 }
 
 void Service::prune_recordings() {
-  const auto pruned =
-      selfcal::prune_recordings(*store_, {config_.recordings_quota_mib, config_.recordings_keep_days},
-                                fs::file_time_type::clock::now());
-  if (!pruned) return journal::write(journal::Level::warning, pruned.error().message);
+  const auto pruned = selfcal::prune_recordings(*store_, {config_.recordings_quota_mib, config_.recordings_keep_days},
+                                                fs::file_time_type::clock::now());
+  if (!pruned) {
+    return journal::write(journal::Level::warning, pruned.error().message);
+  }
   for (const PrunedRecording& gone : *pruned) {
     journal::write(journal::Level::notice, fmt::format("recording {} removed: {}", gone.run.recording, gone.why),
                    {gone.run.id, gone.run.ins, gone.run.serial, "", -1});

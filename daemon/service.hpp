@@ -24,9 +24,9 @@ class Service : public Operations, public RunObserver {
   static Expected<std::unique_ptr<Service>> create(EventLoop& loop, Config config, std::string config_file);
   ~Service() override;
 
-  void resume_unfinished();   // after a crash or restart
-  void reload();              // runs in progress keep what they began with
-  void prepare_to_stop();     // nothing is begun any more; runs in progress stay resumable
+  void resume_unfinished();  // after a crash or restart
+  void reload();             // runs in progress keep what they began with
+  void prepare_to_stop();    // nothing is begun any more; runs in progress stay resumable
 
  private:
   // One configured INS. The port and the run exist from the first run on.

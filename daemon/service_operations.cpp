@@ -31,7 +31,9 @@ tl::unexpected<Refusal> unavailable(const Error& error) {
 
 // The configured timing is that of the named schedules; a file has its own.
 Expected<Schedule> schedule_of(const InsConfig& config, const std::string& name_or_file) {
-  if (named_schedule(name_or_file)) return find_schedule(name_or_file, config.dwell_s, config.rotation_s);
+  if (named_schedule(name_or_file)) {
+    return find_schedule(name_or_file, config.dwell_s, config.rotation_s);
+  }
   return find_schedule(name_or_file);
 }
 
@@ -39,19 +41,26 @@ Expected<Schedule> schedule_of(const InsConfig& config, const std::string& name_
 
 Expected<void> Service::attach(Session& session, RunRecord record, const std::string& schedule_name) {
   auto schedule = schedule_of(session.config, schedule_name);
-  if (!schedule) return tl::unexpected(schedule.error());
+  if (!schedule) {
+    return tl::unexpected(schedule.error());
+  }
   const auto key = load_unlock_key(session.config);
-  if (!key) return tl::unexpected(key.error());
+  if (!key) {
+    return tl::unexpected(key.error());
+  }
   std::error_code error;
   fs::create_directories(run_folder(record.id), error);
-  if (error) return fail(ErrorKind::device, fmt::format("{}: {}", run_folder(record.id).string(), error.message()));
+  if (error) {
+    return fail(ErrorKind::device, fmt::format("{}: {}", run_folder(record.id).string(), error.message()));
+  }
   session.run.reset();
   session.port = std::make_unique<CanPort>(loop_, session.config);
-  if (!session.estimators) session.estimators = std::make_unique<EstimateWorker>(loop_);
+  if (!session.estimators) {
+    session.estimators = std::make_unique<EstimateWorker>(loop_);
+  }
   const std::filesystem::path folder = run_folder(record.id);
-  session.run = std::make_unique<CalibrationRun>(
-      RunContext{loop_, *store_, *session.port, *session.estimators, *this}, session.config, std::move(*schedule),
-      *key, std::move(record), folder);
+  session.run = std::make_unique<CalibrationRun>(RunContext{loop_, *store_, *session.port, *session.estimators, *this},
+                                                 session.config, std::move(*schedule), *key, std::move(record), folder);
   return {};
 }
 
@@ -61,7 +70,9 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
     return refuse(operator_api::error_busy,
                   fmt::format("busy, run {} by user {} since {}", other.id, other.user, other.started_utc));
   }
-  if (stopping_) return refuse(operator_api::error_unavailable, "the daemon is stopping");
+  if (stopping_) {
+    return refuse(operator_api::error_unavailable, "the daemon is stopping");
+  }
   const auto least = static_cast<std::uint64_t>(config_.free_space_mib) * mebibyte;
   if (auto room = require_space(config_.state_directory, least, "a run (free_space_mib)"); !room) {
     return unavailable(room.error());
@@ -70,15 +81,21 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
   if (auto schedule = schedule_of(session.config, schedule_name); !schedule) {
     return refuse(operator_api::error_unknown, schedule.error().message);
   }
-  if (const auto key = load_unlock_key(session.config); !key) return unavailable(key.error());
+  if (const auto key = load_unlock_key(session.config); !key) {
+    return unavailable(key.error());
+  }
   record.ins = session.config.name;
   record.schedule = schedule_name;
   record.started_utc = utc_now();
   record.software = SELFCAL_VERSION;
   const auto id = store_->create_run(record);
-  if (!id) return unavailable(id.error());
+  if (!id) {
+    return unavailable(id.error());
+  }
   record.id = *id;
-  if (auto attached = attach(session, record, schedule_name); !attached) return unavailable(attached.error());
+  if (auto attached = attach(session, record, schedule_name); !attached) {
+    return unavailable(attached.error());
+  }
   session.run->begin();
   notify_status();
   return *id;
@@ -86,7 +103,9 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
 
 Granted<RunId> Service::start(const StartRequest& request) {
   Session* chosen = session(request.ins);
-  if (request.ins.empty() && sessions_.size() == 1) chosen = &sessions_.begin()->second;
+  if (request.ins.empty() && sessions_.size() == 1) {
+    chosen = &sessions_.begin()->second;
+  }
   if (chosen == nullptr) {
     return refuse(operator_api::error_unknown,
                   fmt::format("no INS \"{}\"; configured: {}", request.ins, fmt::join(instruments(), ", ")));
@@ -101,25 +120,35 @@ Granted<RunId> Service::start(const StartRequest& request) {
 
 Granted<RunId> Service::amend(const AmendRequest& request) {
   const auto found = store_->run(request.run);
-  if (!found) return unavailable(found.error());
-  if (!*found) return refuse(operator_api::error_unknown, fmt::format("no run {}", request.run));
+  if (!found) {
+    return unavailable(found.error());
+  }
+  if (!*found) {
+    return refuse(operator_api::error_unknown, fmt::format("no run {}", request.run));
+  }
   const RunRecord& amended = **found;
   if (!is_final(amended.state)) {
-    return refuse(operator_api::error_nothing, fmt::format("run {} has not ended: {}", amended.id, words(amended.state)));
+    return refuse(operator_api::error_nothing,
+                  fmt::format("run {} has not ended: {}", amended.id, words(amended.state)));
   }
   if (amended.recording.empty()) {
     return refuse(operator_api::error_nothing, fmt::format("run {} has no recording (any more)", amended.id));
   }
   const auto runs = store_->runs_of_serial(amended.serial);
-  if (!runs) return unavailable(runs.error());
+  if (!runs) {
+    return unavailable(runs.error());
+  }
   for (const RunRecord& later : *runs) {
     if (later.id > amended.id && wrote_its_set(later)) {
-      return refuse(operator_api::error_nothing, fmt::format("run {} is not the latest: run {} of {} has written a set since",
-                                                             amended.id, later.id, later.started_utc));
+      return refuse(operator_api::error_nothing,
+                    fmt::format("run {} is not the latest: run {} of {} has written a set since", amended.id, later.id,
+                                later.started_utc));
     }
   }
   Session* chosen = session(amended.ins);
-  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", amended.ins));
+  if (chosen == nullptr) {
+    return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", amended.ins));
+  }
   RunRecord record;
   record.user = request.user;
   record.serial = amended.serial;
@@ -130,28 +159,42 @@ Granted<RunId> Service::amend(const AmendRequest& request) {
 }
 
 Granted<RunId> Service::rollback(const std::string& serial, const std::string& reason, const std::string& user) {
-  if (reason.empty()) return refuse(operator_api::error_unknown, "a rollback needs a reason");
+  if (reason.empty()) {
+    return refuse(operator_api::error_unknown, "a rollback needs a reason");
+  }
   const auto runs = store_->runs_of_serial(serial);
-  if (!runs) return unavailable(runs.error());
+  if (!runs) {
+    return unavailable(runs.error());
+  }
   const RunRecord* last = nullptr;
   for (const RunRecord& run : *runs) {
-    if (!serial.empty() && wrote_its_set(run)) last = &run;
+    if (!serial.empty() && wrote_its_set(run)) {
+      last = &run;
+    }
   }
   if (last == nullptr) {
     return refuse(operator_api::error_nothing, fmt::format("no completed calibration of \"{}\" is known", serial));
   }
   Session* chosen = session(last->ins);
-  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", last->ins));
+  if (chosen == nullptr) {
+    return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", last->ins));
+  }
   const auto previous = store_->set(last->id, SetRole::previous);
-  if (!previous) return unavailable(previous.error());
-  if (!*previous) return refuse(operator_api::error_nothing, fmt::format("run {} kept no former set", last->id));
+  if (!previous) {
+    return unavailable(previous.error());
+  }
+  if (!*previous) {
+    return refuse(operator_api::error_nothing, fmt::format("run {} kept no former set", last->id));
+  }
   RunRecord record;
   record.user = user;
   record.serial = serial;
   record.rollback = true;
   record.force_reason = reason;
   auto id = launch(*chosen, record, chosen->config.schedule);
-  if (!id) return id;
+  if (!id) {
+    return id;
+  }
   if (auto stored = store_->store_set(*id, SetRole::written, **previous); !stored) {
     (void)abort(last->ins, stored.error().message);
     return unavailable(stored.error());
@@ -161,29 +204,45 @@ Granted<RunId> Service::rollback(const std::string& serial, const std::string& r
 
 Granted<Done> Service::abort(const std::string& ins, const std::string& reason) {
   Session* chosen = session(ins);
-  if (ins.empty() && sessions_.size() == 1) chosen = &sessions_.begin()->second;
-  if (chosen == nullptr) return refuse(operator_api::error_unknown, fmt::format("no INS \"{}\"", ins));
-  if (!chosen->active()) return refuse(operator_api::error_nothing, fmt::format("{}: no run in progress", chosen->config.name));
+  if (ins.empty() && sessions_.size() == 1) {
+    chosen = &sessions_.begin()->second;
+  }
+  if (chosen == nullptr) {
+    return refuse(operator_api::error_unknown, fmt::format("no INS \"{}\"", ins));
+  }
+  if (!chosen->active()) {
+    return refuse(operator_api::error_nothing, fmt::format("{}: no run in progress", chosen->config.name));
+  }
   chosen->run->abort(reason);
   return Done{};
 }
 
 Granted<std::string> Service::show(RunId id) {
   const auto run = store_->run(id);
-  if (!run) return unavailable(run.error());
-  if (!*run) return refuse(operator_api::error_unknown, fmt::format("no run {}", id));
+  if (!run) {
+    return unavailable(run.error());
+  }
+  if (!*run) {
+    return refuse(operator_api::error_unknown, fmt::format("no run {}", id));
+  }
   auto document = run_document(*store_, **run);
-  if (!document) return unavailable(document.error());
+  if (!document) {
+    return unavailable(document.error());
+  }
   return std::move(*document);
 }
 
 Granted<std::string> Service::history(const std::string& serial) {
   const auto runs = store_->runs_of_serial(serial);
-  if (!runs) return unavailable(runs.error());
+  if (!runs) {
+    return unavailable(runs.error());
+  }
   // Limits are those of the place where the INS was calibrated last.
   const InsConfig* last = runs->empty() ? nullptr : config_.find(runs->back().ins);
   auto document = history_document(*store_, serial, last == nullptr ? Limits() : last->limit);
-  if (!document) return unavailable(document.error());
+  if (!document) {
+    return unavailable(document.error());
+  }
   return std::move(*document);
 }
 
@@ -194,37 +253,50 @@ Granted<std::string> Service::check_database() {
 
 Granted<std::string> Service::backup_database(const std::string& name) {
   const auto path = back_up_database(config_.state_directory, name);
-  if (path) return path->string();
-  if (path.error().kind == ErrorKind::usage) return refuse(operator_api::error_unknown, path.error().message);
+  if (path) {
+    return path->string();
+  }
+  if (path.error().kind == ErrorKind::usage) {
+    return refuse(operator_api::error_unknown, path.error().message);
+  }
   return unavailable(path.error());
 }
 
 // Runs in progress belong to the database that would go.
 Granted<std::string> Service::restore_database(const std::string& name) {
   for (const auto& [ins, other] : sessions_) {
-    if (!other.active()) continue;
+    if (!other.active()) {
+      continue;
+    }
     const RunRecord& run = other.run->record();
     return refuse(operator_api::error_busy,
                   fmt::format("busy, run {} by user {} since {}", run.id, run.user, run.started_utc));
   }
-  for (auto& [ins, other] : sessions_) other.run.reset();   // ended ones look into the store still
+  for (auto& [ins, other] : sessions_) {
+    other.run.reset();  // ended ones look into the store still
+  }
   store_.reset();
   const auto kept = selfcal::restore_database(config_.state_directory, name);
   auto store = RunStore::open(database_path(config_.state_directory));
   // Either the new one or, after a failure, the old one, which was open a moment ago.
-  if (!store) throw std::runtime_error(store.error().message);
+  if (!store) {
+    throw std::runtime_error(store.error().message);
+  }
   store_ = std::move(*store);
   if (!kept) {
     const bool named = kept.error().kind != ErrorKind::usage;
     return refuse(named ? operator_api::error_unavailable : operator_api::error_unknown, kept.error().message);
   }
-  journal::write(journal::Level::warning, fmt::format("database restored from backup {}; the former one is {}", name, kept->string()));
+  journal::write(journal::Level::warning,
+                 fmt::format("database restored from backup {}; the former one is {}", name, kept->string()));
   return kept->string();
 }
 
 std::vector<std::string> Service::instruments() const {
   std::vector<std::string> names;
-  for (const auto& [name, unused] : sessions_) names.push_back(name);
+  for (const auto& [name, unused] : sessions_) {
+    names.push_back(name);
+  }
   return names;
 }
 

@@ -7,13 +7,17 @@
 namespace selfcal::sqlite {
 
 std::string failure_words(sqlite3* database) {
-  if (database == nullptr) return "out of memory";
+  if (database == nullptr) {
+    return "out of memory";
+  }
   std::string words = sqlite3_errmsg(database);
-  const int kind = sqlite3_errcode(database) & 0xff;   // without the extension
+  const int kind = sqlite3_errcode(database) & 0xff;  // without the extension
   const int system_error = sqlite3_system_errno(database);
   // Elsewhere the number is that of some earlier failure.
   const bool from_system = kind == SQLITE_CANTOPEN || kind == SQLITE_IOERR || kind == SQLITE_FULL;
-  if (!from_system || system_error == 0) return words;
+  if (!from_system || system_error == 0) {
+    return words;
+  }
   return fmt::format("{}: {}", words, std::generic_category().message(system_error));
 }
 
@@ -50,17 +54,25 @@ Statement& Statement::bind(const std::vector<std::uint8_t>& value) {
 }
 
 Expected<bool> Statement::step() {
-  if (prepared_ != SQLITE_OK) return database_error(database_, "prepare");
+  if (prepared_ != SQLITE_OK) {
+    return database_error(database_, "prepare");
+  }
   column_ = 0;
   const int result = sqlite3_step(statement_);
-  if (result == SQLITE_ROW) return true;
-  if (result == SQLITE_DONE) return false;
+  if (result == SQLITE_ROW) {
+    return true;
+  }
+  if (result == SQLITE_DONE) {
+    return false;
+  }
   return database_error(database_, "execute");
 }
 
 Expected<void> Statement::run() {
   const auto done = step();
-  if (!done) return tl::unexpected(done.error());
+  if (!done) {
+    return tl::unexpected(done.error());
+  }
   return {};
 }
 

@@ -32,7 +32,7 @@ class Statement {
 
   // True: there is a row; false: done.
   Expected<bool> step();
-  Expected<void> run();   // for statements without rows
+  Expected<void> run();  // for statements without rows
 
   // The next column of the row.
   std::int64_t integer();

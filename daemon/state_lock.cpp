@@ -14,9 +14,13 @@ namespace selfcal {
 Expected<StateLock> StateLock::take(const std::filesystem::path& state_directory) {
   // The directory itself: a lock file left by root would shut the service out.
   const int fd = ::open(state_directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return fail(ErrorKind::device, fmt::format("{}: {}", state_directory.string(), std::strerror(errno)));
+  if (fd < 0) {
+    return fail(ErrorKind::device, fmt::format("{}: {}", state_directory.string(), std::strerror(errno)));
+  }
   StateLock lock(fd);
-  if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+  if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+    return lock;
+  }
   return fail(ErrorKind::device, fmt::format("{}: in use by another selfcald or selfcal", state_directory.string()));
 }
 
@@ -28,7 +32,9 @@ StateLock& StateLock::operator=(StateLock&& other) noexcept {
 }
 
 StateLock::~StateLock() {
-  if (fd_ >= 0) ::close(fd_);
+  if (fd_ >= 0) {
+    ::close(fd_);
+  }
 }
 
 }  // namespace selfcal

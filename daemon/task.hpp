@@ -34,14 +34,16 @@ class [[nodiscard]] Task {
     void return_value(U&& result) {
       value.emplace(std::forward<U>(result));
     }
-    void unhandled_exception() { std::terminate(); }   // our own bug: nothing here throws on bad input
+    void unhandled_exception() { std::terminate(); }  // our own bug: nothing here throws on bad input
   };
 
   Task() = default;
   Task(Task&& other) noexcept : handle_(std::exchange(other.handle_, {})) {}
   Task& operator=(Task&& other) noexcept {
     if (this != &other) {
-      if (handle_) handle_.destroy();
+      if (handle_) {
+        handle_.destroy();
+      }
       handle_ = std::exchange(other.handle_, {});
     }
     return *this;
@@ -49,7 +51,9 @@ class [[nodiscard]] Task {
   Task(const Task&) = delete;
   Task& operator=(const Task&) = delete;
   ~Task() {
-    if (handle_) handle_.destroy();
+    if (handle_) {
+      handle_.destroy();
+    }
   }
 
   // Awaiting starts the inner task and resumes the outer one with its value.
@@ -71,6 +75,6 @@ class [[nodiscard]] Task {
   std::coroutine_handle<promise_type> handle_;
 };
 
-struct Done {};   // the value of a task that only does something
+struct Done {};  // the value of a task that only does something
 
 }  // namespace selfcal

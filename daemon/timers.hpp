@@ -8,16 +8,16 @@
 
 namespace selfcal {
 
-using SteadyTime = std::chrono::nanoseconds;   // since an arbitrary origin, never set back
+using SteadyTime = std::chrono::nanoseconds;  // since an arbitrary origin, never set back
 
 class Timers {
  public:
-  using Id = std::uint64_t;   // 0: none
+  using Id = std::uint64_t;  // 0: none
   virtual ~Timers() = default;
 
   virtual SteadyTime now() const = 0;
   virtual Id after(std::chrono::nanoseconds delay, std::function<void()> callback) = 0;
-  virtual void cancel(Id id) = 0;   // of a timer that has fired or never was: no effect
+  virtual void cancel(Id id) = 0;  // of a timer that has fired or never was: no effect
 };
 
 // co_await Sleep(timers, 100ms). Breaking off the waiting task cancels the timer.

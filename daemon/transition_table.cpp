@@ -150,10 +150,10 @@ constexpr auto table = std::to_array<Transition>({
     {S::stopping, E::link_gone, G::always, A::conclude, S::failed},
 });
 
-constexpr std::array state_names{"connecting", "unlocking",  "scheduling", "starting",   "rotating",  "ending_early", "draining",
-                                 "estimating", "judging",    "checking_old", "erasing",  "writing",   "verifying",
-                                 "committing", "resetting",  "confirming", "checking_new", "ending_check", "stopping",
-                                 "completed",  "refused",    "failed",     "aborted"};
+constexpr std::array state_names{
+    "connecting",   "unlocking",    "scheduling", "starting",  "rotating",  "ending_early", "draining",  "estimating",
+    "judging",      "checking_old", "erasing",    "writing",   "verifying", "committing",   "resetting", "confirming",
+    "checking_new", "ending_check", "stopping",   "completed", "refused",   "failed",       "aborted"};
 constexpr std::array state_words{"looking for the INS",
                                  "unlocking the INS",
                                  "writing the schedule",
@@ -177,20 +177,38 @@ constexpr std::array state_words{"looking for the INS",
                                  "refused: nothing was written",
                                  "failed",
                                  "aborted"};
-constexpr std::array event_names{"begin",         "identified",     "unlocked",       "schedule_accepted",
-                                 "rotation_started", "tolerances_met", "rotation_ended", "pages_complete", "estimate_ready",
-                                 "judged",        "drift_measured", "slot_erased",    "set_written",
-                                 "set_verified",  "set_committed",  "ins_restarted",  "set_confirmed",
-                                 "gimbal_stopped", "check_ended",   "link_lost",      "recovered",
-                                 "link_gone",     "step_failed",    "abort_requested"};
-constexpr std::array guard_names{"always",       "rollback", "amendment",          "gimbal_turning",
-                                 "rotation_complete", "gate_refused", "dry_run",  "drift_check_wanted", "new_set_in_force",
-                                 "abort_pending", "failure_pending"};
-constexpr std::array action_names{
-    "none",       "identify",          "unlock",        "write_schedule",      "start_rotation", "follow_rotation",
-    "end_rotation_early", "pull_last_pages", "estimate",     "judge",         "measure_drift_old",   "erase_inactive_slot", "write_set",
-    "read_back",  "commit",            "reset_ins",     "read_in_force",       "measure_drift_new", "end_check", "stop_gimbal",
-    "recover_link", "decline_abort",   "conclude"};
+constexpr std::array event_names{
+    "begin",          "identified",     "unlocked",       "schedule_accepted", "rotation_started",
+    "tolerances_met", "rotation_ended", "pages_complete", "estimate_ready",    "judged",
+    "drift_measured", "slot_erased",    "set_written",    "set_verified",      "set_committed",
+    "ins_restarted",  "set_confirmed",  "gimbal_stopped", "check_ended",       "link_lost",
+    "recovered",      "link_gone",      "step_failed",    "abort_requested"};
+constexpr std::array guard_names{
+    "always",  "rollback",           "amendment",        "gimbal_turning", "rotation_complete", "gate_refused",
+    "dry_run", "drift_check_wanted", "new_set_in_force", "abort_pending",  "failure_pending"};
+constexpr std::array action_names{"none",
+                                  "identify",
+                                  "unlock",
+                                  "write_schedule",
+                                  "start_rotation",
+                                  "follow_rotation",
+                                  "end_rotation_early",
+                                  "pull_last_pages",
+                                  "estimate",
+                                  "judge",
+                                  "measure_drift_old",
+                                  "erase_inactive_slot",
+                                  "write_set",
+                                  "read_back",
+                                  "commit",
+                                  "reset_ins",
+                                  "read_in_force",
+                                  "measure_drift_new",
+                                  "end_check",
+                                  "stop_gimbal",
+                                  "recover_link",
+                                  "decline_abort",
+                                  "conclude"};
 
 static_assert(state_names.size() == static_cast<std::size_t>(State::aborted) + 1);
 static_assert(state_words.size() == state_names.size());
@@ -217,7 +235,9 @@ std::string_view words(State state) { return state_words.at(static_cast<std::siz
 
 std::optional<State> state_from_name(std::string_view text) {
   for (std::size_t i = 0; i < state_names.size(); ++i) {
-    if (text == state_names[i]) return static_cast<State>(i);
+    if (text == state_names[i]) {
+      return static_cast<State>(i);
+    }
   }
   return std::nullopt;
 }

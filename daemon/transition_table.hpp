@@ -13,29 +13,29 @@
 namespace selfcal {
 
 enum class State {
-  connecting,      // find the INS and read who it is
-  unlocking,       // session and SecurityAccess
-  scheduling,      // write the rotation schedule
-  starting,        // command the rotation
-  rotating,        // follow it, pull pages meanwhile
-  ending_early,    // every tolerance is met: gimbal to rest, data stay
-  draining,        // gimbal at rest, last pages
-  estimating,      // estimator at work, off the loop
-  judging,         // may this be written?
-  checking_old,    // free-inertial drift with the old set
-  erasing,         // inactive slot
-  writing,         // new set into the inactive slot
-  verifying,       // read it back
-  committing,      // make it the newest valid slot
-  resetting,       // power cycle
-  confirming,      // read what is in force
-  checking_new,    // free-inertial drift with the new set
-  ending_check,    // navigation check to be ended on the INS before the run ends
-  stopping,        // gimbal to be stopped before the run ends
-  completed,       // end: done (also a dry run)
-  refused,         // end: the answer is no, nothing was written
-  failed,          // end: trouble
-  aborted,         // end: by an operator
+  connecting,    // find the INS and read who it is
+  unlocking,     // session and SecurityAccess
+  scheduling,    // write the rotation schedule
+  starting,      // command the rotation
+  rotating,      // follow it, pull pages meanwhile
+  ending_early,  // every tolerance is met: gimbal to rest, data stay
+  draining,      // gimbal at rest, last pages
+  estimating,    // estimator at work, off the loop
+  judging,       // may this be written?
+  checking_old,  // free-inertial drift with the old set
+  erasing,       // inactive slot
+  writing,       // new set into the inactive slot
+  verifying,     // read it back
+  committing,    // make it the newest valid slot
+  resetting,     // power cycle
+  confirming,    // read what is in force
+  checking_new,  // free-inertial drift with the new set
+  ending_check,  // navigation check to be ended on the INS before the run ends
+  stopping,      // gimbal to be stopped before the run ends
+  completed,     // end: done (also a dry run)
+  refused,       // end: the answer is no, nothing was written
+  failed,        // end: trouble
+  aborted,       // end: by an operator
 };
 
 enum class Event {
@@ -44,7 +44,7 @@ enum class Event {
   unlocked,
   schedule_accepted,
   rotation_started,
-  tolerances_met,    // and the gimbal stands
+  tolerances_met,  // and the gimbal stands
   rotation_ended,
   pages_complete,
   estimate_ready,
@@ -58,25 +58,25 @@ enum class Event {
   set_confirmed,
   gimbal_stopped,
   check_ended,
-  link_lost,         // no answer, or the interface went down
-  recovered,         // identified and unlocked again
-  link_gone,         // not recovered within the stated time
-  step_failed,       // anything else that cannot be mended
+  link_lost,    // no answer, or the interface went down
+  recovered,    // identified and unlocked again
+  link_gone,    // not recovered within the stated time
+  step_failed,  // anything else that cannot be mended
   abort_requested,
 };
 
 enum class Guard {
   always,
-  rollback,              // a former set is to be put back, nothing to be measured
-  amendment,             // a kept recording is to be estimated again, nothing to be measured
-  gimbal_turning,        // the INS says so, and it is this run's rotation
-  rotation_complete,     // the INS says so, and it is this run's rotation
-  gate_refused,          // not determined, inconsistent or implausible, and no operator's reason to write it anyway
+  rollback,           // a former set is to be put back, nothing to be measured
+  amendment,          // a kept recording is to be estimated again, nothing to be measured
+  gimbal_turning,     // the INS says so, and it is this run's rotation
+  rotation_complete,  // the INS says so, and it is this run's rotation
+  gate_refused,       // not determined, inconsistent or implausible, and no operator's reason to write it anyway
   dry_run,
   drift_check_wanted,
-  new_set_in_force,      // slot in force holds this run's set
-  abort_pending,         // an operator asked for this end
-  failure_pending,       // nobody asked for it: a step failed
+  new_set_in_force,  // slot in force holds this run's set
+  abort_pending,     // an operator asked for this end
+  failure_pending,   // nobody asked for it: a step failed
 };
 
 enum class Action {
@@ -119,7 +119,9 @@ std::span<const Transition> transition_table();
 template <typename Holds>
 const Transition* find_transition(State state, Event event, Holds&& holds) {
   for (const Transition& row : transition_table()) {
-    if (row.state == state && row.event == event && holds(row.guard)) return &row;
+    if (row.state == state && row.event == event && holds(row.guard)) {
+      return &row;
+    }
   }
   return nullptr;
 }

@@ -12,13 +12,19 @@ namespace selfcal {
 namespace {
 
 std::string key_path(const InsConfig& config) {
-  if (!config.key_file.empty()) return config.key_file;
+  if (!config.key_file.empty()) {
+    return config.key_file;
+  }
   const char* folder = std::getenv("CREDENTIALS_DIRECTORY");
-  if (folder == nullptr) return {};
+  if (folder == nullptr) {
+    return {};
+  }
   for (const std::string& file : {config.name + ".key", std::string("ins.key")}) {
     const auto path = std::filesystem::path(folder) / file;
     std::error_code ignored;
-    if (std::filesystem::exists(path, ignored)) return path.string();
+    if (std::filesystem::exists(path, ignored)) {
+      return path.string();
+    }
   }
   return {};
 }
@@ -32,8 +38,12 @@ Expected<UnlockKey> load_unlock_key(const InsConfig& config) {
                 fmt::format("ins.{}: no key: set key_file, or give the credential {}.key", config.name, config.name));
   }
   auto text = read_text_file(path, 256);
-  if (!text) return tl::unexpected(text.error());
-  while (!text->empty() && (text->back() == '\n' || text->back() == '\r' || text->back() == ' ')) text->pop_back();
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  while (!text->empty() && (text->back() == '\n' || text->back() == '\r' || text->back() == ' ')) {
+    text->pop_back();
+  }
   UnlockKey key{};
   bool well = text->size() == 2 * key.size();
   for (std::size_t i = 0; well && i < key.size(); ++i) {
@@ -41,7 +51,9 @@ Expected<UnlockKey> load_unlock_key(const InsConfig& config) {
     const auto read = std::from_chars(digits, digits + 2, key[i], 16);
     well = read.ec == std::errc() && read.ptr == digits + 2;
   }
-  if (!well) return fail(ErrorKind::bad_input, fmt::format("{}: a key is {} hexadecimal digits", path, 2 * key.size()));
+  if (!well) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: a key is {} hexadecimal digits", path, 2 * key.size()));
+  }
   return key;
 }
 

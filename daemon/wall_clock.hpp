@@ -6,8 +6,8 @@
 
 namespace selfcal {
 
-std::string utc_now();              // 2026-11-21T07:10:00Z
-std::string utc_text(std::int64_t seconds);   // the same, of seconds since 1970
-std::int64_t utc_now_us();          // microseconds since 1970
+std::string utc_now();                       // 2026-11-21T07:10:00Z
+std::string utc_text(std::int64_t seconds);  // the same, of seconds since 1970
+std::int64_t utc_now_us();                   // microseconds since 1970
 
 }  // namespace selfcal

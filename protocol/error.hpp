@@ -8,15 +8,15 @@ namespace selfcal {
 
 // The kind decides the exit status of the programs (interfaces.md): the numbers are theirs.
 enum class ErrorKind {
-  usage = 2,       // the request itself is wrong
-  bad_input = 3,   // a file or message does not hold what it must
-  device = 4,      // INS, bus or daemon trouble
+  usage = 2,      // the request itself is wrong
+  bad_input = 3,  // a file or message does not hold what it must
+  device = 4,     // INS, bus or daemon trouble
   internal = 5,
 };
 
 struct Error {
   ErrorKind kind = ErrorKind::internal;
-  std::string message;   // one line: what, where, which value
+  std::string message;  // one line: what, where, which value
 };
 
 template <typename T>

@@ -5,6 +5,6 @@
 
 namespace selfcal {
 
-using Time = std::chrono::nanoseconds;   // since an epoch of the caller's choice, or a span
+using Time = std::chrono::nanoseconds;  // since an epoch of the caller's choice, or a span
 
 }  // namespace selfcal

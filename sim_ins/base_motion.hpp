@@ -8,14 +8,14 @@
 namespace selfcal::sim {
 
 struct Sine {
-  double amplitude = 0.0;      // rad or m
+  double amplitude = 0.0;  // rad or m
   double period_s = 1.0;
-  double phase = 0.0;          // rad, at t = 0
+  double phase = 0.0;  // rad, at t = 0
 };
 
 // An exponential settling: amplitude * exp(-t/tau); zero velocity is not required at t = 0.
 struct Settling {
-  double amplitude = 0.0;      // m or rad
+  double amplitude = 0.0;  // m or rad
   double tau_s = 1.0;
 };
 
@@ -35,9 +35,9 @@ BaseMotion moored_base_motion();
 
 // The motion at one time. p: displacement from the stated position along n (north, up, east).
 struct BaseState {
-  Attitude attitude;           // rad
-  Attitude attitude_rate;      // rad/s: d/dt of roll, pitch, heading
-  Vector3 p_n, v_n, a_n;       // m, m/s, m/s^2
+  Attitude attitude;       // rad
+  Attitude attitude_rate;  // rad/s: d/dt of roll, pitch, heading
+  Vector3 p_n, v_n, a_n;   // m, m/s, m/s^2
 };
 
 BaseState base_state(const BaseMotion& motion, const Attitude& mean, double t);

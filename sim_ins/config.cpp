@@ -33,8 +33,8 @@ Expected<void> check(const Range& range, double value) {
   if (value >= range.low && value <= range.high) {
     return {};
   }
-  return fail(ErrorKind::bad_input, fmt::format("{} = {} is outside [{}, {}]", range.name, value, range.low,
-                                                range.high));
+  return fail(ErrorKind::bad_input,
+              fmt::format("{} = {} is outside [{}, {}]", range.name, value, range.low, range.high));
 }
 
 void read_sines(TomlTable& motion, std::string_view key, double si, std::vector<Sine>& sines) {
@@ -103,7 +103,7 @@ void read_root(TomlTable& root, SimConfig& config) {
   });
   root.table("base_motion", [&](TomlTable& motion) { read_base_motion(motion, config.base_motion); });
   root.text("parameter_set", config.parameter_set);
-  root.table("parameters", [&](TomlTable& parameters) {   // the table's names and units
+  root.table("parameters", [&](TomlTable& parameters) {  // the table's names and units
     for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
       double value = 0.0;
       parameters.number(sensor_parameters[i].name, value, -1e6, 1e6);

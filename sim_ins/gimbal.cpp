@@ -43,8 +43,8 @@ std::array<double, 3> profile(double t, double duration, double ramp) {
 GimbalMotion::GimbalMotion(std::array<double, 2> initial, std::vector<GimbalMove> moves)
     : initial_(initial), moves_(std::move(moves)) {
   for (const GimbalMove& move : moves_) {
-    breakpoints_.insert(breakpoints_.end(), {move.start_s, move.start_s + move.ramp_s,
-                                             move.end_s() - move.ramp_s, move.end_s()});
+    breakpoints_.insert(breakpoints_.end(),
+                        {move.start_s, move.start_s + move.ramp_s, move.end_s() - move.ramp_s, move.end_s()});
   }
 }
 
@@ -98,8 +98,7 @@ Expected<void> check_schedule(const GimbalConfig& config, const Schedule& schedu
   for (std::size_t k = 1; k < schedule.positions.size(); ++k) {
     const GimbalPosition& from = schedule.positions[k - 1];
     const GimbalPosition& to = schedule.positions[k];
-    const double distance = std::max(std::abs(to.outer_deg - from.outer_deg),
-                                     std::abs(to.inner_deg - from.inner_deg));
+    const double distance = std::max(std::abs(to.outer_deg - from.outer_deg), std::abs(to.inner_deg - from.inner_deg));
     if (distance > 0.0 && !(schedule.rotation_s > 0.0)) {
       return fail(ErrorKind::bad_input, fmt::format("schedule: rotation_s = {} s", schedule.rotation_s));
     }

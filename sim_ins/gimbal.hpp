@@ -24,8 +24,8 @@ struct GimbalMove {
   double start_s = 0.0;
   double duration_s = 0.0;
   double ramp_s = 0.0;
-  std::array<double, 2> from{};   // rad
-  std::array<double, 2> to{};     // rad
+  std::array<double, 2> from{};  // rad
+  std::array<double, 2> to{};    // rad
 
   double end_s() const { return start_s + duration_s; }
 };
@@ -37,7 +37,7 @@ class GimbalMotion {
   GimbalMotion(std::array<double, 2> initial, std::vector<GimbalMove> moves);
 
   GimbalState at(double t) const;
-  bool turning(double begin, double end) const;                 // anywhere within [begin, end]
+  bool turning(double begin, double end) const;  // anywhere within [begin, end]
   const std::vector<GimbalMove>& moves() const { return moves_; }
   // Times at which the profile has no second derivative of rate: starts and ends of ramps, in order.
   const std::vector<double>& breakpoints() const { return breakpoints_; }

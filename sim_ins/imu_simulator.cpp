@@ -34,7 +34,7 @@ std::int32_t clamped(std::int64_t count) {
 void add_base_effect(BaseMotion& base, const PhysicsEffect& effect) {
   const std::vector<double>& v = effect.values;
   if (effect.id == "base_sway") {
-    const std::array<std::vector<Sine>*, 6> axes{&base.roll, &base.pitch, &base.yaw,
+    const std::array<std::vector<Sine>*, 6> axes{&base.roll,  &base.pitch, &base.yaw,
                                                  &base.surge, &base.heave, &base.sway};
     for (std::size_t k = 0; k < axes.size(); ++k) {
       if (v[k] != 0.0) {
@@ -105,8 +105,13 @@ Expected<ImuSimulator> ImuSimulator::create(const SimConfig& config, GimbalMotio
 }
 
 ImuSimulator::ImuSimulator(const SimConfig& config, TrueMotion motion, const SensorErrors& errors, std::uint64_t seed)
-    : config_(config), motion_(std::move(motion)), errors_(errors), gyro_noise_(seed, gyro_noise_stream),
-      accel_noise_(seed, accel_noise_stream), instability_(seed, instability_stream), readout_(seed, readout_stream) {
+    : config_(config),
+      motion_(std::move(motion)),
+      errors_(errors),
+      gyro_noise_(seed, gyro_noise_stream),
+      accel_noise_(seed, accel_noise_stream),
+      instability_(seed, instability_stream),
+      readout_(seed, readout_stream) {
   gyro_arw_.setConstant(config.gyro_arw_deg_per_sqrt_h * units::degree_per_sqrt_hour);
   accel_vrw_.setConstant(config.accel_vrw_ug_per_sqrt_hz * units::micro_g_per_sqrt_hz);
   gyro_quantiser_.lsb = config.gyro_lsb_arcsec * units::arcsecond;
@@ -155,7 +160,7 @@ MotionState ImuSimulator::state_at(double t) {
   if (!motion_.base_still() || gimbal.turning(t, t)) {
     return motion_.at(t);
   }
-  const int move = gimbal.last_move(t);   // a still base and a resting gimbal: one state for the whole dwell
+  const int move = gimbal.last_move(t);  // a still base and a resting gimbal: one state for the whole dwell
   if (move != cached_move_) {
     cached_state_ = motion_.at(t);
     cached_move_ = move;
@@ -260,10 +265,10 @@ void ImuSimulator::add_noise(IdealIncrement& increment, double begin, double end
   if (config_.gyro_bias_instability_deg_per_h > 0.0 || config_.accel_bias_instability_ug > 0.0) {
     const double keep = std::exp(-h / config_.bias_instability_tau_s);
     const double drive = std::sqrt(1.0 - keep * keep);
-    gyro_markov_ = keep * gyro_markov_ + drive * config_.gyro_bias_instability_deg_per_h * units::degree_per_hour *
-                                             normal3(instability_);
-    accel_markov_ = keep * accel_markov_ + drive * config_.accel_bias_instability_ug * units::micro_g *
-                                               normal3(instability_);
+    gyro_markov_ = keep * gyro_markov_ +
+                   drive * config_.gyro_bias_instability_deg_per_h * units::degree_per_hour * normal3(instability_);
+    accel_markov_ =
+        keep * accel_markov_ + drive * config_.accel_bias_instability_ug * units::micro_g * normal3(instability_);
   }
 }
 

@@ -18,16 +18,16 @@ namespace selfcal::sim {
 struct ImuSample {
   std::array<std::int32_t, 3> delta_theta{};
   std::array<std::int32_t, 3> delta_v{};
-  double outer = 0.0;            // rad, read-outs at the interval's end
+  double outer = 0.0;  // rad, read-outs at the interval's end
   double inner = 0.0;
-  double temperature_c = 0.0;    // read-out
-  bool missing = false;          // lost on the way to the memory
+  double temperature_c = 0.0;  // read-out
+  bool missing = false;        // lost on the way to the memory
 };
 
 // Exact integrals of output over one interval, before noise: what noise-free, unquantised sensors would give.
 struct IdealIncrement {
-  Vector3 delta_theta = Vector3::Zero();   // rad
-  Vector3 delta_v = Vector3::Zero();       // m/s
+  Vector3 delta_theta = Vector3::Zero();  // rad
+  Vector3 delta_v = Vector3::Zero();      // m/s
 };
 
 class ImuSimulator {
@@ -51,7 +51,7 @@ class ImuSimulator {
     SensorEquation equation = nullptr;
     std::vector<double> values;
   };
-  struct Line {                 // spectral line on the sensors' output
+  struct Line {  // spectral line on the sensors' output
     Vector3 domega, df;
     double angular_frequency = 0.0;
     double phase = 0.0;
@@ -59,7 +59,7 @@ class ImuSimulator {
   struct Loss {
     double start_s, count, every_s, mode;
   };
-  struct Quantiser {            // counts of lsb; what does not fill a count is carried on
+  struct Quantiser {  // counts of lsb; what does not fill a count is carried on
     double lsb = 1.0;
     Vector3 carried = Vector3::Zero();
     std::array<std::int64_t, 3> count(const Vector3& increment);
@@ -81,21 +81,21 @@ class ImuSimulator {
   std::vector<ActiveEffect> effects_;
   std::vector<Line> lines_;
   std::vector<Loss> losses_;
-  std::vector<Vector3> turn_df_;              // per move
+  std::vector<Vector3> turn_df_;  // per move
   bool needs_angular_acceleration_ = false;
   double accel_delay_s_ = 0.0;
   double clock_scale_ = 0.0;
-  Vector3 gyro_arw_ = Vector3::Zero();        // rad/sqrt(s)
-  Vector3 accel_vrw_ = Vector3::Zero();       // m/s/sqrt(s)
-  Vector3 gyro_walk_asd_ = Vector3::Zero();   // rad/s/sqrt(s)
+  Vector3 gyro_arw_ = Vector3::Zero();       // rad/sqrt(s)
+  Vector3 accel_vrw_ = Vector3::Zero();      // m/s/sqrt(s)
+  Vector3 gyro_walk_asd_ = Vector3::Zero();  // rad/s/sqrt(s)
   Vector3 accel_walk_asd_ = Vector3::Zero();
-  Vector3 gyro_wander_ = Vector3::Zero(), gyro_markov_ = Vector3::Zero();     // rad/s
-  Vector3 accel_wander_ = Vector3::Zero(), accel_markov_ = Vector3::Zero();   // m/s^2
-  Quantiser gyro_hidden_{0.0}, accel_hidden_{0.0};   // concealed coarser quantisation; lsb 0: none
+  Vector3 gyro_wander_ = Vector3::Zero(), gyro_markov_ = Vector3::Zero();    // rad/s
+  Vector3 accel_wander_ = Vector3::Zero(), accel_markov_ = Vector3::Zero();  // m/s^2
+  Quantiser gyro_hidden_{0.0}, accel_hidden_{0.0};  // concealed coarser quantisation; lsb 0: none
   Quantiser gyro_quantiser_, accel_quantiser_;
   std::uint64_t index_ = 0;
   ImuSample before_;
-  int cached_move_ = -2;                      // dwell whose state is cached, -2: none
+  int cached_move_ = -2;  // dwell whose state is cached, -2: none
   MotionState cached_state_;
 };
 

@@ -103,9 +103,11 @@ void configure(CLI::App& app, Arguments& a) {
   app.add_option("--scenario", a.scenario, "faults by time, TOML (see sim_ins/README.md)");
   app.add_option("--speed", node.speed, "INS seconds per second")->check(CLI::Range(0.01, 1e5))->capture_default_str();
   app.add_option("--patience", node.patience, "stretches the time-outs of ISO-TP and session, for slow testers")
-      ->check(CLI::Range(1.0, 1000.0))->capture_default_str();
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
   app.add_option("--turnaround", node.turnaround_ms, "of the tester in an upload, ms of INS time for each request")
-      ->check(CLI::Range(0.0, 1000.0))->capture_default_str();
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
   app.add_flag("--fd", node.fd, "CAN FD with bit rate switch");
   app.add_option("--bit-rate", a.arbitration_rate, "bit/s")->capture_default_str();
   app.add_option("--data-bit-rate", a.data_rate, "bit/s, FD data phase")->capture_default_str();
@@ -206,7 +208,7 @@ int main(int argc, char** argv) {
   try {
     return selfcal::sim::configure_and_run(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "sim_ins: %s\n", error.what());   // unlike fmt::print it cannot throw
+    std::fprintf(stderr, "sim_ins: %s\n", error.what());  // unlike fmt::print it cannot throw
     return static_cast<int>(selfcal::ErrorKind::internal);
   }
 }

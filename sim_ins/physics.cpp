@@ -13,7 +13,7 @@ constexpr double dph = units::degree_per_hour;
 constexpr double ug = units::micro_g;
 constexpr double ppm = units::ppm;
 constexpr double arcsec = units::arcsecond;
-constexpr double per_deg_s = 1.0 / units::degree;   // 1/(deg/s) in s/rad
+constexpr double per_deg_s = 1.0 / units::degree;  // 1/(deg/s) in s/rad
 
 // Three axes of one unit; and a 3 x 3 matrix, row (affected axis) first.
 constexpr std::array<P, 3> axes(std::string_view unit, double si) {
@@ -26,8 +26,12 @@ constexpr std::array<P, 9> matrix(std::string_view unit, double si) {
 template <std::size_t N, std::size_t M>
 constexpr std::array<P, N + M> join(const std::array<P, N>& a, const std::array<P, M>& b) {
   std::array<P, N + M> all{};
-  for (std::size_t i = 0; i < N; ++i) all[i] = a[i];
-  for (std::size_t i = 0; i < M; ++i) all[N + i] = b[i];
+  for (std::size_t i = 0; i < N; ++i) {
+    all[i] = a[i];
+  }
+  for (std::size_t i = 0; i < M; ++i) {
+    all[N + i] = b[i];
+  }
   return all;
 }
 constexpr std::array<P, 3> warm_up(std::string_view unit, double si) {
@@ -37,14 +41,16 @@ constexpr P tau(double seconds) { return {"tau_s", "s", 1.0, seconds}; }
 constexpr P reference{"reference_c", "degC", 1.0, 25.0};
 
 constexpr auto gyro_g = matrix("deg/h/g", dph);
-constexpr auto gyro_magnetic = join(matrix("deg/h/G", dph), std::array{P{"field_north", "G", 1.0, 0.28},
-                                    P{"field_up", "G", 1.0, -0.45}, P{"field_east", "G", 1.0, -0.03}});
+constexpr auto gyro_magnetic = join(
+    matrix("deg/h/G", dph),
+    std::array{P{"field_north", "G", 1.0, 0.28}, P{"field_up", "G", 1.0, -0.45}, P{"field_east", "G", 1.0, -0.03}});
 constexpr auto gyro_asymmetry = axes("ppm", ppm);
-constexpr std::array gyro_nonlinearity{
-    P{"x", "ppm/(deg/s)", ppm * per_deg_s}, P{"y", "ppm/(deg/s)", ppm * per_deg_s},
-    P{"z", "ppm/(deg/s)", ppm * per_deg_s}, P{"cubic_x", "ppm/(deg/s)^2", ppm * per_deg_s * per_deg_s},
-    P{"cubic_y", "ppm/(deg/s)^2", ppm * per_deg_s * per_deg_s},
-    P{"cubic_z", "ppm/(deg/s)^2", ppm * per_deg_s * per_deg_s}};
+constexpr std::array gyro_nonlinearity{P{"x", "ppm/(deg/s)", ppm* per_deg_s},
+                                       P{"y", "ppm/(deg/s)", ppm* per_deg_s},
+                                       P{"z", "ppm/(deg/s)", ppm* per_deg_s},
+                                       P{"cubic_x", "ppm/(deg/s)^2", ppm* per_deg_s* per_deg_s},
+                                       P{"cubic_y", "ppm/(deg/s)^2", ppm* per_deg_s* per_deg_s},
+                                       P{"cubic_z", "ppm/(deg/s)^2", ppm* per_deg_s* per_deg_s}};
 constexpr auto gyro_temperature =
     join(join(axes("deg/h/degC", dph), warm_up("deg/h", dph)), std::array{tau(600.0), reference});
 constexpr auto accel_temperature =
@@ -53,9 +59,9 @@ constexpr auto gyro_ramp = axes("deg/h/h", dph / units::hour);
 constexpr auto accel_ramp = axes("ug/h", ug / units::hour);
 constexpr auto scale_temperature =
     join(join(axes("ppm/degC", ppm), warm_up("ppm", ppm)), std::array{tau(600.0), reference});
-constexpr auto dead_zone = join(axes("deg/h", dph), std::array{P{"width", "deg/h", dph, 5.0},
-                                P{"threshold_x", "deg/h", dph}, P{"threshold_y", "deg/h", dph},
-                                P{"threshold_z", "deg/h", dph}});
+constexpr auto dead_zone =
+    join(axes("deg/h", dph), std::array{P{"width", "deg/h", dph, 5.0}, P{"threshold_x", "deg/h", dph},
+                                        P{"threshold_y", "deg/h", dph}, P{"threshold_z", "deg/h", dph}});
 constexpr auto quadratic = axes("ug/g^2", ug);
 constexpr auto cubic = axes("ug/g^3", ug);
 constexpr std::array cross{P{"x_yy", "ug/g^2", ug}, P{"x_zz", "ug/g^2", ug}, P{"x_xy", "ug/g^2", ug},
@@ -64,36 +70,44 @@ constexpr std::array cross{P{"x_yy", "ug/g^2", ug}, P{"x_zz", "ug/g^2", ug}, P{"
                            P{"y_xz", "ug/g^2", ug}, P{"z_xx", "ug/g^2", ug}, P{"z_yy", "ug/g^2", ug},
                            P{"z_xz", "ug/g^2", ug}, P{"z_yz", "ug/g^2", ug}, P{"z_xy", "ug/g^2", ug}};
 constexpr auto relaxation = join(axes("ug", ug), std::array{tau(60.0)});
-constexpr auto size_effect = matrix("cm", 0.01);      // rows: accelerometer, columns: its place in b
+constexpr auto size_effect = matrix("cm", 0.01);  // rows: accelerometer, columns: its place in b
 constexpr auto lever_arm = axes("cm", 0.01);
 constexpr std::array time_offset{P{"tau", "ms", 1e-3}};
 constexpr auto flexure = matrix("arcsec/g", arcsec);
 constexpr std::array sway{P{"roll", "deg", units::degree}, P{"pitch", "deg", units::degree},
-                          P{"yaw", "deg", units::degree}, P{"surge", "cm", 0.01}, P{"heave", "cm", 0.01},
-                          P{"sway", "cm", 0.01}, P{"period_s", "s", 1.0, 8.0}, P{"phase", "deg", units::degree}};
-constexpr std::array settling{P{"roll", "arcsec", arcsec}, P{"pitch", "arcsec", arcsec}, P{"heave", "mm", 1e-3},
-                              tau(300.0), P{"surge", "mm", 1e-3}, P{"sway", "mm", 1e-3}};
+                          P{"yaw", "deg", units::degree},  P{"surge", "cm", 0.01},
+                          P{"heave", "cm", 0.01},          P{"sway", "cm", 0.01},
+                          P{"period_s", "s", 1.0, 8.0},    P{"phase", "deg", units::degree}};
+constexpr std::array settling{P{"roll", "arcsec", arcsec}, P{"pitch", "arcsec", arcsec},
+                              P{"heave", "mm", 1e-3},      tau(300.0),
+                              P{"surge", "mm", 1e-3},      P{"sway", "mm", 1e-3}};
 constexpr auto gyro_noise = axes("deg/sqrt(h)", units::degree_per_sqrt_hour);
 constexpr auto accel_noise = axes("ug/sqrt(Hz)", units::micro_g_per_sqrt_hz);
-constexpr auto gyro_walk = axes("deg/h/sqrt(h)", dph / 60.0);     // 60 = sqrt(3600 s)
+constexpr auto gyro_walk = axes("deg/h/sqrt(h)", dph / 60.0);  // 60 = sqrt(3600 s)
 constexpr auto accel_walk = axes("ug/sqrt(h)", ug / 60.0);
 constexpr std::array quantum{P{"gyro_lsb", "arcsec", arcsec}, P{"accel_lsb", "m/s", 1.0}};
-constexpr std::array vibration{P{"gyro_x", "deg/h", dph}, P{"gyro_y", "deg/h", dph}, P{"gyro_z", "deg/h", dph},
-                               P{"accel_x", "ug", ug}, P{"accel_y", "ug", ug}, P{"accel_z", "ug", ug},
-                               P{"frequency_hz", "Hz", 1.0, 19.0}, P{"phase", "deg", units::degree}};
+constexpr std::array vibration{P{"gyro_x", "deg/h", dph},
+                               P{"gyro_y", "deg/h", dph},
+                               P{"gyro_z", "deg/h", dph},
+                               P{"accel_x", "ug", ug},
+                               P{"accel_y", "ug", ug},
+                               P{"accel_z", "ug", ug},
+                               P{"frequency_hz", "Hz", 1.0, 19.0},
+                               P{"phase", "deg", units::degree}};
 // mode 0: increments are zero; 1: the increment before is repeated; 2: the sample is missing.
 constexpr std::array lost{P{"start_s", "s", 1.0}, P{"count", "1", 1.0, 1.0}, P{"every_s", "s", 1.0},
                           P{"mode", "1", 1.0}};
 constexpr std::array clock_scale{P{"scale", "ppm", ppm}};
 constexpr std::array stick_slip{P{"step", "arcsec", arcsec}, P{"first_s", "s", 1.0, 20.0},
                                 P{"interval_s", "s", 1.0, 30.0}, P{"decay", "1", 1.0, 0.5}};
-constexpr auto g_rate = axes("deg/h/g/(deg/s)", dph * per_deg_s);
-constexpr std::array lagged{P{"gyro_x", "deg/h/(degC/h)", dph * units::hour},
-                            P{"gyro_y", "deg/h/(degC/h)", dph * units::hour},
-                            P{"gyro_z", "deg/h/(degC/h)", dph * units::hour},
-                            P{"accel_x", "ug/(degC/h)", ug * units::hour},
-                            P{"accel_y", "ug/(degC/h)", ug * units::hour},
-                            P{"accel_z", "ug/(degC/h)", ug * units::hour}, tau(300.0)};
+constexpr auto g_rate = axes("deg/h/g/(deg/s)", dph* per_deg_s);
+constexpr std::array lagged{P{"gyro_x", "deg/h/(degC/h)", dph* units::hour},
+                            P{"gyro_y", "deg/h/(degC/h)", dph* units::hour},
+                            P{"gyro_z", "deg/h/(degC/h)", dph* units::hour},
+                            P{"accel_x", "ug/(degC/h)", ug* units::hour},
+                            P{"accel_y", "ug/(degC/h)", ug* units::hour},
+                            P{"accel_z", "ug/(degC/h)", ug* units::hour},
+                            tau(300.0)};
 constexpr auto hysteresis = axes("ug", ug);
 constexpr std::array gimbal_field{P{"outer_x", "deg/h", dph}, P{"outer_y", "deg/h", dph}, P{"outer_z", "deg/h", dph},
                                   P{"inner_x", "deg/h", dph}, P{"inner_y", "deg/h", dph}, P{"inner_z", "deg/h", dph}};

@@ -17,11 +17,11 @@ struct EffectParameter {
   std::string_view name;
   std::string_view unit;
   double si_per_unit = 1.0;
-  double default_value = 0.0;   // in the unit
+  double default_value = 0.0;  // in the unit
 };
 
 struct EffectDescription {
-  std::string_view id;          // as in the mismatch catalogue, or, in_catalogue false, one of ours beyond it
+  std::string_view id;  // as in the mismatch catalogue, or, in_catalogue false, one of ours beyond it
   bool in_catalogue = true;
   std::span<const EffectParameter> parameters;
 };
@@ -31,7 +31,7 @@ std::span<const EffectDescription> physics_effects();
 
 struct PhysicsEffect {
   std::string id;
-  std::vector<double> values;   // SI, in the order of the description's parameters
+  std::vector<double> values;  // SI, in the order of the description's parameters
 };
 
 // Effects add up. The same effect may stand twice (two spectral lines, two settlings).

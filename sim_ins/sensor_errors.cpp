@@ -12,7 +12,7 @@ Vector3 group(const SensorErrors& errors, int first) {
 
 // mission.md: df = bias + K+ max(f,0) + K- max(-f,0), then the lower-triangular misalignment.
 Vector3 accel_error(const SensorErrors& errors, const Vector3& f) {
-  const Vector3 A = group(errors, parameter::accel_misalignment);   // yx zx zy
+  const Vector3 A = group(errors, parameter::accel_misalignment);  // yx zx zy
   Vector3 df = group(errors, parameter::accel_bias) +
                group(errors, parameter::accel_scale_pos).cwiseProduct(f.cwiseMax(0.0)) +
                group(errors, parameter::accel_scale_neg).cwiseProduct((-f).cwiseMax(0.0));

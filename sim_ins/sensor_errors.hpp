@@ -6,7 +6,7 @@
 
 namespace selfcal::sim {
 
-Vector3 accel_error(const SensorErrors& errors, const Vector3& f_ib_b);        // m/s^2
-Vector3 gyro_error(const SensorErrors& errors, const Vector3& omega_ib_b);     // rad/s
+Vector3 accel_error(const SensorErrors& errors, const Vector3& f_ib_b);     // m/s^2
+Vector3 gyro_error(const SensorErrors& errors, const Vector3& omega_ib_b);  // rad/s
 
 }  // namespace selfcal::sim

@@ -39,8 +39,7 @@ void gyro_scale_nonlinearity(Values p, const Context& c, Deviation& d) {
 
 // b (T - T_ref) + w (1 - exp(-t/tau)): values, three of b, three of w, tau, T_ref.
 Vector3 thermal(Values p, const Context& c) {
-  return vector_at(p, 0) * (temperature_at(*c.temperature, c.t) - p[7]) +
-         vector_at(p, 3) * -std::expm1(-c.t / p[6]);
+  return vector_at(p, 0) * (temperature_at(*c.temperature, c.t) - p[7]) + vector_at(p, 3) * -std::expm1(-c.t / p[6]);
 }
 void gyro_temperature(Values p, const Context& c, Deviation& d) { d.domega += thermal(p, c); }
 void accel_temperature(Values p, const Context& c, Deviation& d) { d.df += thermal(p, c); }
@@ -51,9 +50,7 @@ void accel_bias_ramp(Values p, const Context& c, Deviation& d) { d.df += vector_
 void gyro_scale_temperature(Values p, const Context& c, Deviation& d) {
   d.domega += thermal(p, c).cwiseProduct(c.omega_ib_b);
 }
-void accel_scale_temperature(Values p, const Context& c, Deviation& d) {
-  d.df += thermal(p, c).cwiseProduct(c.f_ib_b);
-}
+void accel_scale_temperature(Values p, const Context& c, Deviation& d) { d.df += thermal(p, c).cwiseProduct(c.f_ib_b); }
 
 // Smooth lock-in -a tanh(w/width), and the hard threshold: the output stays zero below it and lags above it.
 void gyro_dead_zone(Values p, const Context& c, Deviation& d) {
@@ -73,10 +70,9 @@ void accel_cubic(Values p, const Context& c, Deviation& d) {
 }
 
 void accel_cross_coupling(Values p, const Context& c, Deviation& d) {
-  constexpr std::array<std::array<std::pair<int, int>, 5>, 3> products{{
-      {{{1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}},
-      {{{0, 0}, {2, 2}, {0, 1}, {1, 2}, {0, 2}}},
-      {{{0, 0}, {1, 1}, {0, 2}, {1, 2}, {0, 1}}}}};
+  constexpr std::array<std::array<std::pair<int, int>, 5>, 3> products{{{{{1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}},
+                                                                        {{{0, 0}, {2, 2}, {0, 1}, {1, 2}, {0, 2}}},
+                                                                        {{{0, 0}, {1, 1}, {0, 2}, {1, 2}, {0, 1}}}}};
   const Vector3 u = c.u();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t k = 0; k < 5; ++k) {
@@ -103,9 +99,7 @@ void accel_size_effect(Values p, const Context& c, Deviation& d) {
 }
 void imu_lever_arm(Values p, const Context& c, Deviation& d) { d.df += centripetal(c, vector_at(p, 0)); }
 
-void triad_flexure(Values p, const Context& c, Deviation& d) {
-  d.df += (matrix_of(p) * c.u()).cross(c.f_ib_b);
-}
+void triad_flexure(Values p, const Context& c, Deviation& d) { d.df += (matrix_of(p) * c.u()).cross(c.f_ib_b); }
 
 // Beyond the catalogue. The bearing creeps back in jumps after a turn: the accelerometer triad stands off about z by
 // `step`, and every interval from first_s on what is left shrinks by `decay`.
@@ -130,7 +124,7 @@ void lagged_thermal_gradient(Values p, const Context& c, Deviation& d) {
 // The proof mass rests where the last turn left it: the sign of the change of f decides.
 void accel_turn_hysteresis(Values p, const Context& c, Deviation& d) {
   for (int i = 0; i < 3; ++i) {
-    constexpr double noticed = 0.1;   // m/s^2: smaller changes leave the mass where it was
+    constexpr double noticed = 0.1;  // m/s^2: smaller changes leave the mass where it was
     const double change = c.turn_df[i];
     d.df[i] += std::abs(change) < noticed ? 0.0 : std::copysign(p[static_cast<std::size_t>(i)], change);
   }
@@ -171,8 +165,8 @@ constexpr std::array<std::pair<std::string_view, SensorEquation>, 23> equations{
 Vector3 SensorContext::u() const { return f_ib_b / units::standard_gravity; }
 
 SensorEquation sensor_equation(std::string_view effect_id) {
-  const auto found = std::find_if(equations.begin(), equations.end(),
-                                  [&](const auto& entry) { return entry.first == effect_id; });
+  const auto found =
+      std::find_if(equations.begin(), equations.end(), [&](const auto& entry) { return entry.first == effect_id; });
   return found == equations.end() ? nullptr : found->second;
 }
 

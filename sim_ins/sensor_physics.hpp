@@ -12,15 +12,15 @@ namespace selfcal::sim {
 
 // One instant, all that an equation may depend on. u is f_ib_b over standard gravity.
 struct SensorContext {
-  double t = 0.0;                            // s since the recording's start
+  double t = 0.0;  // s since the recording's start
   Matrix3 C_nb = Matrix3::Identity();
-  Vector3 f_ib_b = Vector3::Zero();          // m/s^2
-  Vector3 omega_ib_b = Vector3::Zero();      // rad/s
-  Vector3 angular_acceleration = Vector3::Zero();   // rad/s^2, set only where an effect needs it
+  Vector3 f_ib_b = Vector3::Zero();                // m/s^2
+  Vector3 omega_ib_b = Vector3::Zero();            // rad/s
+  Vector3 angular_acceleration = Vector3::Zero();  // rad/s^2, set only where an effect needs it
   const TemperatureConfig* temperature = nullptr;
-  double since_turn_s = -1.0;                // since the last turn's end; negative before the first
-  Vector3 turn_df = Vector3::Zero();         // change of f_ib_b from before to after the last turn
-  double outer = 0.0;                        // rad, true
+  double since_turn_s = -1.0;         // since the last turn's end; negative before the first
+  Vector3 turn_df = Vector3::Zero();  // change of f_ib_b from before to after the last turn
+  double outer = 0.0;                 // rad, true
   double inner = 0.0;
 
   Vector3 u() const;

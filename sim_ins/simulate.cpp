@@ -21,8 +21,8 @@ constexpr std::uint64_t gimbal_stream = 2;
 // as -100, which is taken as it stands.
 constexpr SensorErrors table3 = {100, 100, 100, 0.01, 0.01, 0.01, 100, 100, 100, -100, -100, -100,
                                  30,  30,  30,  30,   30,   30,   30,  30,  30,  30,   30,   30};
-constexpr SensorErrors table5 = {767, -505, -221, 0.0139, -0.0023, 0.0212, 162, 327, 263, -151, -286, -215,
-                                 181, 119,  -314, 15,     9,       22,     -247, 1,  111, 149,  -72,  -256};
+constexpr SensorErrors table5 = {767, -505, -221, 0.0139, -0.0023, 0.0212, 162,  327, 263, -151, -286, -215,
+                                 181, 119,  -314, 15,     9,       22,     -247, 1,   111, 149,  -72,  -256};
 
 void append(Recording& recording, const SimConfig& config, const ImuSample& sample, std::size_t index) {
   const double theta_lsb = config.gyro_lsb_arcsec * units::arcsecond;
@@ -77,7 +77,7 @@ const SensorErrors& random_spread() {
 }
 
 Expected<SensorErrors> true_sensor_errors(const SimConfig& config, std::uint64_t seed) {
-  SensorErrors errors{};   // in the table's units until the end
+  SensorErrors errors{};  // in the table's units until the end
   if (config.parameter_set == "table3") {
     errors = table3;
   } else if (config.parameter_set == "table5") {
@@ -88,8 +88,8 @@ Expected<SensorErrors> true_sensor_errors(const SimConfig& config, std::uint64_t
       errors[i] = random_spread()[i] * random.uniform(-1.0, 1.0);
     }
   } else if (config.parameter_set != "none") {
-    return fail(ErrorKind::bad_input, fmt::format("parameter_set {}: known are table3, table5, random, none",
-                                                  config.parameter_set));
+    return fail(ErrorKind::bad_input,
+                fmt::format("parameter_set {}: known are table3, table5, random, none", config.parameter_set));
   }
   for (std::size_t i = 0; i < errors.size(); ++i) {
     errors[i] = config.explicit_parameters[i].value_or(errors[i]) * sensor_parameters[i].si_per_unit;
@@ -130,8 +130,8 @@ Expected<void> write_truth(const std::string& path, const SimConfig& config, std
   truth["parameters"] = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < errors->size(); ++i) {
     const SensorParameter& named = sensor_parameters[i];
-    truth["parameters"].push_back({{"name", named.name}, {"unit", named.unit},
-                                   {"value", (*errors)[i] / named.si_per_unit}});
+    truth["parameters"].push_back(
+        {{"name", named.name}, {"unit", named.unit}, {"value", (*errors)[i] / named.si_per_unit}});
   }
   truth["attitude_deg"] = {{"roll", config.roll_deg}, {"pitch", config.pitch_deg}, {"heading", config.heading_deg}};
   truth["gyro_arw_deg_per_sqrt_h"] = config.gyro_arw_deg_per_sqrt_h;

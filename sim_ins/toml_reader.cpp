@@ -30,7 +30,8 @@ void TomlTable::refuse(std::string_view key, const std::string& what) {
   }
   const toml::node* node = table_.get(key);
   const auto line = (node != nullptr ? node->source() : table_.source()).begin.line;
-  problem_ = Error{ErrorKind::bad_input, fmt::format("{}:{}: {}{}: {}", file_, line, prefix_, one_line(key), one_line(what))};
+  problem_ =
+      Error{ErrorKind::bad_input, fmt::format("{}:{}: {}{}: {}", file_, line, prefix_, one_line(key), one_line(what))};
 }
 
 void TomlTable::number(std::string_view key, double& value, double low, double high) {

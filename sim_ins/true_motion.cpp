@@ -37,8 +37,8 @@ MotionState TrueMotion::at(double t) const {
   state.C_nb = C_nv * C_vb;
   const Vector3 omega_ie = earth::omega_ie_n(here.latitude);
   const Vector3 omega_en = earth::omega_en_n(here, base.v_n);
-  state.omega_ib_b = state.C_nb.transpose() * (omega_ie + omega_en) + C_vb.transpose() * omega_nv_v(base) +
-                     omega_vb_b(gimbal);
+  state.omega_ib_b =
+      state.C_nb.transpose() * (omega_ie + omega_en) + C_vb.transpose() * omega_nv_v(base) + omega_vb_b(gimbal);
   // dv/dt = f - (2 omega_ie + omega_en) x v + g, solved for f.
   const Vector3 gravity_n(0.0, -earth::normal_gravity(here.latitude, here.height), 0.0);
   const Vector3 f_n = base.a_n + (2.0 * omega_ie + omega_en).cross(base.v_n) - gravity_n;

@@ -11,8 +11,8 @@ namespace selfcal::sim {
 // At one instant; the IMU sits in the gimbal's centre, which is at the stated position plus the base's displacement.
 struct MotionState {
   Matrix3 C_nb = Matrix3::Identity();
-  Vector3 omega_ib_b = Vector3::Zero();   // rad/s
-  Vector3 f_ib_b = Vector3::Zero();       // m/s^2
+  Vector3 omega_ib_b = Vector3::Zero();  // rad/s
+  Vector3 f_ib_b = Vector3::Zero();      // m/s^2
 };
 
 class TrueMotion {

@@ -71,10 +71,11 @@ std::vector<std::string> objections(const CalibrationResult& result, const Calib
     }
   }
   if (result.consistency.verdict == Verdict::inconsistent) {
-    found.push_back(fmt::format("recording and model disagree: NIS {:.3f} where {:.3f} to {:.3f} is expected, "
-                                "whiteness p = {:.2g}",
-                                result.consistency.nis_mean, result.consistency.nis_low,
-                                result.consistency.nis_high, result.consistency.whiteness_p_value));
+    found.push_back(
+        fmt::format("recording and model disagree: NIS {:.3f} where {:.3f} to {:.3f} is expected, "
+                    "whiteness p = {:.2g}",
+                    result.consistency.nis_mean, result.consistency.nis_low, result.consistency.nis_high,
+                    result.consistency.whiteness_p_value));
   } else if (result.consistency.verdict == Verdict::not_converged) {
     found.push_back(fmt::format("not converged after {} passes: the last moved a parameter by {:.2g} of its sigma",
                                 result.passes.size(),

@@ -109,8 +109,7 @@ Expected<CoefficientSet> parse_coefficient_set(const std::string& json, const st
   set.acceptable = acceptable->get<bool>();
   const auto parameters = document.find("parameters");
   if (parameters == document.end() || !parameters->is_array() || parameters->size() != sensor_parameter_count) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: parameters: {} entries expected", name, sensor_parameter_count));
+    return fail(ErrorKind::bad_input, fmt::format("{}: parameters: {} entries expected", name, sensor_parameter_count));
   }
   for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
     if (const auto parsed = parse_parameter((*parameters)[k], k, set, name); !parsed) {

@@ -10,12 +10,12 @@
 namespace selfcal {
 
 struct CoefficientSet {
-  std::string serial;                                   // of the INS they belong to
-  std::string computed_at_utc;                          // ISO 8601
-  std::array<double, sensor_parameter_count> value{};   // SI, order of sensor_parameters
-  std::array<double, sensor_parameter_count> sigma{};   // SI
+  std::string serial;                                  // of the INS they belong to
+  std::string computed_at_utc;                         // ISO 8601
+  std::array<double, sensor_parameter_count> value{};  // SI, order of sensor_parameters
+  std::array<double, sensor_parameter_count> sigma{};  // SI
   std::array<bool, sensor_parameter_count> determined{};
-  bool acceptable = false;                              // as acceptable(result): may be pushed without a word
+  bool acceptable = false;  // as acceptable(result): may be pushed without a word
 };
 
 // A value outside what is physically possible counts as not determined here. The time is the caller's, who has a clock.

@@ -21,7 +21,7 @@ ordered_json to_json(const Located& l) {
   }
   j["axis"] = l.axis;
   j["significance"] = l.significance;
-  if (l.end_s > l.start_s) {   // a place in time
+  if (l.end_s > l.start_s) {  // a place in time
     j["start_s"] = l.start_s;
     j["end_s"] = l.end_s;
   }

@@ -17,12 +17,9 @@ constexpr const char* name_of(PassDirection direction) {
 
 constexpr const char* name_of(Verdict verdict) {
   switch (verdict) {
-    case Verdict::consistent:
-      return "consistent";
-    case Verdict::inconsistent:
-      return "inconsistent";
-    case Verdict::not_converged:
-      break;
+    case Verdict::consistent: return "consistent";
+    case Verdict::inconsistent: return "inconsistent";
+    case Verdict::not_converged: break;
   }
   return "not converged";
 }
@@ -144,38 +141,36 @@ Json consistency_json(const Consistency& consistency) {
 }  // namespace
 
 nlohmann::ordered_json result_json(const CalibrationResult& result, const CalibrationOptions& options,
-                                   const Recording& recording, const std::vector<std::string>& warnings,
-                                   bool curves) {
+                                   const Recording& recording, const std::vector<std::string>& warnings, bool curves) {
   const Attitude& attitude = result.initial_attitude;
-  Json document = {
-      {"serial", recording.serial},
-      {"acceptable", acceptable(result)},
-      {"objections", objections(result, options)},
-      {"parameters", parameters_json(result, options)},
-      {"initial_attitude_deg",
-       {{"roll", attitude.roll / units::degree},
-        {"pitch", attitude.pitch / units::degree},
-        {"heading", attitude.heading / units::degree}}},
-      {"attitude_sigma_deg",
-       {{"north", result.attitude_sigma.x() / units::degree},
-        {"up", result.attitude_sigma.y() / units::degree},
-        {"east", result.attitude_sigma.z() / units::degree}}},
-      {"consistency", consistency_json(result.consistency)},
-      {"undetermined", undetermined_json(result)},
-      {"noise", noise_json(result)},
-      {"covariance_carried", options.carried_covariance},
-      {"passes", passes_json(result, curves)},
-      {"segments", segments_json(result)},
-      {"elapsed_s", result.elapsed_s},
-      {"samples", recording.size()},
-      {"duration_s", static_cast<double>(recording.size()) / recording.sample_rate_hz},
-      {"sample_rate_hz", recording.sample_rate_hz},
-      {"site",
-       {{"latitude_deg", recording.latitude_deg},
-        {"longitude_deg", recording.longitude_deg},
-        {"height_m", recording.height_m}}},
-      {"start_time_utc", recording.start_time_utc},
-      {"warnings", warnings}};
+  Json document = {{"serial", recording.serial},
+                   {"acceptable", acceptable(result)},
+                   {"objections", objections(result, options)},
+                   {"parameters", parameters_json(result, options)},
+                   {"initial_attitude_deg",
+                    {{"roll", attitude.roll / units::degree},
+                     {"pitch", attitude.pitch / units::degree},
+                     {"heading", attitude.heading / units::degree}}},
+                   {"attitude_sigma_deg",
+                    {{"north", result.attitude_sigma.x() / units::degree},
+                     {"up", result.attitude_sigma.y() / units::degree},
+                     {"east", result.attitude_sigma.z() / units::degree}}},
+                   {"consistency", consistency_json(result.consistency)},
+                   {"undetermined", undetermined_json(result)},
+                   {"noise", noise_json(result)},
+                   {"covariance_carried", options.carried_covariance},
+                   {"passes", passes_json(result, curves)},
+                   {"segments", segments_json(result)},
+                   {"elapsed_s", result.elapsed_s},
+                   {"samples", recording.size()},
+                   {"duration_s", static_cast<double>(recording.size()) / recording.sample_rate_hz},
+                   {"sample_rate_hz", recording.sample_rate_hz},
+                   {"site",
+                    {{"latitude_deg", recording.latitude_deg},
+                     {"longitude_deg", recording.longitude_deg},
+                     {"height_m", recording.height_m}}},
+                   {"start_time_utc", recording.start_time_utc},
+                   {"warnings", warnings}};
   if (curves) {
     document["correlation"] = correlation_json(result);
   }

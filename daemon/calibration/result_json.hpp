@@ -18,7 +18,6 @@ nlohmann::ordered_json result_json(const CalibrationResult& result, const Calibr
 
 // As one line of text, for those who keep it rather than look into it. Not finite numbers become null.
 std::string result_json_text(const CalibrationResult& result, const CalibrationOptions& options,
-                             const Recording& recording, const std::vector<std::string>& warnings,
-                             bool curves = false);
+                             const Recording& recording, const std::vector<std::string>& warnings, bool curves = false);
 
 }  // namespace selfcal

@@ -46,18 +46,18 @@ std::string passes_text(const CalibrationResult& result) {
   int number = 0;
   for (const PassSummary& pass : result.passes) {
     text += fmt::format("pass {} {:<8} {:>7.0f} s  NIS {:.3f}  largest move {:.3g} sigma\n", ++number,
-                        pass.direction == PassDirection::forward ? "forward" : "reverse", pass.seconds,
-                        pass.nis_mean, pass.largest_move_sigma);
+                        pass.direction == PassDirection::forward ? "forward" : "reverse", pass.seconds, pass.nis_mean,
+                        pass.largest_move_sigma);
   }
   return text;
 }
 
 }  // namespace
 
-std::string result_table(const CalibrationResult& result, const CalibrationOptions& options,
-                         const Recording& recording, bool colour) {
-  std::string text = fmt::format("{:<22} {:>12} {:>10} {:>10}  {:<7}\n", "parameter", "value", "sigma",
-                                 "tolerance", "unit");
+std::string result_table(const CalibrationResult& result, const CalibrationOptions& options, const Recording& recording,
+                         bool colour) {
+  std::string text =
+      fmt::format("{:<22} {:>12} {:>10} {:>10}  {:<7}\n", "parameter", "value", "sigma", "tolerance", "unit");
   for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
     text += parameter_row(result, options, k, colour);
   }
@@ -66,8 +66,7 @@ std::string result_table(const CalibrationResult& result, const CalibrationOptio
                       recording.serial.empty() ? "no serial number" : recording.serial, recording.size(),
                       static_cast<double>(recording.size()) / recording.sample_rate_hz, result.elapsed_s);
   text += fmt::format("attitude at the start: roll {:.4f}, pitch {:.4f}, heading {:.4f} deg\n",
-                      attitude.roll / units::degree, attitude.pitch / units::degree,
-                      attitude.heading / units::degree);
+                      attitude.roll / units::degree, attitude.pitch / units::degree, attitude.heading / units::degree);
   text += fmt::format("{} base; noise in use: ARW {:.3g} deg/sqrt(h), VRW {:.3g} ug/sqrt(Hz), position {:.3g} m\n",
                       result.moored ? "moored" : "still", result.gyro_arw / units::degree_per_sqrt_hour,
                       result.accel_vrw / units::micro_g_per_sqrt_hz, result.position_sigma);

@@ -8,7 +8,7 @@
 
 namespace selfcal {
 
-std::string result_table(const CalibrationResult& result, const CalibrationOptions& options,
-                         const Recording& recording, bool colour);
+std::string result_table(const CalibrationResult& result, const CalibrationOptions& options, const Recording& recording,
+                         bool colour);
 
 }  // namespace selfcal

@@ -12,10 +12,10 @@
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr double largest_shift_s = 2.0;    // between the same turns of both
+constexpr double largest_shift_s = 2.0;  // between the same turns of both
 // Of the false-alarm rate. Map, whiteness and size have a tenth each by themselves (judgement.hpp).
 constexpr double share_names = 0.5, share_structure = 0.1, share_parameters = 0.1;
-constexpr double rejection_rate = 0.01;    // of right names, by what they leave
+constexpr double rejection_rate = 0.01;  // of right names, by what they leave
 
 std::string schedules_differ(const ImuData& a, const ImuData& b) {
   char text[160];
@@ -43,7 +43,7 @@ struct Side {
   std::string take_out(const Correction& correction, const DiagnosisOptions& options);
 
   ImuData data;
-  AngleVelocity theta, velocity;   // behind `data`, once something was taken out
+  AngleVelocity theta, velocity;  // behind `data`, once something was taken out
   CalibrationResult calibration;
 };
 
@@ -110,7 +110,7 @@ class Comparer {
   const DiagnosisOptions& options_;
   const std::function<void(const std::string&)>& progress_;
   double log_names_;
-  NoiseModel simulated_noise_;           // that simulated_residual_ was made with
+  NoiseModel simulated_noise_;  // that simulated_residual_ was made with
   Eigen::VectorXd simulated_residual_;
   Comparison result_;
 };
@@ -169,8 +169,8 @@ void Comparer::judge(const Naming& naming) {
   d.log_p_limit = naming.log_p_limit();
   d.located = naming.map_before().places;
   d.remaining = after.places;
-  d.before =
-      adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha, moored());
+  d.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha,
+                      moored());
   d.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
   for (const Chosen& c : naming.chosen()) {
     d.findings.push_back(describe(c, naming.rows()));
@@ -186,13 +186,13 @@ void Comparer::judge(const Naming& naming) {
                    [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
   if (!moored()) {
     d.after.log_p_structure = naming.log_p_structure();
-    d.after.accepted = d.after.accepted &&
-                       d.after.log_p_structure > std::log(d.findings.empty() ? share_structure * alpha : rejection_rate);
+    d.after.accepted = d.after.accepted && d.after.log_p_structure >
+                                               std::log(d.findings.empty() ? share_structure * alpha : rejection_rate);
   }
   const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
   d.after.accepted = d.after.accepted && !jumps && itself && !naming.entangled();
   d.unexplained = !d.after.accepted;
-  constexpr double tolerable_share = 0.1;   // names must explain all but this much of the misfit
+  constexpr double tolerable_share = 0.1;  // names must explain all but this much of the misfit
   if (d.unexplained && d.after.misfit > tolerable_share * d.before.misfit) {
     d.rejected.insert(d.rejected.end(), d.findings.begin(), d.findings.end());
     d.findings.clear();
@@ -240,9 +240,8 @@ ComparisonOutcome Comparer::run() {
     return {std::nullopt, std::move(failure)};
   }
   say("difference");
-  const RecordingContext context(recording_.data, [this](const NoiseModel& noise) -> const Eigen::VectorXd& {
-    return simulated_residual(noise);
-  });
+  const RecordingContext context(
+      recording_.data, [this](const NoiseModel& noise) -> const Eigen::VectorXd& { return simulated_residual(noise); });
   PassInput input = forward_pass(recording_.data, recording_.calibration);
   input.noise = common_noise();
   Naming naming(context, input, log_names_);
@@ -257,9 +256,9 @@ ComparisonOutcome Comparer::run() {
   const bool same_parameters = log_corrected(log_chi_squared_tail(z * z, 1.0), sensor_parameter_count) >
                                std::log(share_parameters * options_.false_alarm_rate);
   d.mismatch = !d.findings.empty() || d.unexplained || !same_parameters;
-  d.verdict = !d.findings.empty()  ? DiagnosisVerdict::named
-              : d.unexplained      ? DiagnosisVerdict::none_of_the_above
-                                   : DiagnosisVerdict::adequate;
+  d.verdict = !d.findings.empty() ? DiagnosisVerdict::named
+              : d.unexplained     ? DiagnosisVerdict::none_of_the_above
+                                  : DiagnosisVerdict::adequate;
   result_.attitude_difference = attitude_difference();
   return {std::move(result_), {}};
 }

@@ -15,16 +15,16 @@
 namespace selfcal::diagnosis {
 
 struct Comparison {
-  Diagnosis diagnosis;             // located, findings, adequacy of the difference; the 24 and calibration the recording's
-  std::vector<Finding> in_both;    // effects that the simulation shows, taken out of both before they were compared
-  ParameterVector difference;      // of the 24, recording less simulation, SI, findings taken into account
+  Diagnosis diagnosis;  // located, findings, adequacy of the difference; the 24 and calibration the recording's
+  std::vector<Finding> in_both;  // effects that the simulation shows, taken out of both before they were compared
+  ParameterVector difference;    // of the 24, recording less simulation, SI, findings taken into account
   ParameterVector sigma;
-  double attitude_difference = 0.0;   // largest between the two in a dwell, rad
+  double attitude_difference = 0.0;  // largest between the two in a dwell, rad
 };
 
 struct ComparisonOutcome {
   std::optional<Comparison> comparison;
-  std::string failure;             // schedules that differ, or a recording that cannot be calibrated
+  std::string failure;  // schedules that differ, or a recording that cannot be calibrated
 };
 
 ComparisonOutcome compare(const ImuData& recording, const ImuData& simulation, const DiagnosisOptions& options,

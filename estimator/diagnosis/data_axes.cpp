@@ -39,7 +39,7 @@ struct AxisOrder {
     }
     return v;
   }
-  Matrix3 matrix() const {   // measured = matrix * truth
+  Matrix3 matrix() const {  // measured = matrix * truth
     Matrix3 m = Matrix3::Zero();
     for (std::size_t i = 0; i < 3; ++i) {
       m(static_cast<Eigen::Index>(i), of[i]) = sign[i];
@@ -74,15 +74,16 @@ std::vector<AxisOrder> all_orders() {
   return all;
 }
 
-DataFault wrong_order(const std::string& triad, const AxisOrder& order, const std::string& evidence, std::size_t samples) {
+DataFault wrong_order(const std::string& triad, const AxisOrder& order, const std::string& evidence,
+                      std::size_t samples) {
   return {order.ordered() ? "wrong_sign" : "wrong_axes", triad + ": " + order.words() + evidence, 0, samples};
 }
 
 // ---- gyros against the gimbal
 
 struct Turns {
-  Matrix3 measured;            // M: measured turn = M * the gimbal's, along b
-  Matrix3 seen;                // projection on the directions about which it turned
+  Matrix3 measured;  // M: measured turn = M * the gimbal's, along b
+  Matrix3 seen;      // projection on the directions about which it turned
 };
 
 std::optional<Turns> turns_against_gimbal(const ImuData& data, const std::vector<Segment>& segments) {
@@ -120,7 +121,7 @@ std::optional<Turns> turns_against_gimbal(const ImuData& data, const std::vector
 // Whether the gyros turn as the gimbal does.
 bool gyros_right(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
   const std::optional<Turns> turns = turns_against_gimbal(data, segments);
-  constexpr double plausible = 0.05;   // gimbal good to 1 deg in 90, sensors to 1 deg
+  constexpr double plausible = 0.05;  // gimbal good to 1 deg in 90, sensors to 1 deg
   if (!turns || (turns->measured - turns->seen).cwiseAbs().maxCoeff() <= plausible) {
     return true;
   }
@@ -134,8 +135,10 @@ bool gyros_right(const ImuData& data, const std::vector<Segment>& segments, std:
   Matrix3 beside = M;
   beside.diagonal().setZero();
   if (beside.cwiseAbs().maxCoeff() <= plausible && M.diagonal().minCoeff() > 0.0) {
-    faults.push_back({"wrong_scale", number("gyros x, y, z make %.3f, %.3f, %.3f of the turns of the gimbal", M(0, 0), M(1, 1),
-                                            M(2, 2)), 0, data.size()});
+    faults.push_back(
+        {"wrong_scale",
+         number("gyros x, y, z make %.3f, %.3f, %.3f of the turns of the gimbal", M(0, 0), M(1, 1), M(2, 2)), 0,
+         data.size()});
     return false;
   }
   char text[200];
@@ -149,8 +152,8 @@ bool gyros_right(const ImuData& data, const std::vector<Segment>& segments, std:
 // ---- dwells by the gyros' own attitude
 
 struct Rest {
-  Vector3 rate, force;         // means, b
-  Matrix3 C_ib;                // at the middle, from where the recording starts
+  Vector3 rate, force;  // means, b
+  Matrix3 C_ib;         // at the middle, from where the recording starts
 };
 
 // Dwells without their first and last second; `drift` is taken from the gyros.
@@ -227,7 +230,7 @@ bool upside_down(const ImuData& data, const std::vector<Segment>& segments) {
 // by the gimbal, where there is one, upwards. Whether the accelerometers' axes are right.
 bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segments, const std::vector<Rest>& dwells,
                           std::vector<DataFault>& faults) {
-  constexpr double inconsistent = 0.15;   // half an hour on the Earth, a gimbal off by degrees
+  constexpr double inconsistent = 0.15;  // half an hour on the Earth, a gimbal off by degrees
   constexpr double far_better = 0.3, longest_s = 1200.0;
   const double each_s = (data.time_s.back() - data.time_s.front()) / static_cast<double>(dwells.size());
   if (dwells.size() < 2 || each_s > longest_s) {
@@ -239,14 +242,17 @@ bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segme
     if (gravity_scatter(dwells, best) < far_better * as_given) {
       faults.push_back(wrong_order("accelerometers", best, ", by where gravity points after the turns", data.size()));
     } else {
-      faults.push_back({"wrong_axes", number("accelerometers against gyros: gravity wanders by %.0f deg from dwell to dwell",
-                                             std::asin(std::min(1.0, as_given)) / units::degree), 0, data.size()});
+      faults.push_back({"wrong_axes",
+                        number("accelerometers against gyros: gravity wanders by %.0f deg from dwell to dwell",
+                               std::asin(std::min(1.0, as_given)) / units::degree),
+                        0, data.size()});
     }
     return false;
   }
   const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
   if (gimbal && upside_down(data, segments)) {
-    faults.push_back(wrong_order("accelerometers", {{0, 1, 2}, {-1, -1, -1}}, ": the base would be upside down", data.size()));
+    faults.push_back(
+        wrong_order("accelerometers", {{0, 1, 2}, {-1, -1, -1}}, ": the base would be upside down", data.size()));
     return false;
   }
   return true;
@@ -256,14 +262,14 @@ bool accelerometers_right(const ImuData& data, const std::vector<Segment>& segme
 
 struct SensedEarth {
   Vector3 drift;
-  double latitude = 0.0, sigma = 0.0;   // rad; of the scatter from dwell to dwell
+  double latitude = 0.0, sigma = 0.0;  // rad; of the scatter from dwell to dwell
 };
 
 // Mean rates of dwells are w_k = C_k' w + drift, w the Earth's in space; with gravity's direction in the same dwell the
 // latitude is the arc sine of their product. None where dwells are few or alike, or the base sways.
 std::optional<SensedEarth> sense_earth(const std::vector<Rest>& dwells) {
   constexpr std::size_t enough = 6;
-  constexpr double told_apart = 0.1;                    // of the information that dwells all about have
+  constexpr double told_apart = 0.1;  // of the information that dwells all about have
   constexpr double steady = 0.05 * earth::rotation_rate;
   Matrix6 normal = Matrix6::Zero();
   Vector6 right = Vector6::Zero();
@@ -300,16 +306,18 @@ std::optional<SensedEarth> sense_earth(const std::vector<Rest>& dwells) {
 
 void latitude_by_gyros(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
   constexpr double plausible = 0.5 * units::degree, sigmas = 6.0;
-  constexpr int rounds = 3;                             // a drift of 1 deg/h turns the attitude by as much
+  constexpr int rounds = 3;  // a drift of 1 deg/h turns the attitude by as much
   std::optional<SensedEarth> sensed = SensedEarth{Vector3::Zero()};
   for (int round = 0; round < rounds && sensed; ++round) {
     sensed = sense_earth(rests(data, segments, sensed->drift));
   }
   if (sensed && std::abs(sensed->latitude - data.site.latitude) > std::max(plausible, sigmas * sensed->sigma)) {
-    faults.push_back({"wrong_site", number("gravity and the Earth's rate as sensed stand as at latitude %.2f deg (+- %.2f), the "
-                                           "site's is %.2f deg", sensed->latitude / units::degree,
-                                           sensed->sigma / units::degree, data.site.latitude / units::degree),
-                      0, data.size()});
+    faults.push_back(
+        {"wrong_site",
+         number("gravity and the Earth's rate as sensed stand as at latitude %.2f deg (+- %.2f), the "
+                "site's is %.2f deg",
+                sensed->latitude / units::degree, sensed->sigma / units::degree, data.site.latitude / units::degree),
+         0, data.size()});
   }
 }
 
@@ -333,8 +341,10 @@ void gravity_size(const ImuData& data, const std::vector<Segment>& segments, std
   }
   constexpr double plausible = 0.015;
   if (dwells > 0 && std::abs(sum / dwells / expected - 1.0) > plausible) {
-    faults.push_back({"wrong_scale", number("specific force at rest is %.5f m/s^2, gravity there is %.5f m/s^2",
-                                            sum / dwells, expected), 0, data.size()});
+    faults.push_back(
+        {"wrong_scale",
+         number("specific force at rest is %.5f m/s^2, gravity there is %.5f m/s^2", sum / dwells, expected), 0,
+         data.size()});
   }
 }
 

@@ -73,7 +73,8 @@ void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
     constexpr double least_p = 0.02, never = 1e-4;
     const double p = std::max(least_p, (chance + 3.0) / n);
     if (p < 0.5 && n * std::pow(p, static_cast<double>(longest)) < never) {
-      faults.push_back({"lost_samples", number("%.0f samples in a row repeat the one before", static_cast<double>(longest)),
+      faults.push_back({"lost_samples",
+                        number("%.0f samples in a row repeat the one before", static_cast<double>(longest)),
                         longest_first, longest});
     }
   }
@@ -91,8 +92,9 @@ void time_base(const ImuData& data, std::vector<DataFault>& faults) {
   std::nth_element(dt.begin(), dt.begin() + static_cast<std::ptrdiff_t>(dt.size() / 2), dt.end());
   const double rate = 1.0 / dt[dt.size() / 2];
   if (std::abs(rate / data.sample_rate_hz - 1.0) > 1e-3) {
-    faults.push_back({"time_base", number("time stamps run at %.6g Hz, the rate is stated as %.6g Hz", rate,
-                                          data.sample_rate_hz), 0, data.size()});
+    faults.push_back({"time_base",
+                      number("time stamps run at %.6g Hz, the rate is stated as %.6g Hz", rate, data.sample_rate_hz), 0,
+                      data.size()});
   }
 }
 
@@ -121,7 +123,7 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
     const bool gyro = axis < 3;
     const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
     const double count = usual_step(data.size(), value);
-    const auto margin = static_cast<std::size_t>(data.sample_rate_hz);   // a dwell's edge may hold part of a turn
+    const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
     DataFault fault{"frozen_axis", {}, 0, 0};
     const auto stuck = [&](std::size_t first, std::size_t last) {
       fault.first_sample = fault.count == 0 ? first : fault.first_sample;
@@ -187,7 +189,7 @@ void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segm
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const auto value = [&](std::size_t i) { return axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
     const std::string name = std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3];
-    std::vector<std::pair<double, std::size_t>> off;   // in time's order
+    std::vector<std::pair<double, std::size_t>> off;  // in time's order
     double largest = 0.0;
     std::size_t met = 0, first_met = 0;
     for (std::size_t i = 0; i < data.size(); ++i) {
@@ -210,9 +212,9 @@ void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segm
     std::vector<std::pair<double, std::size_t>> sorted = off;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
     std::nth_element(sorted.begin(), middle, sorted.end());
-    const double limit = 12.0 * middle->first / 1.645;   // the 90 % point is 1.645 sigma: 12 sigma
+    const double limit = 12.0 * middle->first / 1.645;  // the 90 % point is 1.645 sigma: 12 sigma
     DataFault spike{"spike", {}, 0, 0};
-    for (std::size_t k = 2; k + 2 < off.size(); ++k) {   // its neighbours stand out too, by two thirds of it
+    for (std::size_t k = 2; k + 2 < off.size(); ++k) {  // its neighbours stand out too, by two thirds of it
       const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
       if (off[k].first > limit && limit > 0.0 && largest_around) {
         note(spike, off[k].second);
@@ -225,7 +227,7 @@ void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segm
     }
     met = steeply_met(data, value, largest);
     constexpr std::size_t often = 100;
-    constexpr double rest_rate = 0.5 * units::degree;   // below it the largest count of a gyro is only noise
+    constexpr double rest_rate = 0.5 * units::degree;  // below it the largest count of a gyro is only noise
     const bool loud = axis < 3 ? largest * data.sample_rate_hz > rest_rate : largest * data.sample_rate_hz > 11.0;
     if (met > often && loud) {
       faults.push_back({"saturation", name + number(" meets its extreme value %.0f times", static_cast<double>(met)),
@@ -243,7 +245,7 @@ std::vector<DataFault> find_data_faults(const ImuData& data) {
   time_base(data, faults);
   frozen_axes(data, segments, faults);
   spikes_and_saturation(data, segments, faults);
-  if (faults.empty()) {   // else what a turn adds up to is no question of axes
+  if (faults.empty()) {  // else what a turn adds up to is no question of axes
     find_wrong_axes(data, segments, faults);
   }
   return faults;

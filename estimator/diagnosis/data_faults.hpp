@@ -13,7 +13,7 @@ struct DataFault {
   std::string id;
   std::string words;
   std::size_t first_sample = 0;
-  std::size_t count = 0;        // samples concerned
+  std::size_t count = 0;  // samples concerned
 };
 
 // Each kind at most once, with its first sample and how many there are.

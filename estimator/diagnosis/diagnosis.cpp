@@ -20,10 +20,10 @@ namespace {
 // of the innovations, noise and lines.
 constexpr double share_names = 0.45, share_map = 0.1, share_structure = 0.1, share_white = 0.1, share_size = 0.1,
                  share_noise = 0.15;
-constexpr double rejection_rate = 0.01;        // of right names, by the biases that they leave
-constexpr double remainder_rate = 0.01;        // and by map, whiteness and size
-constexpr double suspicion = 0.05;             // corrected p at which an effect is worth a further experiment
-constexpr double seen_z = 3.0;                 // an effect of typical size is detectable here beyond it
+constexpr double rejection_rate = 0.01;  // of right names, by the biases that they leave
+constexpr double remainder_rate = 0.01;  // and by map, whiteness and size
+constexpr double suspicion = 0.05;       // corrected p at which an effect is worth a further experiment
+constexpr double seen_z = 3.0;           // an effect of typical size is detectable here beyond it
 
 const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
 
@@ -45,13 +45,12 @@ Finding describe(const Chosen& chosen, double rows) {
   f.experiment = effect.experiment;
   for (Eigen::Index k = 0; k < chosen.size.size(); ++k) {
     const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
-    f.parameters.push_back({p.name, p.unit, chosen.size(k) * p.typical,
-                            std::sqrt(chosen.covariance(k, k)) * p.typical});
+    f.parameters.push_back(
+        {p.name, p.unit, chosen.size(k) * p.typical, std::sqrt(chosen.covariance(k, k)) * p.typical});
   }
-  if (!std::isnan(chosen.candidate.constant)) { 
+  if (!std::isnan(chosen.candidate.constant)) {
     f.parameters.push_back({std::string(effect.constant_name), std::string(effect.constant_unit),
-                            chosen.candidate.constant,
-                            chosen.constant_sigma});
+                            chosen.candidate.constant, chosen.constant_sigma});
   }
   f.equivalent = chosen.equivalent;
   f.probability = chosen.probability;
@@ -122,8 +121,8 @@ void judge_noise(const CalibrationResult& calibration, const NoiseModel& fitted,
     // On a moored base the gyros' density hides behind the motion.
     const bool judged = expected > 0.0 && !(gyro && calibration.moored);
     if (judged && std::abs(z) > 5.0) {
-      level.parameters.push_back({"mean", gyro ? "deg/sqrt(h)" : "ug/sqrt(Hz)", density / unit,
-                                  density_sigma * density / unit});
+      level.parameters.push_back(
+          {"mean", gyro ? "deg/sqrt(h)" : "ug/sqrt(Hz)", density / unit, density_sigma * density / unit});
       level.log_p = log_normal_tail(z);
     }
     for (int k = 0; k < 3; ++k) {
@@ -181,12 +180,13 @@ Adequacy adequacy(double square, double rows, double log_p_white, const Map& map
   const auto good = [&](double sigma, double rate) {
     return log_corrected(log_normal_tail(sigma), std::max(1, map.tests)) > std::log(share_map * rate);
   };
-  const bool map_good = good(map.largest_named_sigma, alpha) && good(map.largest_sigma, std::min(alpha, alpha_elsewhere));
+  const bool map_good =
+      good(map.largest_named_sigma, alpha) && good(map.largest_sigma, std::min(alpha, alpha_elsewhere));
   // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
   const bool white = motion_fitted || log_p_white > std::log(share_white * alpha);
   const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
-  const bool size_good = motion_fitted || log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) >
-                                              std::log(share_size * alpha);
+  const bool size_good =
+      motion_fitted || log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) > std::log(share_size * alpha);
   a.accepted = map_good && white && size_good;
   return a;
 }
@@ -197,7 +197,8 @@ DataFault wrong_latitude(const Chosen& chosen, const ImuData& data) {
   const double unit = chosen.candidate.effect->parameters.front().typical;
   const double stated = data.site.latitude / units::degree;
   char words[160];
-  std::snprintf(words, sizeof words, "the Earth's rate as sensed stands as at latitude %.3f +- %.3f deg, the site's is %.3f deg",
+  std::snprintf(words, sizeof words,
+                "the Earth's rate as sensed stands as at latitude %.3f +- %.3f deg, the site's is %.3f deg",
                 stated + chosen.size(0) * unit, std::sqrt(chosen.covariance(0, 0)) * unit, stated);
   return {"wrong_site", words, 0, data.size()};
 }
@@ -224,8 +225,8 @@ class Diagnoser {
   const DiagnosisOptions& options_;
   const std::function<void(const std::string&)>& say_;
   double log_names_;
-  AngleVelocity theta_, velocity_;   // increments without the dwells' lines
-  bool beats_ = false;               // the accelerometers' quantum colours the innovations
+  AngleVelocity theta_, velocity_;  // increments without the dwells' lines
+  bool beats_ = false;              // the accelerometers' quantum colours the innovations
   Diagnosis d_;
 };
 
@@ -333,9 +334,9 @@ void Diagnoser::decide(const Naming& naming) {
     }
   }
   // A moored base moves, and the calibration models it: sway that is found once more is no mismatch.
-  const bool only_motion = d_.calibration.moored &&
-                           std::all_of(d_.findings.begin(), d_.findings.end(),
-                                       [](const Finding& f) { return f.effect == "base_sway"; });
+  const bool only_motion =
+      d_.calibration.moored &&
+      std::all_of(d_.findings.begin(), d_.findings.end(), [](const Finding& f) { return f.effect == "base_sway"; });
   d_.mismatch = (!d_.findings.empty() && !only_motion) || d_.unexplained;
   if (!d_.findings.empty() && !only_motion) {
     d_.verdict = DiagnosisVerdict::named;

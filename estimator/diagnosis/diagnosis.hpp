@@ -23,49 +23,49 @@ namespace selfcal::diagnosis {
 struct DiagnosisOptions {
   // Of a whole recording, over all tests: half of what is promised (1 %), for the null distributions are approximations.
   double false_alarm_rate = 0.005;
-  AssumedNoise assumed;                // what the simulation takes for the sensors
+  AssumedNoise assumed;  // what the simulation takes for the sensors
   CalibrationOptions calibration;
-  std::stop_token stop;                // asked for between steps: the failure is then "stopped"
+  std::stop_token stop;  // asked for between steps: the failure is then "stopped"
 };
 
 struct FindingParameter {
   std::string name, unit;
-  double value = 0.0, sigma = 0.0;     // in the unit
+  double value = 0.0, sigma = 0.0;  // in the unit
 };
 
 struct Finding {
   std::string effect;
   std::string equation, excited;
   std::vector<FindingParameter> parameters;
-  std::vector<std::string> equivalent; // effects that explain the recording as well
-  std::map<std::string, double> probability;   // of every effect in this one's place, all equally likely before
-  std::string experiment;              // what would tell them apart
-  double significance = 0.0;           // sigma, after correction for all that was tested
-  double log_p = 0.0;                  // the same, natural logarithm
-  double delta_bic = 0.0;              // fall of the BIC: positive speaks for it
-  double held_out_gain = 0.0;          // log-likelihood on dwells and rotations left out in turn
-  bool stochastic = false;             // a noise model, not a mean
+  std::vector<std::string> equivalent;        // effects that explain the recording as well
+  std::map<std::string, double> probability;  // of every effect in this one's place, all equally likely before
+  std::string experiment;                     // what would tell them apart
+  double significance = 0.0;                  // sigma, after correction for all that was tested
+  double log_p = 0.0;                         // the same, natural logarithm
+  double delta_bic = 0.0;                     // fall of the BIC: positive speaks for it
+  double held_out_gain = 0.0;                 // log-likelihood on dwells and rotations left out in turn
+  bool stochastic = false;                    // a noise model, not a mean
 };
 
 // One equation of the model that the findings make: for use on other recordings.
 struct ModelEffect {
-  const Effect* effect = nullptr;      // of the catalogue
-  double constant = 0.0;               // NaN: none
-  Eigen::VectorXd size;                // in typical sizes
+  const Effect* effect = nullptr;  // of the catalogue
+  double constant = 0.0;           // NaN: none
+  Eigen::VectorXd size;            // in typical sizes
   Eigen::MatrixXd covariance;
 };
 
 struct Undetectable {
   std::string effect;
-  double expected_z = 0.0;             // of its best coefficient at typical size
+  double expected_z = 0.0;  // of its best coefficient at typical size
 };
 
 struct Adequacy {
-  double nis = 0.0;                    // per degree of freedom
+  double nis = 0.0;  // per degree of freedom
   double log_p_white = 0.0;
-  double largest_sigma = 0.0;          // of the map
-  double misfit = 0.0;                 // sum of squares beyond the degrees of freedom
-  double log_p_structure = 0.0;        // of biases that many dwells, rotations or times share; after the fit only
+  double largest_sigma = 0.0;    // of the map
+  double misfit = 0.0;           // sum of squares beyond the degrees of freedom
+  double log_p_structure = 0.0;  // of biases that many dwells, rotations or times share; after the fit only
   bool accepted = false;
 };
 
@@ -76,22 +76,22 @@ struct Diagnosis {
   bool mismatch = false;
   bool unexplained = false;
   std::vector<DataFault> faults;
-  std::vector<Finding> findings;       // best first
-  std::vector<Finding> rejected;       // fitted best, but what remains says no
-  std::vector<Finding> suspected;      // too weak to name
+  std::vector<Finding> findings;   // best first
+  std::vector<Finding> rejected;   // fitted best, but what remains says no
+  std::vector<Finding> suspected;  // too weak to name
   std::vector<Located> located, remaining;
-  std::vector<Located> located_by, remaining_by;   // by gimbal angles, directions, temperature: the worst of each
+  std::vector<Located> located_by, remaining_by;  // by gimbal angles, directions, temperature: the worst of each
   std::vector<Undetectable> undetectable, detectable;
   Adequacy before, after;
   NoiseCheck noise;
-  CalibrationResult calibration;       // of the 24 alone
-  std::vector<ModelEffect> model;      // equations among the findings
-  double log_p_limit = 0.0;            // natural logarithm of p, not corrected, below which one test of an effect is a name
-  double mean_temperature_c = 0.0;     // of the recording; 0 without a channel
+  CalibrationResult calibration;   // of the 24 alone
+  std::vector<ModelEffect> model;  // equations among the findings
+  double log_p_limit = 0.0;        // natural logarithm of p, not corrected, below which one test of an effect is a name
+  double mean_temperature_c = 0.0;  // of the recording; 0 without a channel
   // Of the 24, SI: mean and sigma over all explanations that the recording leaves open; and with `model` as it is.
   ParameterVector value, sigma;
   ParameterVector value_as_named;
-  ParameterMatrix covariance;          // of value
+  ParameterMatrix covariance;  // of value
 };
 
 struct DiagnosisOutcome {

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double lowest_hz = 0.1, highest_hz = 2.0;
 constexpr double least_dwell_s = 30.0;
-constexpr double log_false_lines = -4.6;   // one false line in a hundred recordings
-constexpr Eigen::Index neighbours = 12;    // bins to either side whose median is the background
+constexpr double log_false_lines = -4.6;  // one false line in a hundred recordings
+constexpr Eigen::Index neighbours = 12;   // bins to either side whose median is the background
 
 struct Line {
   double frequency_hz = 0.0;

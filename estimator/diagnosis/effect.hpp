@@ -16,35 +16,35 @@ namespace selfcal::diagnosis {
 
 // What the equations may use: a stretch in which b turns by 3 mrad at most, 1 s at most. b axes, SI, means over it.
 struct EffectContext {
-  double start_s = 0.0, end_s = 0.0;     // since the start of the recording
+  double start_s = 0.0, end_s = 0.0;  // since the start of the recording
   double dt = 0.0;
-  Vector3 angle, velocity;               // integrals of rate and specific force: rad, m/s
-  Vector3 rate, force, u;                // means: rad/s, m/s^2, force in g
-  Vector3 rate_change;                   // rate at the end less rate at the start: rad/s, zero inside dwells
+  Vector3 angle, velocity;  // integrals of rate and specific force: rad, m/s
+  Vector3 rate, force, u;   // means: rad/s, m/s^2, force in g
+  Vector3 rate_change;      // rate at the end less rate at the start: rad/s, zero inside dwells
   Matrix3 C_nb;
-  double since_turn_start_s = 0.0;       // part of the stretch after the end of the first turn, since the last one's
-  double since_turn_end_s = 0.0;         // equal: none
-  double duration_s = 0.0;               // of the recording
-  double outer = NAN, inner = NAN;       // gimbal read-outs at the middle, rad; NaN: none
-  double temperature = NAN;              // less its mean over the recording, degC; NaN: no channel
-  Vector3 field_b;                       // magnetic field of an axial dipole Earth, gauss
-  Vector3 earth_rate_b = Vector3::Zero();   // direction of the Earth's rate, unit length; zero: not known
+  double since_turn_start_s = 0.0;         // part of the stretch after the end of the first turn, since the last one's
+  double since_turn_end_s = 0.0;           // equal: none
+  double duration_s = 0.0;                 // of the recording
+  double outer = NAN, inner = NAN;         // gimbal read-outs at the middle, rad; NaN: none
+  double temperature = NAN;                // less its mean over the recording, degC; NaN: no channel
+  Vector3 field_b;                         // magnetic field of an axial dipole Earth, gauss
+  Vector3 earth_rate_b = Vector3::Zero();  // direction of the Earth's rate, unit length; zero: not known
 };
 
 struct EffectParameter {
   std::string name;
   std::string unit;
   double si_per_unit = 1.0;
-  double typical = 0.0;                  // size in the unit that such sensors show
+  double typical = 0.0;  // size in the unit that such sensors show
 };
 
 using Columns = Eigen::Ref<Eigen::Matrix3Xd>;
 
 struct Effect {
-  std::string id;                        // as in the catalogue
+  std::string id;  // as in the catalogue
   std::string equation;
-  std::string excited;                   // where it shows, in words
-  std::string experiment;                // what would tell it from its rivals
+  std::string excited;     // where it shows, in words
+  std::string experiment;  // what would tell it from its rivals
   std::vector<EffectParameter> parameters;
   // Grid of the constant; {NaN}: none. Several variants of an effect are alternatives.
   std::vector<double> constants = {NAN};

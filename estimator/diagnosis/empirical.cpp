@@ -38,7 +38,7 @@ Effect smooth(const char* words) {
   return e;
 }
 
-double middle(const EffectContext& c) { return (c.start_s + c.end_s) / c.duration_s - 1.0; }   // -1 to 1
+double middle(const EffectContext& c) { return (c.start_s + c.end_s) / c.duration_s - 1.0; }  // -1 to 1
 
 template <int n>
 double legendre(const EffectContext& c) {
@@ -52,17 +52,29 @@ double legendre(const EffectContext& c) {
   }
 }
 template <int axis>
-double gravity(const EffectContext& c) { return c.u(axis); }
+double gravity(const EffectContext& c) {
+  return c.u(axis);
+}
 template <int i, int j>
-double product(const EffectContext& c) { return c.u(i) * c.u(j); }
+double product(const EffectContext& c) {
+  return c.u(i) * c.u(j);
+}
 template <int n>
-double sine_outer(const EffectContext& c) { return std::sin(n * c.outer); }
+double sine_outer(const EffectContext& c) {
+  return std::sin(n * c.outer);
+}
 template <int n>
-double cosine_outer(const EffectContext& c) { return std::cos(n * c.outer); }
+double cosine_outer(const EffectContext& c) {
+  return std::cos(n * c.outer);
+}
 template <int n>
-double sine_inner(const EffectContext& c) { return std::sin(n * c.inner); }
+double sine_inner(const EffectContext& c) {
+  return std::sin(n * c.inner);
+}
 template <int n>
-double cosine_inner(const EffectContext& c) { return std::cos(n * c.inner); }
+double cosine_inner(const EffectContext& c) {
+  return std::cos(n * c.inner);
+}
 double temperature(const EffectContext& c) { return c.temperature; }
 double temperature_square(const EffectContext& c) { return c.temperature * c.temperature; }
 
@@ -73,11 +85,11 @@ std::vector<Effect> functions(const ImuData& data) {
       smooth<product<0, 1>>("u_x u_y"), smooth<product<0, 2>>("u_x u_z"), smooth<product<1, 2>>("u_y u_z"),
       smooth<legendre<1>>("P1(time)"),  smooth<legendre<2>>("P2(time)"),  smooth<legendre<3>>("P3(time)")};
   if (!data.gimbal_outer.empty() && !data.gimbal_inner.empty()) {
-    for (Effect& e : std::vector<Effect>{
-             smooth<sine_outer<1>>("sin(outer)"), smooth<cosine_outer<1>>("cos(outer)"),
-             smooth<sine_outer<2>>("sin(2 outer)"), smooth<cosine_outer<2>>("cos(2 outer)"),
-             smooth<sine_inner<1>>("sin(inner)"), smooth<cosine_inner<1>>("cos(inner)"),
-             smooth<sine_inner<2>>("sin(2 inner)"), smooth<cosine_inner<2>>("cos(2 inner)")}) {
+    for (Effect& e :
+         std::vector<Effect>{smooth<sine_outer<1>>("sin(outer)"), smooth<cosine_outer<1>>("cos(outer)"),
+                             smooth<sine_outer<2>>("sin(2 outer)"), smooth<cosine_outer<2>>("cos(2 outer)"),
+                             smooth<sine_inner<1>>("sin(inner)"), smooth<cosine_inner<1>>("cos(inner)"),
+                             smooth<sine_inner<2>>("sin(2 inner)"), smooth<cosine_inner<2>>("cos(2 inner)")}) {
       all.push_back(std::move(e));
     }
   }
@@ -146,7 +158,8 @@ EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& 
   const Fit fit = evidence.fit(chosen);
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    const EffectParameter& p = all[static_cast<std::size_t>(chosen[k] / axes)].parameters[static_cast<std::size_t>(chosen[k] % axes)];
+    const EffectParameter& p =
+        all[static_cast<std::size_t>(chosen[k] / axes)].parameters[static_cast<std::size_t>(chosen[k] % axes)];
     result.terms[k].value = fit.value(at) * p.typical;
     result.terms[k].sigma = std::sqrt(fit.covariance(at, at)) * p.typical;
   }

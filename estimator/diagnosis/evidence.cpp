@@ -50,7 +50,7 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
     const Eigen::MatrixXd X = e.information(others, group);
     const Eigen::VectorXd s = e.score(others);
     Eigen::MatrixXd inverse = A;
-    inverse.diagonal().array() += 1e-6;   // sizes up to 1000 times the typical one
+    inverse.diagonal().array() += 1e-6;  // sizes up to 1000 times the typical one
     const Eigen::LDLT<Eigen::MatrixXd> solver(inverse);
     G -= X.transpose() * solver.solve(X);
     b -= X.transpose() * solver.solve(s);
@@ -65,8 +65,8 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   double best = 0.0;
   for (Eigen::Index k = 0; k < b.size(); ++k) {
     test.expected_z = std::max(test.expected_z, std::sqrt(std::max(G(k, k), 0.0)));
-    if (G(k, k) > least_information && G(k, k) > 1e-9 * e.information(group[static_cast<std::size_t>(k)],
-                                                          group[static_cast<std::size_t>(k)])) {
+    if (G(k, k) > least_information &&
+        G(k, k) > 1e-9 * e.information(group[static_cast<std::size_t>(k)], group[static_cast<std::size_t>(k)])) {
       best = std::max(best, b(k) * b(k) / G(k, k));
     }
   }
@@ -125,7 +125,7 @@ WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int
     }
   }
   test.rate = std::sqrt(best_q);
-  if (best_q > 0.0) {   // curvature in the logarithm of the rate
+  if (best_q > 0.0) {  // curvature in the logarithm of the rate
     const double h = 0.1;
     const double around = twice_log_likelihood(best_q * std::exp(2.0 * h)) +
                           twice_log_likelihood(best_q * std::exp(-2.0 * h)) - 2.0 * test.gain;
@@ -160,8 +160,7 @@ double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& resi
     }
     const Eigen::MatrixXd here = G[f].block(first, first, count, count);
     const Eigen::VectorXd score = b[f].segment(first, count);
-    const Fit rest = fit_columns(G_all.block(first, first, count, count) - here,
-                                 b_all.segment(first, count) - score);
+    const Fit rest = fit_columns(G_all.block(first, first, count, count) - here, b_all.segment(first, count) - score);
     return 2.0 * rest.value.dot(score) - rest.value.dot(here * rest.value);
   };
   double gain = 0.0;

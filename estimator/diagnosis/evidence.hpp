@@ -14,7 +14,7 @@ namespace selfcal::diagnosis {
 struct Evidence {
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
-  double square = 0.0;         // of the residuals
+  double square = 0.0;  // of the residuals
   double rows = 0.0;
 
   explicit Evidence(const SignatureRows& rows);
@@ -30,7 +30,7 @@ struct Evidence {
 constexpr double least_information = 1e-5;
 
 struct GroupTest {
-  double gain = 0.0;           // fall of the residuals' square
+  double gain = 0.0;  // fall of the residuals' square
   int rank = 0;
   double log_p = 0.0;          // of the group: whole group and best single column, corrected for looking at both
   double log_detection = 0.0;  // the smaller of both, not corrected: for effective_tests, and for rivals the above
@@ -41,10 +41,10 @@ GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, co
 
 // Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
 struct WalkTest {
-  int axis = 0;                // 0..2 gyro, 3..5 accelerometer
-  double gain = 0.0;           // twice the log-likelihood gained
-  double rate = 0.0;           // map units per sqrt(h)
-  double sigma = 0.0;          // of the rate, from the curvature
+  int axis = 0;        // 0..2 gyro, 3..5 accelerometer
+  double gain = 0.0;   // twice the log-likelihood gained
+  double rate = 0.0;   // map units per sqrt(h)
+  double sigma = 0.0;  // of the rate, from the curvature
   std::vector<int> columns;
   Eigen::MatrixXd covariance;  // of the columns at that rate
 };

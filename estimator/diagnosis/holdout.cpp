@@ -17,7 +17,8 @@ Correction carried(const Diagnosis& d, std::vector<std::string>& not_carried) {
       not_carried.push_back(m.effect->id);
       continue;
     }
-    correction.effects.push_back({m.effect, m.constant, static_cast<int>(sizes.size()), static_cast<int>(m.size.size())});
+    correction.effects.push_back(
+        {m.effect, m.constant, static_cast<int>(sizes.size()), static_cast<int>(m.size.size())});
     sizes.insert(sizes.end(), m.size.begin(), m.size.end());
   }
   for (const Finding& f : d.findings) {

@@ -6,17 +6,17 @@
 namespace selfcal::diagnosis {
 
 struct HeldOutState {
-  double log_likelihood = 0.0;         // of the second recording's innovations; the 24 free, the effects as found
-  double nis = 0.0;                    // per degree of freedom
+  double log_likelihood = 0.0;  // of the second recording's innovations; the 24 free, the effects as found
+  double nis = 0.0;             // per degree of freedom
   double log_p_white = 0.0;
-  double parameter_disagreement = 0.0; // of the 24 between both recordings: mean square in sigma, 1 expected where the
-                                       // sensors' own errors stay (a new turn-on may give new biases)
+  double parameter_disagreement = 0.0;  // of the 24 between both recordings: mean square in sigma, 1 expected where the
+                                        // sensors' own errors stay (a new turn-on may give new biases)
 };
 
 struct Holdout {
-  HeldOutState before, after;          // without and with the effects, the same noise model in both
-  double gain = 0.0;                   // in log likelihood
-  std::vector<std::string> not_carried;   // findings that belong to one recording only: motion of the base, noise
+  HeldOutState before, after;            // without and with the effects, the same noise model in both
+  double gain = 0.0;                     // in log likelihood
+  std::vector<std::string> not_carried;  // findings that belong to one recording only: motion of the base, noise
 };
 
 struct HoldoutOutcome {

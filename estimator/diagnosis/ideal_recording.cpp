@@ -44,7 +44,7 @@ IdealRecording::IdealRecording(const Schedule& schedule, const Attitude& vehicle
     return C_nv * gimbal_matrix(p.outer_deg * units::degree, p.inner_deg * units::degree);
   };
   const double dt = 1.0 / rate_hz;
-  const Matrix3 turn_of_n = matrix_from_rotation_vector(omega_ie_n * dt);   // C from n at the end to n at the start
+  const Matrix3 turn_of_n = matrix_from_rotation_vector(omega_ie_n * dt);  // C from n at the end to n at the start
   Matrix3 C_nb = attitude(0.0);
   C_nb_start_ = C_nb;
   const auto count = static_cast<std::size_t>(schedule.duration_s() * rate_hz);

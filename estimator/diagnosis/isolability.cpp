@@ -48,8 +48,9 @@ std::vector<Trial> trials(const Schedule& done, const Attitude& vehicle) {
   Schedule slow = done;
   slow.rotation_s *= 3.0;
   all.push_back({{"slow_turns", "the same with turns at a third of the rate", slow, 0.0, {}}, vehicle});
-  all.push_back({{"dwells_45", "dwells half as long, and one half way through each turn", with_dwells_between(done), 0.0,
-                  {}}, vehicle});
+  all.push_back(
+      {{"dwells_45", "dwells half as long, and one half way through each turn", with_dwells_between(done), 0.0, {}},
+       vehicle});
   constexpr double tilt = 5.0 * units::degree;
   all.push_back({{"tilted_base", "the host tilted by 5 deg in roll and pitch", done, 0.0, {}},
                  {vehicle.roll + tilt, vehicle.pitch + tilt, vehicle.heading}});
@@ -60,7 +61,7 @@ std::vector<Trial> trials(const Schedule& done, const Attitude& vehicle) {
 
 // The effect as found and every variant of its rivals.
 struct Contest {
-  std::vector<Candidate> candidates;   // the effect first
+  std::vector<Candidate> candidates;  // the effect first
   Eigen::VectorXd size;
 };
 
@@ -69,8 +70,8 @@ Contest contest_of(const ModelEffect& model, const Finding& finding, bool has_te
   c.candidates.push_back({model.effect, model.constant, 0, 0});
   c.size = model.size;
   for (const Effect& effect : catalogue()) {
-    const bool rival = std::find(finding.equivalent.begin(), finding.equivalent.end(), effect.id) !=
-                       finding.equivalent.end();
+    const bool rival =
+        std::find(finding.equivalent.begin(), finding.equivalent.end(), effect.id) != finding.equivalent.end();
     if (rival && (has_temperature || !effect.needs_temperature)) {
       for (const double constant : effect.constants) {
         c.candidates.push_back({&effect, constant, 0, 0});
@@ -82,7 +83,7 @@ Contest contest_of(const ModelEffect& model, const Finding& finding, bool has_te
 
 struct Separation {
   double square = 0.0;
-  double share = 0.0;      // of the effect's own square
+  double share = 0.0;  // of the effect's own square
   std::string closest;
 };
 
@@ -95,7 +96,7 @@ std::vector<Separation> separations(const Eigen::MatrixXd& G, const std::vector<
   for (std::size_t k = 1; k < columns.size(); ++k) {
     const Candidate& c = columns[k];
     Eigen::MatrixXd B = G.block(c.first, c.first, c.count, c.count);
-    B.diagonal().array() += 1e-6;   // sizes up to 1000 times the typical one
+    B.diagonal().array() += 1e-6;  // sizes up to 1000 times the typical one
     const Eigen::VectorXd x = G.block(c.first, 0, c.count, n) * size;
     const double left = std::max(0.0, own - x.dot(Eigen::LDLT<Eigen::MatrixXd>(B).solve(x)));
     const Separation s{left, own > 0.0 ? left / own : 0.0, c.effect->id};
@@ -109,7 +110,8 @@ std::vector<Separation> separations(const Eigen::MatrixXd& G, const std::vector<
   return all;
 }
 
-Eigen::MatrixXd information(const RecordingContext& context, const PassInput& input, std::vector<Candidate>& candidates) {
+Eigen::MatrixXd information(const RecordingContext& context, const PassInput& input,
+                            std::vector<Candidate>& candidates) {
   SignaturePass pass(context, candidates, false);
   const SignatureRows rows = pass.run(input);
   candidates = pass.candidates();
@@ -141,8 +143,8 @@ Split plan_split(const Diagnosis& d, const ModelEffect& model, const Finding& fi
     PassInput input = forward_pass(ideal.data(), d.calibration);
     input.parameters.setZero();
     input.C_nb = ideal.C_nb_start();
-    results.push_back(separations(now + information(planned, input, contest.candidates), contest.candidates,
-                                  contest.size));
+    results.push_back(
+        separations(now + information(planned, input, contest.candidates), contest.candidates, contest.size));
   }
   Split split;
   split.effect = finding.effect;

@@ -14,18 +14,18 @@
 namespace selfcal::diagnosis {
 
 struct Experiment {
-  std::string id;                  // longer, slow_turns, dwells_45, tilted_base, second_heading
+  std::string id;  // longer, slow_turns, dwells_45, tilted_base, second_heading
   std::string words;
   Schedule schedule;
-  double separation = 0.0;         // sigma, from the closest rival, with the present recording and this one
-  std::string closest;             // that rival
+  double separation = 0.0;  // sigma, from the closest rival, with the present recording and this one
+  std::string closest;      // that rival
 };
 
 struct Split {
   std::string effect;
   std::vector<std::string> rivals;
   double separation_now = 0.0;
-  std::vector<Experiment> experiments;   // best first
+  std::vector<Experiment> experiments;  // best first
   // Rivals that hold the effect as a special case: nothing splits them, the fewer parameters are preferred.
   std::vector<std::string> contain;
 };

@@ -21,7 +21,8 @@ std::string describe(const Located& l) {
   if (l.where == "after_turn") {
     std::snprintf(text, sizeof text, "%s, %.0f to %.0f s after each turn", sensor.c_str(), seconds_from, seconds_to);
   } else if (l.where == "time") {
-    std::snprintf(text, sizeof text, "%s, minutes %.0f to %.0f", sensor.c_str(), seconds_from / 60.0, seconds_to / 60.0);
+    std::snprintf(text, sizeof text, "%s, minutes %.0f to %.0f", sensor.c_str(), seconds_from / 60.0,
+                  seconds_to / 60.0);
   } else {
     std::snprintf(text, sizeof text, "%s, %s %d (%.0f to %.0f s)", sensor.c_str(), l.where.c_str(), l.position,
                   seconds_from, seconds_to);
@@ -41,7 +42,7 @@ SingleTest::SingleTest(const Evidence& e, const std::vector<int>& fitted) : evid
 }
 
 std::optional<SingleTest::Result> SingleTest::operator()(int column) const {
-  constexpr double least = 1e-6;       // information: a bias there would not be seen
+  constexpr double least = 1e-6;  // information: a bias there would not be seen
   double g = evidence_.information(column, column);
   double b = evidence_.score(column);
   const double alone = g;
@@ -84,8 +85,14 @@ Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_m
     l.significance = significance;
     l.size = bias->size * (m.axis < 3 ? map_unit(0) / units::degree_per_hour : map_unit(3) / units::micro_g);
     switch (m.kind) {
-      case LocatedColumn::Kind::dwell: l.where = "dwell"; l.position = m.index + 1; break;
-      case LocatedColumn::Kind::rotation: l.where = "rotation"; l.position = m.index + 1; break;
+      case LocatedColumn::Kind::dwell:
+        l.where = "dwell";
+        l.position = m.index + 1;
+        break;
+      case LocatedColumn::Kind::rotation:
+        l.where = "rotation";
+        l.position = m.index + 1;
+        break;
       case LocatedColumn::Kind::after_turn: l.where = "after_turn"; break;
       case LocatedColumn::Kind::time: l.where = "time"; break;
     }
@@ -137,7 +144,7 @@ std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double i
         }
       }
       const double ratio = power[static_cast<std::size_t>(k)] / std::max(around / count, 0.05 * variance);
-      if (ratio > best && k > 5) {   // slower than five periods is drift
+      if (ratio > best && k > 5) {  // slower than five periods is drift
         best = ratio;
         at = k;
       }
@@ -164,7 +171,7 @@ double log_p_white(const Eigen::VectorXd& residual) {
       }
       const auto n = static_cast<double>(epochs);
       const double r = product / square;
-      sum += n * (n + 2.0) * r * r / (n - lag);   // Ljung and Box
+      sum += n * (n + 2.0) * r * r / (n - lag);  // Ljung and Box
     }
   }
   return log_chi_squared_tail(sum, 3.0 * lags);

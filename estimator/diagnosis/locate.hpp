@@ -14,11 +14,11 @@ namespace selfcal::diagnosis {
 struct Located {
   // dwell, rotation, after_turn, time, frequency; outer_angle, inner_angle, gravity, earth_rate, temperature
   std::string where;
-  int position = -1;           // number from 1 of the dwell or rotation; -1: none
-  std::string axis;            // gyro_x ... accel_z, or north, up, east
-  double start_s = 0.0, end_s = 0.0;   // since the start; after_turn: since the turn
-  double significance = 0.0;   // sigma, single test
-  double size = 0.0;           // bias: deg/h or ug; frequency: amplitude, um
+  int position = -1;                  // number from 1 of the dwell or rotation; -1: none
+  std::string axis;                   // gyro_x ... accel_z, or north, up, east
+  double start_s = 0.0, end_s = 0.0;  // since the start; after_turn: since the turn
+  double significance = 0.0;          // sigma, single test
+  double size = 0.0;                  // bias: deg/h or ug; frequency: amplitude, um
   double frequency_hz = 0.0;
   std::string words;
 };
@@ -30,10 +30,10 @@ class SingleTest {
  public:
   SingleTest(const Evidence& evidence, const std::vector<int>& fitted);
   struct Result {
-    double z = 0.0;            // size over its sigma
-    double size = 0.0;         // in the column's units
+    double z = 0.0;     // size over its sigma
+    double size = 0.0;  // in the column's units
   };
-  std::optional<Result> operator()(int column) const;   // none where it would not be seen
+  std::optional<Result> operator()(int column) const;  // none where it would not be seen
 
  private:
   const Evidence& evidence_;
@@ -43,9 +43,9 @@ class SingleTest {
 };
 
 struct Map {
-  std::vector<Located> places;     // largest first, those above 3 sigma (at most 12)
+  std::vector<Located> places;  // largest first, those above 3 sigma (at most 12)
   double largest_sigma = 0.0;
-  double largest_named_sigma = 0.0;   // of places where what is fitted makes at least as much as is left
+  double largest_named_sigma = 0.0;  // of places where what is fitted makes at least as much as is left
   int tests = 0;
 };
 
@@ -61,7 +61,7 @@ double square_within(const Evidence& evidence, const std::vector<int>& place, co
 struct InnovationLine {
   int axis = 0;
   double frequency_hz = 0.0;
-  double log_p = 0.0;          // corrected for the frequencies looked at
+  double log_p = 0.0;  // corrected for the frequencies looked at
 };
 std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double interval_s);
 

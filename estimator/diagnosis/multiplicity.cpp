@@ -35,8 +35,8 @@ class Normals {
 // One candidate as quadratic forms of its score.
 struct Form {
   Eigen::Index first = 0, count = 0;
-  Eigen::MatrixXd root;         // gain = |root * score|^2
-  Eigen::VectorXd variance;     // of the scores; 0: not seen
+  Eigen::MatrixXd root;      // gain = |root * score|^2
+  Eigen::VectorXd variance;  // of the scores; 0: not seen
 };
 
 Form form_of(const Evidence& e, const Candidate& c) {

@@ -16,7 +16,7 @@ constexpr std::size_t most_effects = 6;
 constexpr int walk_axes = 6;
 constexpr int most_relinearisations = 4;
 constexpr double converged_sigma = 0.1;
-constexpr int steps = 3;   // of a constant to either side
+constexpr int steps = 3;  // of a constant to either side
 // Effects whose odds against the best are better than 1:100 stay in its class.
 const double class_log_odds = std::log(100.0);
 const double line_log_p = std::log(1e-4);
@@ -35,8 +35,8 @@ std::vector<Candidate> candidates_for(const RecordingContext& context, const std
     if (effect.id == "base_sway") {
       std::vector<double> known;
       for (const InnovationLine& line : lines) {
-        const bool near = std::any_of(known.begin(), known.end(),
-                                      [&](double f) { return std::abs(f - line.frequency_hz) < 1e-3; });
+        const bool near =
+            std::any_of(known.begin(), known.end(), [&](double f) { return std::abs(f - line.frequency_hz) < 1e-3; });
         if (line.log_p < line_log_p && !near) {
           known.push_back(line.frequency_hz);
           all.push_back({&effect, line.frequency_hz, 0, 0});
@@ -76,8 +76,8 @@ Naming::Naming(const RecordingContext& context, PassInput input, double log_thre
         prospect.expected_z = std::max(prospect.expected_z, test.expected_z);
       }
     }
-    const auto same = std::find_if(prospects_.begin(), prospects_.end(),
-                                   [&](const Suspect& s) { return s.effect == effect.id; });
+    const auto same =
+        std::find_if(prospects_.begin(), prospects_.end(), [&](const Suspect& s) { return s.effect == effect.id; });
     if (same == prospects_.end()) {
       prospects_.push_back(prospect);
     } else {
@@ -191,7 +191,7 @@ std::vector<double> Naming::gains_around(const Chosen& chosen, double step) {
       grid.push_back(c.candidate);
     }
   }
-  const std::size_t applied = grid.size();   // what the recording's correction took out comes back first
+  const std::size_t applied = grid.size();  // what the recording's correction took out comes back first
   grid.insert(grid.end(), correction_.effects.begin(), correction_.effects.end());
   SignaturePass pass(context_, grid, false);
   const SignatureRows rows = pass.run(input_);
@@ -251,14 +251,14 @@ void Naming::refine_constant(Chosen& chosen) {
 
 bool Naming::add_best() {
   const std::vector<int> others = chosen_columns();
-  double best = 0.0, detected = 0.0;   // name by the one, presence by the other
+  double best = 0.0, detected = 0.0;  // name by the one, presence by the other
   const Candidate* winner = nullptr;
   for (const Candidate& c : pass_.candidates()) {
     const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
       return x.candidate.effect->id == c.effect->id && c.effect->id != "base_sway";
     });
-    const bool same = std::any_of(chosen_.begin(), chosen_.end(),
-                                  [&](const Chosen& x) { return x.candidate.first == c.first; });
+    const bool same =
+        std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.first == c.first; });
     if (taken || same || fell(c)) {
       continue;
     }
@@ -279,8 +279,8 @@ bool Naming::add_best() {
   }
   for (const WalkTest& test : tests) {
     const double log_p = log_chi_squared_tail(test.gain, 1.0);
-    const bool taken = std::any_of(walks_.begin(), walks_.end(),
-                                   [&](const WalkTest& w) { return w.axis == test.axis; });
+    const bool taken =
+        std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis == test.axis; });
     if (!taken) {
       detected = std::min(detected, corrected(log_p, test.axis < 3 ? "gyro_random_walk" : "accel_random_walk"));
     }
@@ -295,7 +295,7 @@ bool Naming::add_best() {
   // A walk can follow any slow curve. It is taken where it beats every equation by far; an equation whose constant is
   // still on its grid gets the benefit.
   constexpr double equation_share = 0.85;
-  constexpr double jump_share = 0.6;   // what jumps is no walk: an equation that comes near it is tried first
+  constexpr double jump_share = 0.6;  // what jumps is no walk: an equation that comes near it is tried first
   if (walker != nullptr && winner != nullptr) {
     const bool real = walks_inside_dwells(context_.data(), input_.noise, *walker);
     walker = best_equation < (real ? equation_share : jump_share) * best ? nullptr : walker;
@@ -308,7 +308,7 @@ bool Naming::add_best() {
     chosen_.emplace_back();
     chosen_.back().candidate = *winner;
     refine_constant(chosen_.back());
-    for (std::size_t i = 0; i + 1 < chosen_.size(); ++i) {   // they were found while this one was left out
+    for (std::size_t i = 0; i + 1 < chosen_.size(); ++i) {  // they were found while this one was left out
       refine_constant(chosen_[i]);
     }
     rows_ = pass_.run(input_);
@@ -324,7 +324,7 @@ bool Naming::add_best() {
 // What fell once is not taken again: what was seen may be another's, and it would fall and be taken for ever.
 bool Naming::fell(const Candidate& candidate) const {
   return std::any_of(fallen_.begin(), fallen_.end(), [&](const Candidate& f) {
-    const bool line = f.effect->constants.empty();   // of a sway, one of several
+    const bool line = f.effect->constants.empty();  // of a sway, one of several
     return f.effect == candidate.effect && (!line || f.first == candidate.first);
   });
 }
@@ -351,7 +351,7 @@ bool Naming::exchange() {
     const Candidate* winner = nullptr;
     for (const Candidate& c : pass_.candidates()) {
       const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
-        return x.candidate.effect->id == c.effect->id;   // its own constant is refined already
+        return x.candidate.effect->id == c.effect->id;  // its own constant is refined already
       });
       if (taken || c.first == own.first) {
         continue;
@@ -393,10 +393,10 @@ void Naming::judge() {
     c.equivalent.clear();
     for (const Candidate& rival : pass_.candidates()) {
       const std::string& id = rival.effect->id;
-      const bool listed = id == c.candidate.effect->id ||
-                          std::find(c.equivalent.begin(), c.equivalent.end(), id) != c.equivalent.end();
-      const bool chosen = std::any_of(chosen_.begin(), chosen_.end(),
-                                      [&](const Chosen& x) { return x.candidate.effect->id == id; });
+      const bool listed =
+          id == c.candidate.effect->id || std::find(c.equivalent.begin(), c.equivalent.end(), id) != c.equivalent.end();
+      const bool chosen =
+          std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.effect->id == id; });
       if (listed || chosen) {
         continue;
       }
@@ -407,8 +407,7 @@ void Naming::judge() {
       }
     }
   }
-  std::stable_sort(chosen_.begin(), chosen_.end(),
-                   [](const Chosen& a, const Chosen& b) { return a.log_p < b.log_p; });
+  std::stable_sort(chosen_.begin(), chosen_.end(), [](const Chosen& a, const Chosen& b) { return a.log_p < b.log_p; });
 }
 
 void Naming::run(const std::function<void(const std::string&)>& progress, const std::stop_token& stop) {
@@ -445,9 +444,8 @@ std::vector<Suspect> Naming::suspects() const {
   std::vector<Suspect> all;
   const std::vector<int> others = chosen_columns();
   for (const Candidate& c : pass_.candidates()) {
-    const bool chosen = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
-      return x.candidate.effect->id == c.effect->id;
-    });
+    const bool chosen = std::any_of(chosen_.begin(), chosen_.end(),
+                                    [&](const Chosen& x) { return x.candidate.effect->id == c.effect->id; });
     if (chosen) {
       continue;
     }

@@ -14,18 +14,19 @@
 namespace selfcal::diagnosis {
 
 struct Chosen {
-  Candidate candidate;                 // columns as in the naming's candidates
-  double constant_sigma = 0.0;         // of the candidate's constant, from the curvature of the likelihood
-  int derivative = -1;                 // first column of its derivative by the constant's logarithm, once averaged
-  std::vector<Candidate> constants;    // the same effect with constants about its own, columns of their own, once averaged
-  Eigen::VectorXd size;                // fitted, in typical sizes
+  Candidate candidate;          // columns as in the naming's candidates
+  double constant_sigma = 0.0;  // of the candidate's constant, from the curvature of the likelihood
+  int derivative = -1;          // first column of its derivative by the constant's logarithm, once averaged
+  std::vector<Candidate>
+      constants;         // the same effect with constants about its own, columns of their own, once averaged
+  Eigen::VectorXd size;  // fitted, in typical sizes
   Eigen::MatrixXd covariance;
-  double log_p = 0.0;                  // given the others, corrected for variants and effects
+  double log_p = 0.0;  // given the others, corrected for variants and effects
   double gain = 0.0;
   int rank = 0;
   double held_out = 0.0;
   std::vector<std::string> equivalent;
-  std::map<std::string, double> probability;   // of every effect in this one's place, all equally likely before
+  std::map<std::string, double> probability;  // of every effect in this one's place, all equally likely before
 };
 
 struct Suspect {
@@ -113,23 +114,23 @@ class Naming {
   ImuData corrected_view_;
   AngleVelocity theta_, velocity_;
   double log_threshold_;
-  double effective_tests_ = 1.0;       // of the catalogue on this recording
+  double effective_tests_ = 1.0;  // of the catalogue on this recording
   SignaturePass pass_;
   SignatureRows rows_;
-  Evidence evidence_;                  // with what the correction took out added back, walks integrated out
+  Evidence evidence_;  // with what the correction took out added back, walks integrated out
   std::vector<Chosen> chosen_;
-  std::vector<Candidate> fallen_;      // chosen once, too weak beside others
+  std::vector<Candidate> fallen_;  // chosen once, too weak beside others
   std::vector<WalkTest> walks_;
   std::vector<Suspect> prospects_;
   Map map_before_;
   std::vector<InnovationLine> lines_before_;
   double square_before_ = 0.0, white_before_ = 0.0;
-  Eigen::VectorXd applied_;            // sizes of chosen_ that the correction holds
+  Eigen::VectorXd applied_;  // sizes of chosen_ that the correction holds
   std::vector<int> applied_columns_;
-  ParameterVector averaged_ = ParameterVector::Zero();   // what the effects shift the 24 by, mean of all explanations
-  ParameterMatrix spread_ = ParameterMatrix::Zero();     // its covariance
+  ParameterVector averaged_ = ParameterVector::Zero();  // what the effects shift the 24 by, mean of all explanations
+  ParameterMatrix spread_ = ParameterMatrix::Zero();    // its covariance
   double log_p_likeness_ = 0.0;
-  Correction correction_;              // the same with the constants it was made with
+  Correction correction_;  // the same with the constants it was made with
 };
 
 }  // namespace selfcal::diagnosis

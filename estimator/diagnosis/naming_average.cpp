@@ -17,16 +17,16 @@ namespace {
 // Typical sizes that coefficients may have: unknown, so each is tried. What is seen at a hundredth of its typical size (a
 // lever arm, a time offset) is also found at that.
 constexpr std::array<double, 10> scales = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0};
-constexpr std::size_t first_scale = 7;     // to begin with
-constexpr double constant_prior = 2.0;     // sigma of a constant's logarithm: the width of the grids
-constexpr double negligible = 25.0;        // log odds below which an explanation is left out
+constexpr std::size_t first_scale = 7;  // to begin with
+constexpr double constant_prior = 2.0;  // sigma of a constant's logarithm: the width of the grids
+constexpr double negligible = 25.0;     // log odds below which an explanation is left out
 // Constants beside a chosen effect's own: so many sigmas of the logarithm apart, further out by a share of the distance.
 constexpr double constants_apart = 0.5, constants_spread = 0.25;
-constexpr double furthest_apart = 0.5;     // of the logarithm
+constexpr double furthest_apart = 0.5;  // of the logarithm
 
 // A share of the design: columns of the rows, combined by T, sizes ~ N(0, sigma^2).
 struct Part {
-  int only = -1;                     // the coefficient, -1: all
+  int only = -1;  // the coefficient, -1: all
   double constant = NAN;
   std::vector<int> columns;
   Eigen::MatrixXd T;
@@ -36,9 +36,9 @@ struct Part {
 
 struct Explanation {
   double log_p = 0.0;
-  Eigen::VectorXd mean;              // sizes of the part in question, which comes first
+  Eigen::VectorXd mean;  // sizes of the part in question, which comes first
   Eigen::MatrixXd covariance;
-  ParameterVector shift;             // of the 24, by all parts
+  ParameterVector shift;  // of the 24, by all parts
   ParameterMatrix shift_covariance;
 };
 
@@ -129,7 +129,7 @@ class Averaging {
     for (std::size_t k = 0; k < constants.size(); ++k) {
       const double below = constants[k > 0 ? k - 1 : k].constant;
       const double above = constants[std::min(k + 1, constants.size() - 1)].constant;
-      const double share = 0.5 * std::log(above / below) / range;   // every logarithm is equally likely
+      const double share = 0.5 * std::log(above / below) / range;  // every logarithm is equally likely
       const std::vector<Part> some = parts(constants[k], -1, {}, std::log(share));
       all.insert(all.end(), some.begin(), some.end());
     }
@@ -139,7 +139,8 @@ class Averaging {
   // Effect by effect the most probable part, the others at theirs.
   void settle() {
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
-      current_.push_back(part(chosen_[i].candidate, -1, scales[first_scale - 1], chosen_[i].derivative, chosen_[i].size));
+      current_.push_back(
+          part(chosen_[i].candidate, -1, scales[first_scale - 1], chosen_[i].derivative, chosen_[i].size));
     }
     for (int sweep = 0; sweep < (chosen_.size() > 1 ? 2 : 1); ++sweep) {
       for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -189,7 +190,8 @@ class Averaging {
     const Eigen::VectorXd along = solver.eigenvectors().transpose() * b;
     const Eigen::VectorXd mean = axes * along.cwiseQuotient(precision);
     Explanation e;
-    e.log_p = p.log_prior + 0.5 * along.cwiseAbs2().cwiseQuotient(precision).sum() - 0.5 * precision.array().log().sum();
+    e.log_p =
+        p.log_prior + 0.5 * along.cwiseAbs2().cwiseQuotient(precision).sum() - 0.5 * precision.array().log().sum();
     if (full) {
       const Eigen::MatrixXd covariance = axes * precision.cwiseInverse().asDiagonal() * axes.transpose();
       const Eigen::MatrixXd S = rows_.shift(Eigen::all, columns) * T;
@@ -235,7 +237,7 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
 
 // What the explanations in the place of one chosen effect say together.
 struct PlaceAverage {
-  Mixture<ParameterVector, ParameterMatrix> shift;   // of the 24, by all effects
+  Mixture<ParameterVector, ParameterMatrix> shift;  // of the 24, by all effects
   std::vector<Share> constants;
   std::map<std::string, double> probability;
 };
@@ -263,10 +265,10 @@ PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std:
     if (t.candidate != &own.candidate || std::isnan(t.part.constant)) {
       continue;
     }
-    if (own.constants.empty()) {   // the last size is the logarithm's
+    if (own.constants.empty()) {  // the last size is the logarithm's
       const Eigen::Index last = e.mean.size() - 1;
-      place.constants.push_back({weight, t.part.constant * (1.0 + e.mean(last)),
-                                 t.part.constant * std::sqrt(e.covariance(last, last))});
+      place.constants.push_back(
+          {weight, t.part.constant * (1.0 + e.mean(last)), t.part.constant * std::sqrt(e.covariance(last, last))});
     } else {
       place.constants.push_back({weight, t.part.constant, 0.0});
     }
@@ -280,12 +282,11 @@ PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std:
 // Size and sigma of the coefficients, all of them unknown: that only one is concerned may well be the better guess, but
 // an interval must not rest on it. Size and constant as told belong together; sigma says what else they may be.
 void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, Chosen& chosen) {
-  std::erase_if(tried, [&](const Tried& t) {
-    return t.candidate != &averaging.chosen(i).candidate || t.part.only >= 0;
-  });
+  std::erase_if(tried,
+                [&](const Tried& t) { return t.candidate != &averaging.chosen(i).candidate || t.part.only >= 0; });
   const double top = top_of(tried);
   const Eigen::Index count = chosen.candidate.count;
-  Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;   // with any constant, with the one told
+  Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;  // with any constant, with the one told
   std::vector<std::vector<Share>> each(static_cast<std::size_t>(count));
   for (const Tried& t : tried) {
     if (t.log_p < top - negligible) {
@@ -361,7 +362,7 @@ static std::vector<double> constants_about(const Chosen& chosen) {
 void Naming::append_constants() {
   struct Appended {
     Chosen* chosen;
-    double width;                      // of the difference that makes the derivative
+    double width;  // of the difference that makes the derivative
     std::vector<double> constants;
   };
   std::vector<Candidate> more;
@@ -434,7 +435,7 @@ void Naming::average() {
     }
     averaged_ += place.shift.mean() - best.shift;
     spread_ += place.shift.covariance() - best.shift_covariance;
-    for (int k = 0; k < sensor_parameter_count; ++k) {   // averaging one effect never adds certainty about the others
+    for (int k = 0; k < sensor_parameter_count; ++k) {  // averaging one effect never adds certainty about the others
       spread_(k, k) = std::max(spread_(k, k), best.shift_covariance(k, k));
     }
   }

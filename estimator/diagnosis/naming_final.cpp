@@ -51,7 +51,7 @@ const Effect& gimbal_functions() {
 // The calibration took part of what was left out for motion of the base. With the effects fitted its white noise is
 // the one of the greatest likelihood, down to a micrometre, by factors of 3.
 void Naming::sharpen_observation() {
-  constexpr double factor = 1.0 / 3.0, least = 0.9e-6;   // m
+  constexpr double factor = 1.0 / 3.0, least = 0.9e-6;  // m
   if ((chosen_.empty() && walks_.empty()) || input_.noise.observation.state_count() > 0) {
     return;
   }
@@ -104,7 +104,7 @@ double Naming::log_likelihood_as_named(const PassInput& input) const {
 }
 
 bool Naming::entangled() const {
-  constexpr double half_of_it = 0.5, counts = 3.0;   // share of a signature; sigmas from which a coefficient counts
+  constexpr double half_of_it = 0.5, counts = 3.0;  // share of a signature; sigmas from which a coefficient counts
   std::vector<std::vector<int>> groups;
   for (const Chosen& c : chosen_) {
     groups.push_back(columns_of(c.candidate));
@@ -125,7 +125,7 @@ bool Naming::entangled() const {
     const double least = std::min(counts, z.maxCoeff());
     for (std::size_t j = 0; j < groups.size(); ++j) {
       if (j == i || (j < chosen_.size() && chosen_[j].candidate.effect == chosen_[i].candidate.effect)) {
-        continue;   // lines of a sway are several of one kind
+        continue;  // lines of a sway are several of one kind
       }
       const Eigen::MatrixXd other = rows_.columns(Eigen::all, groups[j]);
       const Eigen::MatrixXd G = other.transpose() * other;
@@ -144,8 +144,8 @@ bool Naming::entangled() const {
 // Of columns on the axes of a chosen effect, one by one, given all that is chosen and its constants: the smallest p,
 // corrected for `tests_per_axis` independent ones.
 double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside) {
-  constexpr double counts = 3.0;            // sigmas from which a coefficient counts
-  constexpr double tests_per_axis = 3.0;    // four functions of the gimbal angles; warm-ups are alike: two
+  constexpr double counts = 3.0;          // sigmas from which a coefficient counts
+  constexpr double tests_per_axis = 3.0;  // four functions of the gimbal angles; warm-ups are alike: two
   std::vector<int> others = chosen_columns();
   for (const Chosen& c : chosen_) {
     for (int k = 0; c.derivative >= 0 && k < c.candidate.count; ++k) {
@@ -155,7 +155,7 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   std::array<bool, 3> concerned{};
   const Eigen::VectorXd z = chosen.size.cwiseQuotient(chosen.covariance.diagonal().cwiseSqrt()).cwiseAbs();
   for (Eigen::Index k = 0; k < z.size(); ++k) {
-    const Eigen::Index axis = z.size() > 3 ? k / 3 : k;   // a matrix row by row
+    const Eigen::Index axis = z.size() > 3 ? k / 3 : k;  // a matrix row by row
     concerned[static_cast<std::size_t>(axis)] |= z(k) >= std::min(counts, z.maxCoeff());
   }
   Eigen::Index all = 0;
@@ -164,7 +164,7 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   }
   const int first = append_columns(beside, Eigen::MatrixXd::Identity(all, all));
   double smallest = 0.0;
-  for (int column = 0; column < static_cast<int>(all); ++column) {   // axis by axis in threes
+  for (int column = 0; column < static_cast<int>(all); ++column) {  // axis by axis in threes
     if (concerned[static_cast<std::size_t>(column % 3)]) {
       smallest = std::min(smallest, test_group(evidence_, {first + column}, others).log_p);
     }
@@ -211,7 +211,8 @@ Naming::Structure Naming::structure() const {
         }
       }
       const GroupTest left = test_group(evidence_, group, others);
-      const bool walks = std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis / 3 == axis / 3; });
+      const bool walks =
+          std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis / 3 == axis / 3; });
       const bool named = walks || (!others.empty() && square_within(evidence_, group, others, size) >= left.gain);
       double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
       smallest = std::min(smallest, left.log_p);
@@ -223,9 +224,7 @@ Naming::Structure Naming::structure() const {
   return found;
 }
 
-Map Naming::map_after() const {
-  return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns());
-}
+Map Naming::map_after() const { return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns()); }
 
 Naming::ByQuantity Naming::locate_by_quantities() const {
   std::vector<Candidate> all = quantity_bins(context_);
@@ -260,9 +259,7 @@ Naming::ByQuantity Naming::locate_by_quantities() const {
   return located;
 }
 
-double Naming::square_after() const {
-  return evidence_.square - evidence_.fit(chosen_columns()).gain;
-}
+double Naming::square_after() const { return evidence_.square - evidence_.fit(chosen_columns()).gain; }
 
 Eigen::VectorXd Naming::final_residual() const {
   Eigen::VectorXd residual = rows_.residual;
@@ -273,7 +270,7 @@ Eigen::VectorXd Naming::final_residual() const {
   if (!columns.empty()) {
     residual -= rows_.columns(Eigen::all, columns) * evidence_.fit(columns).value;
   }
-  for (const WalkTest& walk : walks_) {   // the walk's own estimate
+  for (const WalkTest& walk : walks_) {  // the walk's own estimate
     const Eigen::MatrixXd Z = rows_.columns(Eigen::all, walk.columns);
     const Eigen::MatrixXd J = Z.transpose() * Z;
     const auto n = J.rows();

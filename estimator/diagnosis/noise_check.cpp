@@ -13,7 +13,7 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double margin_s = 5.0;
-constexpr double lowest_hz = 0.25;           // slower: drifts of all kinds
+constexpr double lowest_hz = 0.25;  // slower: drifts of all kinds
 constexpr int most_pieces_per_dwell = 8;
 
 int pieces_of(const Segment& s, Eigen::Index length, double rate_hz) {
@@ -32,7 +32,8 @@ Eigen::Index piece_length(double rate_hz, const std::vector<Segment>& segments) 
                            [&](int sum, const Segment& s) { return sum + pieces_of(s, length, rate_hz); });
   };
   Eigen::Index length = 2048;
-  while (length > shortest && (static_cast<double>(length) > longest_s * rate_hz || total(length) < enough_noise_pieces)) {
+  while (length > shortest &&
+         (static_cast<double>(length) > longest_s * rate_hz || total(length) < enough_noise_pieces)) {
     length /= 2;
   }
   return length;
@@ -41,7 +42,7 @@ Eigen::Index piece_length(double rate_hz, const std::vector<Segment>& segments) 
 using Spectrum = Eigen::ArrayXd;
 
 struct DwellSpectra {
-  std::vector<Spectrum> dwells;              // mean of each
+  std::vector<Spectrum> dwells;  // mean of each
   std::vector<int> pieces;
 };
 

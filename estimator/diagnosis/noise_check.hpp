@@ -11,24 +11,24 @@
 namespace selfcal::diagnosis {
 
 struct AssumedNoise {
-  double gyro_arw = 0.0;        // rad/s/sqrt(Hz)
-  double accel_vrw = 0.0;       // m/s^2/sqrt(Hz)
-  double gyro_quantum = 0.0;    // rad
-  double accel_quantum = 0.0;   // m/s
+  double gyro_arw = 0.0;       // rad/s/sqrt(Hz)
+  double accel_vrw = 0.0;      // m/s^2/sqrt(Hz)
+  double gyro_quantum = 0.0;   // rad
+  double accel_quantum = 0.0;  // m/s
 };
 
 struct AxisNoise {
-  double white_asd = 0.0;       // as AssumedNoise
-  double white_sigma = 0.0;     // of the estimate
-  double increment_sigma = 0.0; // white noise of the integral: quantum/sqrt(12) where nothing else, rad or m/s
-  double increment_variance_sigma = 0.0;   // of the estimate of its square
+  double white_asd = 0.0;        // as AssumedNoise
+  double white_sigma = 0.0;      // of the estimate
+  double increment_sigma = 0.0;  // white noise of the integral: quantum/sqrt(12) where nothing else, rad or m/s
+  double increment_variance_sigma = 0.0;  // of the estimate of its square
 };
 
 struct VibrationLine {
-  int axis = 0;                 // 0..2 gyro, 3..5 accelerometer
+  int axis = 0;  // 0..2 gyro, 3..5 accelerometer
   double frequency_hz = 0.0;
-  double amplitude = 0.0;       // rad/s or m/s^2
-  double log_p = 0.0;           // corrected for frequencies and axes
+  double amplitude = 0.0;  // rad/s or m/s^2
+  double log_p = 0.0;      // corrected for frequencies and axes
 };
 
 constexpr int enough_noise_pieces = 20;
@@ -36,7 +36,7 @@ constexpr int enough_noise_pieces = 20;
 struct NoiseCheck {
   std::array<AxisNoise, 6> axes;
   std::vector<VibrationLine> lines;
-  int pieces = 0;               // of spectra averaged; below enough_noise_pieces nothing is judged
+  int pieces = 0;  // of spectra averaged; below enough_noise_pieces nothing is judged
 };
 
 // Periodograms of pieces of the dwells (Hann), shorter where the dwells are. White rate plus white angle are fitted where

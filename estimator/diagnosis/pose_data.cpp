@@ -15,7 +15,7 @@ Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
 // Scatter of windows of `window` samples: root of the sum of the axes' variances.
 std::vector<double> scatter(const std::vector<std::array<double, 3>>& series, std::size_t window) {
   std::vector<double> result;
-  const Vector3 offset = at(series, 0);   // raw counts are large beside their scatter
+  const Vector3 offset = at(series, 0);  // raw counts are large beside their scatter
   Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
   for (std::size_t i = 0; i < series.size(); ++i) {
     const Vector3 in = at(series, i) - offset;
@@ -64,7 +64,7 @@ Pose mean_of(const PoseInput& input, std::size_t first, std::size_t last) {
 std::vector<Pose> find_poses(const PoseInput& input) {
   std::vector<Pose> poses;
   const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
-  const auto window = static_cast<std::size_t>(std::lround(rate));   // 1 s
+  const auto window = static_cast<std::size_t>(std::lround(rate));  // 1 s
   if (window < 4 || input.time_s.size() < 20 * window) {
     return poses;
   }
@@ -78,7 +78,7 @@ std::vector<Pose> find_poses(const PoseInput& input) {
     if (quiet && !inside) {
       begin = k;
     } else if (!quiet && inside && k - begin >= window) {
-      poses.push_back(mean_of(input, begin + window / 2, k + window / 2));   // middles of the windows
+      poses.push_back(mean_of(input, begin + window / 2, k + window / 2));  // middles of the windows
     }
     inside = quiet;
   }

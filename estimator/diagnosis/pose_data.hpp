@@ -9,11 +9,11 @@
 namespace selfcal::diagnosis {
 
 struct Pose {
-  std::size_t first = 0, last = 0;   // samples
+  std::size_t first = 0, last = 0;  // samples
   double middle_s = 0.0;
-  Vector3 gyro, accel;               // means, raw
-  Vector3 gyro_white;                // sigma of the mean by white noise, raw
-  Vector3 u;                         // calibrated, g
+  Vector3 gyro, accel;  // means, raw
+  Vector3 gyro_white;   // sigma of the mean by white noise, raw
+  Vector3 u;            // calibrated, g
 };
 
 // Stretches of 1 s and more in which both triads scatter by less than three times what the quietest tenth does.
@@ -23,8 +23,8 @@ std::vector<Pose> find_poses(const PoseInput& input);
 struct AccelModel {
   Matrix3 T = Matrix3::Identity();
   Vector3 bias = Vector3::Zero();
-  Eigen::VectorXd residual;          // |u| - 1 of the poses
-  Eigen::MatrixXd jacobian;          // of the residual, [poses x 9]
+  Eigen::VectorXd residual;  // |u| - 1 of the poses
+  Eigen::MatrixXd jacobian;  // of the residual, [poses x 9]
   Vector3 direction(const Vector3& raw) const { return T * (raw - bias); }
 };
 AccelModel fit_accelerometers(const std::vector<Pose>& poses);
@@ -32,8 +32,8 @@ AccelModel fit_accelerometers(const std::vector<Pose>& poses);
 // Turns between poses: direction of gravity carried by the gyros, w = S (raw - bias - G u) times the unit.
 struct GyroModel {
   Matrix3 S = Matrix3::Identity();
-  Vector3 bias = Vector3::Zero();    // raw
-  Matrix3 G = Matrix3::Zero();       // raw per g
+  Vector3 bias = Vector3::Zero();  // raw
+  Matrix3 G = Matrix3::Zero();     // raw per g
 };
 // u at the beginning of pose k+1, carried there from pose k, less the accelerometers' u.
 Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to, const GyroModel& model);

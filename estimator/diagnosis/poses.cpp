@@ -60,7 +60,7 @@ Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& p
 struct Regression {
   double square = 0.0;
   Eigen::Index rank = 0;
-  double held_out_rms = 0.0;   // e / (1 - h)
+  double held_out_rms = 0.0;  // e / (1 - h)
   Eigen::VectorXd value, sigma;
 };
 
@@ -98,7 +98,7 @@ double log_p_of(const Regression& without, const Regression& with, Eigen::Index 
 
 bool acts_on(const Effect& effect, bool gyro) {
   return effect.sensor != nullptr && !effect.needs_temperature && effect.id.starts_with(gyro ? "gyro" : "accel") &&
-         effect.id != "gyro_magnetic_sensitivity";   // needs a heading
+         effect.id != "gyro_magnetic_sensitivity";  // needs a heading
 }
 
 class Gyros {
@@ -157,7 +157,8 @@ std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) con
   std::vector<PoseEffect> all;
   int tried = 0;
   for (const Effect& effect : catalogue()) {
-    const bool known = std::any_of(named.begin(), named.end(), [&](const PoseEffect& p) { return p.effect == effect.id; });
+    const bool known =
+        std::any_of(named.begin(), named.end(), [&](const PoseEffect& p) { return p.effect == effect.id; });
     if (known || !acts_on(effect, true)) {
       continue;
     }
@@ -260,7 +261,8 @@ GyroModel static_model(const std::vector<Pose>& poses, std::size_t without, bool
   return m;
 }
 
-void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, double& fitted, double& held_out) {
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, double& fitted,
+                 double& held_out) {
   GyroModel all = static_model(poses, none, linear);
   fit_turns(input, poses, none, all);
   double square = 0.0, held_out_square = 0.0;
@@ -278,8 +280,8 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool li
 
 // log of the incomplete beta function ratio I_x(a, b) by Lentz's continued fraction, for x below (a+1)/(a+b+2).
 double log_beta_ratio(double x, double a, double b) {
-  const double front = std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x) -
-                       std::log(a);
+  const double front =
+      std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x) - std::log(a);
   constexpr double tiny = 1e-300;
   double c = 1.0, d = 1.0 - (a + b) * x / (a + 1.0);
   d = 1.0 / (std::abs(d) < tiny ? tiny : d);
@@ -307,7 +309,7 @@ double log_f_tail(double f, double numerator, double denominator) {
   if (f <= 0.0) {
     return 0.0;
   }
-  const double x = denominator / (denominator + numerator * f);   // P(F > f) = I_x(denominator/2, numerator/2)
+  const double x = denominator / (denominator + numerator * f);  // P(F > f) = I_x(denominator/2, numerator/2)
   const double a = 0.5 * denominator, b = 0.5 * numerator;
   if (x < (a + 1.0) / (a + b + 2.0)) {
     return log_beta_ratio(x, a, b);
@@ -317,12 +319,13 @@ double log_f_tail(double f, double numerator, double denominator) {
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   PoseDiagnosis d;
-  if (input.time_s.size() < 100 || input.gyro.size() != input.time_s.size() || input.accel.size() != input.time_s.size()) {
+  if (input.time_s.size() < 100 || input.gyro.size() != input.time_s.size() ||
+      input.accel.size() != input.time_s.size()) {
     d.failure = "too few samples";
     return d;
   }
   std::vector<Pose> poses = find_poses(input);
-  constexpr std::size_t least = 16;   // nine unknowns of the accelerometers, and as many again to judge them by
+  constexpr std::size_t least = 16;  // nine unknowns of the accelerometers, and as many again to judge them by
   if (poses.size() < least) {
     d.failure = "fewer than 16 static poses: " + std::to_string(poses.size());
     return d;
@@ -352,10 +355,11 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect == "gyro_g_sensitivity"; });
   judge_turns(input, poses, linear, d.direction_after, d.direction_after_held_out);
-  d.invisible = {"isotropic part of gyro_g_sensitivity: it turns about gravity, which no direction of gravity shows, and in "
-                 "the poses it stands together with the Earth's rate about the vertical",
-                 "gyro_magnetic_sensitivity: without heading it cannot be told from the field's vertical part, so it is "
-                 "not excluded"};
+  d.invisible = {
+      "isotropic part of gyro_g_sensitivity: it turns about gravity, which no direction of gravity shows, and in "
+      "the poses it stands together with the Earth's rate about the vertical",
+      "gyro_magnetic_sensitivity: without heading it cannot be told from the field's vertical part, so it is "
+      "not excluded"};
   return d;
 }
 

@@ -14,10 +14,10 @@
 namespace selfcal::diagnosis {
 
 struct PoseInput {
-  std::vector<double> time_s;                       // increasing
-  std::vector<std::array<double, 3>> gyro, accel;   // raw, any unit
-  double gyro_unit = 1.0;                           // nominal rad/s per raw unit
-  double gravity = 9.80665;                         // m/s^2, or 1 for an answer in g
+  std::vector<double> time_s;                      // increasing
+  std::vector<std::array<double, 3>> gyro, accel;  // raw, any unit
+  double gyro_unit = 1.0;                          // nominal rad/s per raw unit
+  double gravity = 9.80665;                        // m/s^2, or 1 for an answer in g
 };
 
 struct PoseEffect {
@@ -34,17 +34,17 @@ struct PoseDiagnosis {
   // Accelerometers: bias, scale, misalignment fitted to |f| = g.
   double accel_rms_g = 0.0, accel_held_out_rms_g = 0.0;
   bool accel_adequate = false;
-  std::vector<PoseEffect> accel_tried;   // best first
+  std::vector<PoseEffect> accel_tried;  // best first
   // Gyros in the poses.
-  std::array<double, 3> gyro_held_out_rms{};    // bias alone, raw units
-  std::array<double, 3> gyro_white_rms{};       // what white noise would leave of a pose's mean
-  std::vector<PoseEffect> gyro_tried;    // each alone, best first
-  std::vector<PoseEffect> gyro_named;    // forward selection
+  std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
+  std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
+  std::vector<PoseEffect> gyro_tried;         // each alone, best first
+  std::vector<PoseEffect> gyro_named;         // forward selection
   // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted.
   double direction_before = 0.0, direction_after = 0.0;
-  double direction_before_held_out = 0.0, direction_after_held_out = 0.0;   // rotation and its poses left out
-  std::vector<std::string> invisible;    // in words
-  std::string failure;                   // empty: done
+  double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
+  std::vector<std::string> invisible;                                      // in words
+  std::string failure;                                                     // empty: done
 };
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double false_alarm_rate);

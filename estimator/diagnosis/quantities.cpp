@@ -63,9 +63,9 @@ Effect quantity(std::string_view id, void (*columns)(const EffectContext&, doubl
 }
 
 const std::array<Effect, 4>& attitudes() {
-  static const std::array<Effect, 4> all = {quantity("outer_angle", outer_columns), quantity("inner_angle", inner_columns),
-                                            quantity("gravity", gravity_columns),
-                                            quantity("earth_rate", earth_rate_columns)};
+  static const std::array<Effect, 4> all = {
+      quantity("outer_angle", outer_columns), quantity("inner_angle", inner_columns),
+      quantity("gravity", gravity_columns), quantity("earth_rate", earth_rate_columns)};
   return all;
 }
 
@@ -121,7 +121,8 @@ std::vector<Candidate> quantity_bins(const RecordingContext& context) {
     const auto [least, most] = std::minmax_element(data.temperature.begin(), data.temperature.end());
     const double low = *least - context.mean_temperature(), high = *most - context.mean_temperature();
     for (const TemperatureBins& t : temperatures()) {
-      const auto first = static_cast<int>(std::floor(low / t.width_c)), last = static_cast<int>(std::floor(high / t.width_c));
+      const auto first = static_cast<int>(std::floor(low / t.width_c)),
+                 last = static_cast<int>(std::floor(high / t.width_c));
       if (last - first < most_temperature_bins) {
         for (int k = first; k <= last; ++k) {
           bins.push_back({&t.effect, static_cast<double>(k), 0, 0});
@@ -149,7 +150,8 @@ std::vector<Located> locate_by_quantity(const Evidence& evidence, const std::vec
       l.significance = std::abs(bias->z);
       l.size = bias->size * bin.effect->parameters[axis].typical;
       l.words = words_of(bin, axis, mean_temperature_c);
-      const auto same = std::find_if(all.begin(), all.end(), [&](const Located& other) { return other.where == l.where; });
+      const auto same =
+          std::find_if(all.begin(), all.end(), [&](const Located& other) { return other.where == l.where; });
       if (same == all.end()) {
         all.push_back(l);
       } else if (same->significance < l.significance) {

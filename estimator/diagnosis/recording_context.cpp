@@ -12,7 +12,7 @@ namespace {
 constexpr double division_s = 0.02;
 constexpr double creeping_s = 15.0;
 constexpr std::size_t creeping_divisions = 10;
-constexpr double margin_s = 0.5;   // between a turn as found and as it was
+constexpr double margin_s = 0.5;  // between a turn as found and as it was
 
 // Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a
 // trapezoid, a smooth ramp), whichever fits better. NaN where there are less than three.
@@ -80,18 +80,18 @@ bool RecordingContext::divides(std::size_t sample) const {
     return false;
   }
   const double t = data_.time_s[std::min(sample, data_.size() - 1)];
-  const bool creeps = sample % (creeping_divisions * samples_per_division_) == 0 &&
-                      segment_at(t - creeping_s) != segment_at(t);
+  const bool creeps =
+      sample % (creeping_divisions * samples_per_division_) == 0 && segment_at(t - creeping_s) != segment_at(t);
   return creeps || turns_around(t);
 }
 
 // Segments are told apart by quarters of a second. A creep of 400 ug that is taken to begin 10 ms late leaves 40 um/s,
 // which the position shows within a second: the end is where the rate runs out, to a millisecond.
 double RecordingContext::end_of_turn(const Segment& rotation) const {
-  constexpr double least = 2e-3, most = 0.03;   // rad/s: a hundred quanta; within tenths of a second of the end
-  constexpr double later_s = 0.25;              // than the segment at most
+  constexpr double least = 2e-3, most = 0.03;  // rad/s: a hundred quanta; within tenths of a second of the end
+  constexpr double later_s = 0.25;             // than the segment at most
   const std::size_t n = samples_per_division_;
-  std::vector<double> time, rate;               // of stretches of n samples, from the last to the first
+  std::vector<double> time, rate;  // of stretches of n samples, from the last to the first
   std::size_t last = std::min(data_.size(), rotation.last + static_cast<std::size_t>(later_s * data_.sample_rate_hz));
   for (; last > rotation.first + n; last -= n) {
     const double w = mean_rate(last - n, last).norm();
@@ -108,7 +108,7 @@ double RecordingContext::end_of_turn(const Segment& rotation) const {
   }
   const double length = static_cast<double>(n) / data_.sample_rate_hz;
   const double end = rate_runs_out(time, rate, length);
-  return std::abs(end - rotation.end_s) < later_s + length ? end : rotation.end_s;   // a base that sways is never still
+  return std::abs(end - rotation.end_s) < later_s + length ? end : rotation.end_s;  // a base that sways is never still
 }
 
 // Mean over as much on either side of the boundary: exact while the rate rises evenly.

@@ -31,23 +31,23 @@ class RecordingContext {
 
   const ImuData& data() const { return data_; }
   const std::vector<Segment>& segments() const { return segments_; }
-  double mean_temperature() const { return mean_temperature_; }   // degC, where there is a channel
-  const ReferenceResidual& reference() const { return reference_; }   // may be empty
+  double mean_temperature() const { return mean_temperature_; }      // degC, where there is a channel
+  const ReferenceResidual& reference() const { return reference_; }  // may be empty
   bool has_temperature() const { return !data_.temperature.empty(); }
 
  private:
-  Vector3 rate_at(std::size_t sample) const;   // at the boundary before `sample`, zero in dwells
-  Vector3 mean_rate(std::size_t first, std::size_t last) const;   // of samples [first, last)
+  Vector3 rate_at(std::size_t sample) const;                     // at the boundary before `sample`, zero in dwells
+  Vector3 mean_rate(std::size_t first, std::size_t last) const;  // of samples [first, last)
   bool turns_around(double t) const;
   double end_of_turn(const Segment& rotation) const;
 
   const ImuData& data_;
   ReferenceResidual reference_;
   std::vector<Segment> segments_;
-  std::vector<double> turn_ends_s_;    // recording's time, ascending
-  std::size_t samples_per_division_;   // 20 ms
+  std::vector<double> turn_ends_s_;   // recording's time, ascending
+  std::size_t samples_per_division_;  // 20 ms
   double start_s_, mean_temperature_ = 0.0;
-  Vector3 field_n_;   // gauss
+  Vector3 field_n_;  // gauss
 };
 
 }  // namespace selfcal::diagnosis

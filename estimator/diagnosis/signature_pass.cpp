@@ -10,7 +10,7 @@
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr std::array<double, 6> after_turn_edges = {0.0, 5.0, 15.0, 30.0, 60.0, 120.0};   // s
+constexpr std::array<double, 6> after_turn_edges = {0.0, 5.0, 15.0, 30.0, 60.0, 120.0};  // s
 constexpr int time_bins = 8;
 
 class BlockSignatures : public ExtraSignatures {
@@ -47,7 +47,7 @@ class BlockSignatures : public ExtraSignatures {
                    Eigen::Ref<Eigen::Matrix3Xd> angle) const {
     const std::size_t segment = context_.segment_at(0.5 * (block.start_s + block.end_s));
     const bool rotation = context_.segments()[segment].rotation;
-    int number = 0;   // of dwells or rotations before this one
+    int number = 0;  // of dwells or rotations before this one
     for (std::size_t k = 0; k < segment; ++k) {
       number += context_.segments()[k].rotation == rotation ? 1 : 0;
     }
@@ -94,7 +94,7 @@ class RowWriter : public PassObserver {
     rows.columns.resize(3 * static_cast<Eigen::Index>(most), signatures.count());
     rows.residual.resize(rows.columns.rows());
     displace(0.0);
-    s_.topRows<3>() = -at_epoch_;   // where the pass begins the position was observed too
+    s_.topRows<3>() = -at_epoch_;  // where the pass begins the position was observed too
     Phi_ = Eigen::MatrixXd::Zero(dynamic_, dynamic_);
     Phi_.bottomRightCorner(dynamic_ - StateLayout::navigation_count, dynamic_ - StateLayout::navigation_count) =
         input.noise.observation.transition(input.interval_s);
@@ -104,7 +104,8 @@ class RowWriter : public PassObserver {
     navigator_.next(own_);
     Phi_.topLeftCorner<9, 9>() = own_.Phi;
     Eigen::MatrixXd next = Phi_ * s_.topRows(dynamic_);
-    next.topRows<9>().noalias() += own_.Gamma.leftCols<sensor_parameter_count>() * s_.bottomRows<sensor_parameter_count>();
+    next.topRows<9>().noalias() +=
+        own_.Gamma.leftCols<sensor_parameter_count>() * s_.bottomRows<sensor_parameter_count>();
     next.topRows<9>() += own_.Gamma.rightCols(s_.cols());
     s_.topRows(dynamic_) = next;
     displace(own_.end_s - start_s_);

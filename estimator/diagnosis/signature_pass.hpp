@@ -17,8 +17,8 @@ namespace selfcal::diagnosis {
 
 struct Candidate {
   const Effect* effect = nullptr;
-  double constant = 0.0;       // NaN: none
-  int first = 0, count = 0;    // columns
+  double constant = 0.0;     // NaN: none
+  int first = 0, count = 0;  // columns
 };
 
 std::vector<int> columns_of(const Candidate& candidate);
@@ -26,18 +26,18 @@ std::vector<int> columns_of(const Candidate& candidate);
 // Where a sensor's bias is off, for the map: the columns behind those of the candidates.
 struct LocatedColumn {
   enum class Kind { dwell, rotation, after_turn, time } kind = Kind::dwell;
-  int index = 0;               // dwell or rotation number from 0, bin number
-  int axis = 0;                // 0..2 gyro x y z, 3..5 accelerometer x y z
-  double start_s = 0.0, end_s = 0.0;   // since the turn, or since the start
+  int index = 0;                      // dwell or rotation number from 0, bin number
+  int axis = 0;                       // 0..2 gyro x y z, 3..5 accelerometer x y z
+  double start_s = 0.0, end_s = 0.0;  // since the turn, or since the start
 };
 
 // Rows: epoch by epoch, north, up, east. Columns in units of the typical size of the coefficient (map: 0.01 deg/h,
 // 10 ug).
 struct SignatureRows {
-  Eigen::VectorXd residual;        // [rows], unit variance where nothing is left out
-  Eigen::MatrixXd columns;         // [rows x columns]
-  std::vector<double> time_s;      // [rows], middle of the interval, recording's time
-  Eigen::MatrixXd shift;           // [24 x columns]: truth minus estimate of the 24 per unit column
+  Eigen::VectorXd residual;    // [rows], unit variance where nothing is left out
+  Eigen::MatrixXd columns;     // [rows x columns]
+  std::vector<double> time_s;  // [rows], middle of the interval, recording's time
+  Eigen::MatrixXd shift;       // [24 x columns]: truth minus estimate of the 24 per unit column
   PassOutput pass;
 };
 
@@ -46,7 +46,7 @@ using AngleVelocity = std::vector<std::array<double, 3>>;
 // Increments from which the effects were taken out, column by column times `size`.
 struct Correction {
   std::vector<Candidate> effects;
-  Eigen::VectorXd size;            // [sum of counts], in typical sizes
+  Eigen::VectorXd size;  // [sum of counts], in typical sizes
 };
 
 class SignaturePass {

@@ -15,7 +15,7 @@ double log_chi_squared_tail(double value, double degrees) {
     return 0.0;
   }
   const double front = -x + a * std::log(x) - std::lgamma(a);
-  if (x < a + 1.0) {   // 1 - P by the series
+  if (x < a + 1.0) {  // 1 - P by the series
     double term = 1.0 / a, sum = term;
     for (int n = 1; n < 1000 && term > 1e-14 * sum; ++n) {
       term *= x / (a + n);
@@ -23,7 +23,7 @@ double log_chi_squared_tail(double value, double degrees) {
     }
     return std::log1p(-std::min(std::exp(front) * sum, 1.0 - 1e-15));
   }
-  constexpr double tiny = 1e-300;   // Lentz's method
+  constexpr double tiny = 1e-300;  // Lentz's method
   double b = x + 1.0 - a, c = 1.0 / tiny, d = 1.0 / b, h = d;
   for (int n = 1; n < 1000; ++n) {
     const double an = -n * (n - a);
@@ -65,7 +65,7 @@ double least_eigenvalue(const Eigen::VectorXd& eigenvalues, double most) {
 Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
   const double floor = least_eigenvalue(eigen.eigenvalues(), most);
-  const Eigen::Index hidden = (eigen.eigenvalues().array() <= floor).count();   // they come first
+  const Eigen::Index hidden = (eigen.eigenvalues().array() <= floor).count();  // they come first
   const Eigen::Index seen = information.rows() - hidden;
   return eigen.eigenvalues().tail(seen).cwiseSqrt().cwiseInverse().asDiagonal() *
          eigen.eigenvectors().rightCols(seen).transpose();
@@ -95,7 +95,7 @@ double sigma_about(double centre, const std::vector<Share>& shares) {
   if (held(low) >= 0.95) {
     return rms;
   }
-  while (held(high) < 0.95) {   // at 4.5 rms at the latest (Chebyshev)
+  while (held(high) < 0.95) {  // at 4.5 rms at the latest (Chebyshev)
     high *= 1.5;
   }
   for (int step = 0; step < 50; ++step) {

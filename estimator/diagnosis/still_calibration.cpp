@@ -13,7 +13,8 @@ CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions op
                                       const std::stop_token& stop) {
   constexpr double far_below_one = 0.5;
   constexpr int rounds = 3;
-  for (int round = 0; round < rounds && outcome.result && outcome.result->consistency.nis_mean < far_below_one; ++round) {
+  for (int round = 0; round < rounds && outcome.result && outcome.result->consistency.nis_mean < far_below_one;
+       ++round) {
     const double scale = std::sqrt(outcome.result->consistency.nis_mean);
     options.noise.gyro_arw = scale * outcome.result->gyro_arw;
     options.noise.accel_vrw = scale * outcome.result->accel_vrw;
@@ -25,7 +26,7 @@ CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions op
 }  // namespace
 
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop) {
-  constexpr double largest_still_sigma = 3e-6;   // m: a calibration that asks for more does so because of an omission
+  constexpr double largest_still_sigma = 3e-6;  // m: a calibration that asks for more does so because of an omission
   CalibrationOutcome outcome = calibrate(data, options, {}, stop);
   if (outcome.result && !outcome.result->moored && !options.noise.position_sigma &&
       outcome.result->position_sigma > largest_still_sigma) {

@@ -7,9 +7,9 @@
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr double colours = 0.1;         // share of an interval's position variance from which it is modelled
-constexpr double least_log_gain = 10.0; // of the likelihood, for three densities more
-constexpr double correlation_s = 1e5;   // of the walk: far beyond any recording
+constexpr double colours = 0.1;          // share of an interval's position variance from which it is modelled
+constexpr double least_log_gain = 10.0;  // of the likelihood, for three densities more
+constexpr double correlation_s = 1e5;    // of the walk: far beyond any recording
 
 // Walk of `density` (m/sqrt(s)) as an oscillation that never turns: variance 2 sigma^2 T/decay per interval.
 MotionModel walk(double density) { return {{{0.0, correlation_s, density * std::sqrt(0.5 * correlation_s)}}}; }
@@ -37,7 +37,7 @@ void climb(NoiseDensities& best, double& top, const std::array<double, N>& steps
             top = found;
           }
           if (value != start) {
-            break;   // the top lies on this side
+            break;  // the top lies on this side
           }
         }
       }
@@ -57,7 +57,7 @@ PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& d) {
 
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
   constexpr int accelerometers = 3;
-  double variance = 0.0;   // of the integral's white noise, mean of the axes
+  double variance = 0.0;  // of the integral's white noise, mean of the axes
   for (std::size_t axis = accelerometers; axis < noise.axes.size(); ++axis) {
     variance += noise.axes[axis].increment_sigma * noise.axes[axis].increment_sigma / 3.0;
   }

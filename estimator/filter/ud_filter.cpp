@@ -17,7 +17,7 @@ UdFilter::UdFilter(const VectorX& mean, const VectorX& sigma, int constants)
 
 void UdFilter::set_constant_covariance(const MatrixX& covariance) {
   MatrixX P = covariance;
-  for (Eigen::Index j = P.cols() - 1; j >= 0; --j) {   // P = U D U^T, from the last column
+  for (Eigen::Index j = P.cols() - 1; j >= 0; --j) {  // P = U D U^T, from the last column
     const Eigen::Index at = dynamic_ + j;
     assert(P(j, j) > 0.0);
     D_(at) = P(j, j);
@@ -77,7 +77,7 @@ ScalarInnovation UdFilter::update(const VectorX& h_dynamic, double value, double
         u[i] = old + lambda * k[i];
         k[i] += v * old;
       }
-    } else {   // no noise yet: this column takes all of it
+    } else {  // no noise yet: this column takes all of it
       D_(j) = alpha > 0.0 ? 0.0 : D_(j);
       gain_.head(j) += v_(j) * U_.col(j).head(j);
     }

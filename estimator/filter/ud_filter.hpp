@@ -13,8 +13,8 @@ using VectorX = Eigen::VectorXd;
 using MatrixX = Eigen::MatrixXd;
 
 struct ScalarInnovation {
-  double value = 0.0;      // observed minus predicted
-  double variance = 0.0;   // predicted
+  double value = 0.0;     // observed minus predicted
+  double variance = 0.0;  // predicted
 };
 
 class UdFilter {
@@ -48,8 +48,8 @@ class UdFilter {
   MatrixX U_;
   VectorX D_;
   using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  RowMajorMatrix work_;          // [d x (d+k)] rows of the weighted Gram-Schmidt
-  VectorX weights_, weighted_;   // [d+k]
+  RowMajorMatrix work_;         // [d x (d+k)] rows of the weighted Gram-Schmidt
+  VectorX weights_, weighted_;  // [d+k]
   VectorX f_, v_, gain_;
 };
 

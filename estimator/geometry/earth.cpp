@@ -5,9 +5,9 @@
 namespace selfcal::earth {
 namespace {
 
-constexpr double gravity_equator = 9.7803253359;       // m/s^2, gamma_e
-constexpr double somigliana_k = 0.00193185265241;      // (b gamma_p)/(a gamma_e) - 1
-constexpr double gravity_ratio_m = 0.00344978650684;   // omega^2 a^2 b / GM
+constexpr double gravity_equator = 9.7803253359;      // m/s^2, gamma_e
+constexpr double somigliana_k = 0.00193185265241;     // (b gamma_p)/(a gamma_e) - 1
+constexpr double gravity_ratio_m = 0.00344978650684;  // omega^2 a^2 b / GM
 
 struct HeightExpansion {  // gamma(h) = gamma_0 (1 + first h + second h^2), TR8350.2 eq. (4-3)
   double surface;
@@ -52,8 +52,7 @@ Vector3 omega_ie_n(double latitude) {
 Vector3 omega_en_n(const Position& position, const Vector3& v_en_n) {
   const double north_radius = meridian_radius(position.latitude) + position.height;
   const double east_radius = prime_vertical_radius(position.latitude) + position.height;
-  return {v_en_n.z() / east_radius, v_en_n.z() * std::tan(position.latitude) / east_radius,
-          -v_en_n.x() / north_radius};
+  return {v_en_n.z() / east_radius, v_en_n.z() * std::tan(position.latitude) / east_radius, -v_en_n.x() / north_radius};
 }
 
 }  // namespace selfcal::earth

@@ -6,9 +6,9 @@
 
 namespace selfcal::earth {
 
-inline constexpr double semi_major_axis = 6378137.0;            // m
+inline constexpr double semi_major_axis = 6378137.0;  // m
 inline constexpr double flattening = 1.0 / 298.257223563;
-inline constexpr double rotation_rate = 7.292115e-5;            // rad/s
+inline constexpr double rotation_rate = 7.292115e-5;  // rad/s
 inline constexpr double eccentricity_squared = flattening * (2.0 - flattening);
 
 // Site: geodetic latitude and longitude in rad, ellipsoidal height in m.
@@ -18,8 +18,8 @@ struct Position {
   double height = 0.0;
 };
 
-double meridian_radius(double latitude);          // R_M, m
-double prime_vertical_radius(double latitude);    // R_N, m
+double meridian_radius(double latitude);        // R_M, m
+double prime_vertical_radius(double latitude);  // R_N, m
 
 // Normal gravity (gravitation plus centrifugal), m/s^2, positive downwards: Somigliana's closed formula, and the
 // second-order expansion in height; below 10 km height within 1e-6 m/s^2 of the exact field.

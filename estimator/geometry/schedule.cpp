@@ -5,9 +5,8 @@
 namespace selfcal {
 namespace {
 
-const std::vector<GimbalPosition> common_part = {
-    {0, 0},  {90, 0},  {180, 0},  {270, 0},  {180, 0},  {90, 0}, {0, 0},
-    {0, 90}, {90, 90}, {180, 90}, {270, 90}, {180, 90}, {90, 90}};
+const std::vector<GimbalPosition> common_part = {{0, 0},  {90, 0},  {180, 0},  {270, 0},  {180, 0},  {90, 0}, {0, 0},
+                                                 {0, 90}, {90, 90}, {180, 90}, {270, 90}, {180, 90}, {90, 90}};
 const std::vector<GimbalPosition> table2_end = {{0, 90}, {0, 180}, {0, 270}, {0, 180}, {0, 90}, {0, 0}};
 const std::vector<GimbalPosition> horizontal_end = {{90, 180}, {90, 270}, {90, 180}, {90, 90}, {90, 0}, {0, 0}};
 

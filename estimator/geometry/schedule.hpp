@@ -8,14 +8,14 @@
 namespace selfcal {
 
 struct GimbalPosition {
-  double outer_deg = 0.0;   // about v's z axis
-  double inner_deg = 0.0;   // about the y axis of the frame that outer carries
+  double outer_deg = 0.0;  // about v's z axis
+  double inner_deg = 0.0;  // about the y axis of the frame that outer carries
 };
 
 struct Schedule {
   std::vector<GimbalPosition> positions;
-  std::vector<double> dwell_s;     // one per position
-  double rotation_s = 5.0;         // from one position to the next
+  std::vector<double> dwell_s;  // one per position
+  double rotation_s = 5.0;      // from one position to the next
 
   double duration_s() const;
 };

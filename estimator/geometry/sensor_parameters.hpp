@@ -16,19 +16,19 @@ inline constexpr int sensor_parameter_count = 24;
 
 // First index of each group in the table.
 namespace parameter {
-inline constexpr int accel_bias = 0;            // x y z, m/s^2
-inline constexpr int gyro_drift = 3;            // x y z, rad/s
-inline constexpr int accel_scale_pos = 6;       // x y z
-inline constexpr int accel_scale_neg = 9;       // x y z
-inline constexpr int accel_misalignment = 12;   // yx zx zy, rad
-inline constexpr int gyro_scale = 15;           // x y z
-inline constexpr int gyro_misalignment = 18;    // xy xz yx yz zx zy, rad
+inline constexpr int accel_bias = 0;           // x y z, m/s^2
+inline constexpr int gyro_drift = 3;           // x y z, rad/s
+inline constexpr int accel_scale_pos = 6;      // x y z
+inline constexpr int accel_scale_neg = 9;      // x y z
+inline constexpr int accel_misalignment = 12;  // yx zx zy, rad
+inline constexpr int gyro_scale = 15;          // x y z
+inline constexpr int gyro_misalignment = 18;   // xy xz yx yz zx zy, rad
 }  // namespace parameter
 
 struct SensorParameter {
-  std::string_view name;       // as in the JSON, e.g. "accel_bias_x"
-  std::string_view unit;       // as in the JSON: ug, deg/h, ppm, arcsec
-  double si_per_unit;          // value_si = value_in_unit * si_per_unit
+  std::string_view name;  // as in the JSON, e.g. "accel_bias_x"
+  std::string_view unit;  // as in the JSON: ug, deg/h, ppm, arcsec
+  double si_per_unit;     // value_si = value_in_unit * si_per_unit
 };
 
 extern const std::array<SensorParameter, sensor_parameter_count> sensor_parameters;

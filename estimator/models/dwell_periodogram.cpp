@@ -7,7 +7,7 @@
 namespace selfcal {
 namespace {
 
-constexpr int detrend_order = 8;   // a sway of 5 s is two thirds of a cycle of a piece of 3.2 s
+constexpr int detrend_order = 8;  // a sway of 5 s is two thirds of a cycle of a piece of 3.2 s
 
 }  // namespace
 
@@ -42,8 +42,9 @@ DwellPeriodogram::Bins DwellPeriodogram::density(const Eigen::VectorXd& rates, d
 // Variance of each row's product with the differences of white noise of unit variance: neighbours correlate by -1.
 DwellPeriodogram::Bins DwellPeriodogram::angle_density(double interval_s) const {
   const Eigen::Index length = rows_.cols();
-  const Eigen::ArrayXd power = 2.0 * rows_.rowwise().squaredNorm() -
-                               2.0 * rows_.leftCols(length - 1).cwiseProduct(rows_.rightCols(length - 1)).rowwise().sum();
+  const Eigen::ArrayXd power =
+      2.0 * rows_.rowwise().squaredNorm() -
+      2.0 * rows_.leftCols(length - 1).cwiseProduct(rows_.rightCols(length - 1)).rowwise().sum();
   return (power.head(bin_count) + power.tail(bin_count)) / white_gain_ / interval_s;
 }
 

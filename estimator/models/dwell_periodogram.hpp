@@ -9,11 +9,11 @@ namespace selfcal {
 // both do to noise is linear and taken into account: at the lowest bins the polynomial takes some of it away.
 class DwellPeriodogram {
  public:
-  static constexpr int lowest_bin = 6, highest_bin = 26;   // cycles of a piece
+  static constexpr int lowest_bin = 6, highest_bin = 26;  // cycles of a piece
   static constexpr int bin_count = highest_bin - lowest_bin + 1;
   using Bins = Eigen::Array<double, bin_count, 1>;
 
-  explicit DwellPeriodogram(Eigen::Index length);   // values of a piece
+  explicit DwellPeriodogram(Eigen::Index length);  // values of a piece
 
   // Of rates (per s), one each interval_s, as many as the piece is long: density per Hz, two-sided; white noise of asd N
   // gives N^2.
@@ -22,7 +22,7 @@ class DwellPeriodogram {
   Bins angle_density(double interval_s) const;
 
  private:
-  Eigen::MatrixXd rows_;   // [2 bin_count x length]: cosines, then sines
+  Eigen::MatrixXd rows_;  // [2 bin_count x length]: cosines, then sines
   Bins white_gain_;
 };
 

@@ -12,9 +12,10 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int lowest_bin = DwellPeriodogram::lowest_bin, bin_count = DwellPeriodogram::bin_count;   // 0.19 to 0.8 Hz of 32 s
-constexpr double margin_s = 1.0;          // left out at both ends of a dwell
-constexpr int enough_pieces = 10;         // of an axis
+constexpr int lowest_bin = DwellPeriodogram::lowest_bin,
+              bin_count = DwellPeriodogram::bin_count;  // 0.19 to 0.8 Hz of 32 s
+constexpr double margin_s = 1.0;                        // left out at both ends of a dwell
+constexpr int enough_pieces = 10;                       // of an axis
 constexpr int rounds = 40, rounds_before_lines = 10;
 // Taper sin^4: neighbouring bins share noise, and a sum over bins scatters by mean(w^4)/mean(w^2)^2 of independent ones:
 // mean(sin^16) = 6435/32768, mean(sin^8) = 35/128.
@@ -132,7 +133,7 @@ class WhittleFit {
         right += dwell.pieces * row * (dwell.density(b) - hidden[d](b)) / model;
       }
     }
-    constexpr double slowest = 0.01;   // of the density, in one round
+    constexpr double slowest = 0.01;  // of the density, in one round
     angle_ = std::max(0.0, (normal_.inverse() * right)(1));
     white_ = std::max(slowest * white_, (right(0) - normal_(0, 1) * angle_) / normal_(0, 0));
   }
@@ -166,7 +167,8 @@ double quantum_density(double frequency_hz, double mean_rate, double quantum, do
     const double power = quantum * quantum / (2.0 * pi * pi * k * k);
     const double line = k * mean_rate / quantum;
     for (const double f : {frequency_hz - line, frequency_hz + line}) {
-      density += 0.5 * power * dt * (1.0 - kept * kept) / (1.0 - 2.0 * kept * std::cos(2.0 * pi * f * dt) + kept * kept);
+      density +=
+          0.5 * power * dt * (1.0 - kept * kept) / (1.0 - 2.0 * kept * std::cos(2.0 * pi * f * dt) + kept * kept);
     }
     rest -= power;
   }
@@ -175,7 +177,8 @@ double quantum_density(double frequency_hz, double mean_rate, double quantum, do
 }
 
 QuantisedRate fit_quantised_rate(std::span<const std::array<double, 3>> increments, double rate_hz,
-                                 const std::vector<Segment>& segments, double quantum, double piece_s, double first_asd) {
+                                 const std::vector<Segment>& segments, double quantum, double piece_s,
+                                 double first_asd) {
   const auto length = static_cast<std::size_t>(std::lround(piece_s * rate_hz));
   const std::vector<AxisDwell> dwells = axis_dwells(increments, rate_hz, segments, length);
   int pieces = 0;

@@ -20,7 +20,8 @@ struct QuantisedRate {
 // dwell's rate. `increments` in rad are multiples of `quantum` rad whose remainders are carried on; `piece_s` is the length of a
 // piece of a dwell, `first_asd` > 0 a first guess within a factor of some hundreds.
 QuantisedRate fit_quantised_rate(std::span<const std::array<double, 3>> increments, double rate_hz,
-                                 const std::vector<Segment>& segments, double quantum, double piece_s, double first_asd);
+                                 const std::vector<Segment>& segments, double quantum, double piece_s,
+                                 double first_asd);
 
 // Spectral density (two-sided, (rad/s)^2/Hz) at frequency_hz of the error of a rate whose angle, at a steady mean rate
 // (rad/s), walks with white_asd (rad/s/sqrt(Hz)) and is put out in multiples of `quantum` (rad) at rate_hz.

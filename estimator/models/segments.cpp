@@ -19,7 +19,7 @@ double angle_between(double a, double b) { return std::remainder(a - b, 360.0 * 
 
 struct Window {
   std::size_t first, last;
-  double rate;   // rad/s, mean over the window
+  double rate;  // rad/s, mean over the window
 };
 
 std::vector<Window> windows_of(const ImuData& data, bool by_gimbal) {

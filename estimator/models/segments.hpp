@@ -10,9 +10,9 @@ namespace selfcal {
 
 struct Segment {
   bool rotation = false;
-  std::size_t first = 0, last = 0;      // samples [first, last)
+  std::size_t first = 0, last = 0;  // samples [first, last)
   double start_s = 0.0, end_s = 0.0;
-  double outer = 0.0, inner = 0.0;      // mean gimbal read-out of a dwell, rad; 0 where there is none
+  double outer = 0.0, inner = 0.0;  // mean gimbal read-out of a dwell, rad; 0 where there is none
 };
 
 // Cuts the recording where the gimbal starts and stops. The gimbal read-outs decide where present; else the gyros,

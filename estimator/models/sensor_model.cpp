@@ -6,16 +6,23 @@
 namespace selfcal {
 
 const std::array<int, accel_parameter_count> accel_parameter_index = {
-    parameter::accel_bias,          parameter::accel_bias + 1,      parameter::accel_bias + 2,
-    parameter::accel_scale_pos,     parameter::accel_scale_pos + 1, parameter::accel_scale_pos + 2,
-    parameter::accel_scale_neg,     parameter::accel_scale_neg + 1, parameter::accel_scale_neg + 2,
-    parameter::accel_misalignment,  parameter::accel_misalignment + 1, parameter::accel_misalignment + 2};
+    parameter::accel_bias,         parameter::accel_bias + 1,         parameter::accel_bias + 2,
+    parameter::accel_scale_pos,    parameter::accel_scale_pos + 1,    parameter::accel_scale_pos + 2,
+    parameter::accel_scale_neg,    parameter::accel_scale_neg + 1,    parameter::accel_scale_neg + 2,
+    parameter::accel_misalignment, parameter::accel_misalignment + 1, parameter::accel_misalignment + 2};
 
-const std::array<int, gyro_parameter_count> gyro_parameter_index = {
-    parameter::gyro_drift,            parameter::gyro_drift + 1,        parameter::gyro_drift + 2,
-    parameter::gyro_scale,            parameter::gyro_scale + 1,        parameter::gyro_scale + 2,
-    parameter::gyro_misalignment,     parameter::gyro_misalignment + 1, parameter::gyro_misalignment + 2,
-    parameter::gyro_misalignment + 3, parameter::gyro_misalignment + 4, parameter::gyro_misalignment + 5};
+const std::array<int, gyro_parameter_count> gyro_parameter_index = {parameter::gyro_drift,
+                                                                    parameter::gyro_drift + 1,
+                                                                    parameter::gyro_drift + 2,
+                                                                    parameter::gyro_scale,
+                                                                    parameter::gyro_scale + 1,
+                                                                    parameter::gyro_scale + 2,
+                                                                    parameter::gyro_misalignment,
+                                                                    parameter::gyro_misalignment + 1,
+                                                                    parameter::gyro_misalignment + 2,
+                                                                    parameter::gyro_misalignment + 3,
+                                                                    parameter::gyro_misalignment + 4,
+                                                                    parameter::gyro_misalignment + 5};
 
 SensorCompensation::SensorCompensation(const ParameterVector& p)
     : bias_(p.segment<3>(parameter::accel_bias)),

@@ -8,7 +8,7 @@
 
 namespace selfcal {
 
-using ParameterVector = Eigen::Matrix<double, sensor_parameter_count, 1>;   // SI, order of sensor_parameters
+using ParameterVector = Eigen::Matrix<double, sensor_parameter_count, 1>;  // SI, order of sensor_parameters
 using ParameterMatrix = Eigen::Matrix<double, sensor_parameter_count, sensor_parameter_count>;
 
 // Takes the sensor errors out of measured increments. The accelerometer part is triangular and piecewise linear, the
@@ -30,17 +30,17 @@ class SensorCompensation {
   double scaled(int axis, double value) const { return value * (value >= 0.0 ? positive_(axis) : negative_(axis)); }
 
   Vector3 bias_, drift_;
-  Vector3 positive_, negative_;   // 1/(1 + K+), 1/(1 - K-)
+  Vector3 positive_, negative_;  // 1/(1 + K+), 1/(1 - K-)
   double yx_, zx_, zy_;
-  Matrix3 gyro_inverse_;          // (I + K_G + G)^-1
+  Matrix3 gyro_inverse_;  // (I + K_G + G)^-1
 };
 
 // What the derivatives need of a stretch of time in which b hardly turns: integrals in b over it.
 struct SensorIntegrals {
-  double dt = 0.0;                              // s, positive
-  Vector3 angle = Vector3::Zero();              // rad
-  Vector3 velocity_pos = Vector3::Zero();       // of max(f, 0), m/s
-  Vector3 velocity_neg = Vector3::Zero();       // of max(-f, 0), m/s
+  double dt = 0.0;                         // s, positive
+  Vector3 angle = Vector3::Zero();         // rad
+  Vector3 velocity_pos = Vector3::Zero();  // of max(f, 0), m/s
+  Vector3 velocity_neg = Vector3::Zero();  // of max(-f, 0), m/s
 };
 
 inline constexpr int accel_parameter_count = 12;

@@ -14,7 +14,7 @@ namespace {
 
 using Increments = std::span<const std::array<double, 3>>;
 
-constexpr int piece_length = 64;          // groups
+constexpr int piece_length = 64;  // groups
 // Increments are summed into groups. 0.05 s: pieces of 3.2 s, 1.9 to 8 Hz, where sway has died out. Gyros on a still
 // base 0.5 s: 32 s, 0.19 to 0.8 Hz, because a slow steady rate leaves their quantisation far from white above that.
 constexpr double slow_group_s = 0.5, fast_group_s = 0.05;
@@ -37,11 +37,10 @@ const DwellPeriodogram& analysis() {
 struct Spectrum {
   Bins density = Bins::Zero();
   std::size_t pieces = 0;
-  double group_s = 0.0;   // as grouped: whole samples
+  double group_s = 0.0;  // as grouped: whole samples
 };
 
-Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<Segment>& segments,
-                       double group_s) {
+Spectrum mean_spectrum(Increments increments, double rate_hz, const std::vector<Segment>& segments, double group_s) {
   const auto group = static_cast<std::size_t>(std::max(1.0, std::round(group_s * rate_hz)));
   const std::size_t length = group * piece_length;
   const auto margin = static_cast<std::size_t>(margin_s * rate_hz);
@@ -97,7 +96,7 @@ void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, do
     for (Eigen::Index b = 0; b < bins; ++b) {
       const double model = white + angle * shape(b);
       if (round > 0 && spectrum.density(b) > 2.0 * model) {
-        continue;   // a line
+        continue;  // a line
       }
       const Eigen::Vector2d row(1.0 / model, shape(b) / model);
       normal += row * row.transpose();

@@ -10,7 +10,7 @@ namespace {
 
 struct VelocityPoint {
   double time_s;
-  Vector3 velocity;   // integral of the specific force, in b0
+  Vector3 velocity;  // integral of the specific force, in b0
 };
 
 std::vector<VelocityPoint> inertial_velocity(const ImuData& data, double span_s) {

@@ -6,10 +6,10 @@
 namespace selfcal {
 
 struct CoarseAlignment {
-  Matrix3 C_nb;                     // at the start of the first sample
-  double span_s = 0.0;              // of data used
-  double gravity = 0.0;             // found, m/s^2
-  double horizontal_rate = 0.0;     // Omega cos L found, rad/s: against the site's, a measure of success
+  Matrix3 C_nb;                  // at the start of the first sample
+  double span_s = 0.0;           // of data used
+  double gravity = 0.0;          // found, m/s^2
+  double horizontal_rate = 0.0;  // Omega cos L found, rad/s: against the site's, a measure of success
 };
 
 // Seen from inertial space the specific force of a base at rest turns with the Earth: in the frame b0 in which b stood

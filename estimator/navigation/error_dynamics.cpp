@@ -12,22 +12,23 @@ SiteModel::SiteModel(const earth::Position& p)
   const double north_radius = earth::meridian_radius(p.latitude) + p.height;
   const double east_radius = earth::prime_vertical_radius(p.latitude) + p.height;
 
-  Matrix3 transport = Matrix3::Zero();   // omega_en = transport * v
+  Matrix3 transport = Matrix3::Zero();  // omega_en = transport * v
   transport(0, 2) = 1.0 / east_radius;
   transport(1, 2) = std::tan(p.latitude) / east_radius;
   transport(2, 0) = -1.0 / north_radius;
 
   F_rest.setZero();
-  F_rest.block<3, 3>(P, V).setIdentity();                                              // (D1)
-  F_rest.block<3, 3>(V, V) = -2.0 * skew(omega_ie_n);                                  // (D2)
+  F_rest.block<3, 3>(P, V).setIdentity();              // (D1)
+  F_rest.block<3, 3>(V, V) = -2.0 * skew(omega_ie_n);  // (D2)
   F_rest(V + 1, P + 1) = -earth::gravity_gradient(p.latitude, p.height);
-  constexpr double step = 1e-4;   // rad; gravity is smooth: central difference good to 1e-9 relative
-  F_rest(V + 1, P) = -(earth::normal_gravity(p.latitude + step, p.height) -
-                       earth::normal_gravity(p.latitude - step, p.height)) / (2.0 * step) / north_radius;
-  F_rest.block<3, 3>(A, A) = -skew(omega_ie_n);                                        // (D3)
+  constexpr double step = 1e-4;  // rad; gravity is smooth: central difference good to 1e-9 relative
+  F_rest(V + 1, P) =
+      -(earth::normal_gravity(p.latitude + step, p.height) - earth::normal_gravity(p.latitude - step, p.height)) /
+      (2.0 * step) / north_radius;
+  F_rest.block<3, 3>(A, A) = -skew(omega_ie_n);  // (D3)
   F_rest.block<3, 3>(A, V) = transport;
-  F_rest(A, P) = -omega_ie_n.y() / north_radius;      // d(Omega cos L)/dL = -Omega sin L
-  F_rest(A + 1, P) = omega_ie_n.x() / north_radius;   // d(Omega sin L)/dL =  Omega cos L
+  F_rest(A, P) = -omega_ie_n.y() / north_radius;     // d(Omega cos L)/dL = -Omega sin L
+  F_rest(A + 1, P) = omega_ie_n.x() / north_radius;  // d(Omega sin L)/dL =  Omega cos L
 }
 
 Matrix9 transition(const SiteModel& site, const Vector3& f_n, double length_s, double sign) {
@@ -36,7 +37,7 @@ Matrix9 transition(const SiteModel& site, const Vector3& f_n, double length_s, d
   F *= sign * length_s;
   // Horner: I + F (I + F/2 (I + F/3)).
   Matrix9 sum = Matrix9::Identity() + F / 3.0;
-  sum = (Matrix9::Identity() + 0.5 * F.lazyProduct(sum)).eval();   // a lazy product must not overwrite its factor
+  sum = (Matrix9::Identity() + 0.5 * F.lazyProduct(sum)).eval();  // a lazy product must not overwrite its factor
   return Matrix9::Identity() + F.lazyProduct(sum);
 }
 

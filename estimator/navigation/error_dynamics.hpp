@@ -18,9 +18,9 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 struct SiteModel {
   explicit SiteModel(const earth::Position& site);
 
-  Vector3 omega_ie_n;          // rad/s
-  Vector3 gravity_n;           // (0, -g, 0), m/s^2
-  Matrix9 F_rest;              // error dynamics without the specific force, 1/s
+  Vector3 omega_ie_n;  // rad/s
+  Vector3 gravity_n;   // (0, -g, 0), m/s^2
+  Matrix9 F_rest;      // error dynamics without the specific force, 1/s
 };
 
 // exp(sign * F * length), F = F_rest + the coupling f_n x phi; third order: the rest is (|F| length)^4/24, below

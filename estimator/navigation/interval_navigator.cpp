@@ -7,7 +7,7 @@ namespace selfcal {
 namespace {
 
 // Attitude is taken as that of the block's middle: the error of a sensitivity is (turn/2)^2/6 of it, 4e-7 here.
-constexpr double block_turn = 3e-3;   // rad
+constexpr double block_turn = 3e-3;  // rad
 
 }  // namespace
 
@@ -19,11 +19,11 @@ struct IntervalNavigator::Moments {
   Vector3 velocity_rest = Vector3::Zero();  // int (length - tau) C f
   AccelSensitivity A0 = AccelSensitivity::Zero(), A1 = AccelSensitivity::Zero();
   GyroSensitivity W0 = GyroSensitivity::Zero(), W1 = GyroSensitivity::Zero(), W2 = GyroSensitivity::Zero();
-  Eigen::Matrix3Xd XA0, XA1, XW0, XW1, XW2;   // the same for extra signatures
+  Eigen::Matrix3Xd XA0, XA1, XW0, XW1, XW2;  // the same for extra signatures
   Eigen::Matrix3Xd extra_velocity, extra_angle;
 
   SensorBlock block;
-  Matrix3 C_block;                 // where the block was entered
+  Matrix3 C_block;  // where the block was entered
   double tau_block = 0.0;
   bool open = false;
   Matrix3 C_now;
@@ -36,8 +36,7 @@ IntervalNavigator::IntervalNavigator(const ImuData& data, const ParameterVector&
       site_(data.site),
       q_nb_(C_nb),
       sign_(sign),
-      samples_per_interval_(
-          static_cast<std::size_t>(std::max(1.0, std::round(interval_s * data.sample_rate_hz)))),
+      samples_per_interval_(static_cast<std::size_t>(std::max(1.0, std::round(interval_s * data.sample_rate_hz)))),
       extra_(extra) {}
 
 double IntervalNavigator::sample_dt(std::size_t index) const {
@@ -132,7 +131,7 @@ void IntervalNavigator::close_block(Moments& m, double length) {
   m.open = false;
   const double dt = m.block.integrals.dt;
   const double rest = length - (m.tau_block + 0.5 * dt);
-  const double rest2 = 0.5 * (rest * rest + dt * dt / 12.0);   // mean of (length - tau)^2 / 2 over the block
+  const double rest2 = 0.5 * (rest * rest + dt * dt / 12.0);  // mean of (length - tau)^2 / 2 over the block
   m.block.C_nb = 0.5 * (m.C_block + m.C_now);
   const Matrix3& C = m.block.C_nb;
   const SensorIntegrals& s = m.block.integrals;
@@ -195,7 +194,7 @@ void IntervalNavigator::finish(const Moments& m, Interval& interval) {
   interval.f_n = velocity / T;
   Vector3 drift_p = position + site_.gravity_n * (T * T / 2.0);
   Vector3 drift_v = s * (velocity + site_.gravity_n * T);
-  drift_v -= 2.0 * w.cross(drift_p);   // Coriolis on the drift
+  drift_v -= 2.0 * w.cross(drift_p);  // Coriolis on the drift
   interval.drive.setZero();
   interval.drive.segment<3>(StateLayout::position) = -drift_p;
   interval.drive.segment<3>(StateLayout::velocity) = -drift_v;

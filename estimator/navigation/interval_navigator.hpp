@@ -18,10 +18,10 @@ namespace selfcal {
 
 // A stretch inside an interval in which b turned by less than about 3 mrad.
 struct SensorBlock {
-  std::size_t first = 0, last = 0;   // samples [first, last)
+  std::size_t first = 0, last = 0;  // samples [first, last)
   double start_s = 0.0, end_s = 0.0;
-  SensorIntegrals integrals;         // compensated, in b at the middle
-  Matrix3 C_nb = Matrix3::Identity(); // at the middle
+  SensorIntegrals integrals;           // compensated, in b at the middle
+  Matrix3 C_nb = Matrix3::Identity();  // at the middle
 };
 
 // Sensor errors beyond the 24: signatures that are to be propagated as further constant parameters.
@@ -37,15 +37,15 @@ class ExtraSignatures {
 };
 
 struct Interval {
-  double start_s = 0.0, end_s = 0.0;    // chronological, start < end
+  double start_s = 0.0, end_s = 0.0;  // chronological, start < end
   double length_s = 0.0;
-  double sign = 1.0;                    // +1 forward, -1 reverse
-  std::size_t first = 0, last = 0;      // samples [first, last)
-  Vector3 f_n;                          // mean specific force, m/s^2
-  Vector3 angle_b;                      // integral of the compensated rate, b (no commutation), rad
-  Matrix9 Phi;                          // of the navigation states
-  Eigen::Matrix<double, 9, Eigen::Dynamic> Gamma;   // [9 x (24 + extra)]
-  Vector9 drive;                        // minus the drift of the computed position and velocity, zero attitude
+  double sign = 1.0;                               // +1 forward, -1 reverse
+  std::size_t first = 0, last = 0;                 // samples [first, last)
+  Vector3 f_n;                                     // mean specific force, m/s^2
+  Vector3 angle_b;                                 // integral of the compensated rate, b (no commutation), rad
+  Matrix9 Phi;                                     // of the navigation states
+  Eigen::Matrix<double, 9, Eigen::Dynamic> Gamma;  // [9 x (24 + extra)]
+  Vector9 drive;  // minus the drift of the computed position and velocity, zero attitude
 };
 
 class IntervalNavigator {
@@ -76,9 +76,9 @@ class IntervalNavigator {
   Eigen::Quaterniond q_nb_;
   double sign_;
   std::size_t samples_per_interval_;
-  std::size_t done_ = 0;                  // samples navigated so far
+  std::size_t done_ = 0;  // samples navigated so far
   ExtraSignatures* extra_;
-  Vector3 previous_angle_ = Vector3::Zero(), previous_velocity_ = Vector3::Zero();   // of the sample before, in time
+  Vector3 previous_angle_ = Vector3::Zero(), previous_velocity_ = Vector3::Zero();  // of the sample before, in time
   Vector3 angle_ = Vector3::Zero(), velocity_ = Vector3::Zero();
   std::size_t loaded_ = static_cast<std::size_t>(-1);
 };

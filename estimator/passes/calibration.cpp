@@ -17,11 +17,11 @@ namespace {
 constexpr double interval_s = 1.0;
 constexpr double least_duration_s = 60.0;
 // Until the site's own noise is known. Moored: decimetres.
-constexpr double first_still_sigma = 3e-6;    // m
-constexpr double first_moored_sigma = 0.2;    // m
-constexpr double least_position_sigma = 1e-6; // m: a still base stands to micrometres
+constexpr double first_still_sigma = 3e-6;     // m
+constexpr double first_moored_sigma = 0.2;     // m
+constexpr double least_position_sigma = 1e-6;  // m: a still base stands to micrometres
 constexpr int motion_rounds = 2;
-constexpr double fair_nis = 10.0;             // beyond it another heading is tried
+constexpr double fair_nis = 10.0;  // beyond it another heading is tried
 
 ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale, double accel_angle, double gyro_scale,
                        double gyro_angle) {
@@ -74,9 +74,9 @@ class Calibration {
   PassOutput last_;
   double next_sign_ = 1.0;
   std::vector<PassSummary> passes_;
-  std::array<std::optional<ParameterVector>, 2> answers_;   // of the last forward and the last reverse pass
-  double last_move_ = 0.0;       // in sigma, since the pass before
-  double same_way_move_ = 0.0;   // in sigma, since the last pass of the same direction
+  std::array<std::optional<ParameterVector>, 2> answers_;  // of the last forward and the last reverse pass
+  double last_move_ = 0.0;                                 // in sigma, since the pass before
+  double same_way_move_ = 0.0;                             // in sigma, since the last pass of the same direction
   bool converged_ = false;
 };
 
@@ -108,8 +108,7 @@ bool Calibration::pass(double sign) {
   next_sign_ = -sign;
   if (options_.carried_covariance) {
     const int at = last_.layout.parameters();
-    input_.prior.carried =
-        last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).eval();
+    input_.prior.carried = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).eval();
   }
   return true;
 }
@@ -227,7 +226,7 @@ CalibrationOutcome Calibration::run() {
   if (!settle(3)) {
     return stopped;
   }
-  if (next_sign_ < 0.0 && !pass(next_sign_)) {   // end at the start: its attitude is part of the answer
+  if (next_sign_ < 0.0 && !pass(next_sign_)) {  // end at the start: its attitude is part of the answer
     return stopped;
   }
   return {result(), {}};

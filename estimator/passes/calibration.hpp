@@ -22,9 +22,9 @@ namespace selfcal {
 
 // Noise of the sensors and of the site; what is not given is estimated from the recording.
 struct NoiseOptions {
-  std::optional<double> gyro_arw;              // rad/s/sqrt(Hz)
-  std::optional<double> accel_vrw;             // m/s^2/sqrt(Hz)
-  std::optional<double> position_sigma;        // m, white, at 1 Hz
+  std::optional<double> gyro_arw;        // rad/s/sqrt(Hz)
+  std::optional<double> accel_vrw;       // m/s^2/sqrt(Hz)
+  std::optional<double> position_sigma;  // m, white, at 1 Hz
 };
 
 // 1 sigma: 10 ug, 0.005 deg/h, 10 ppm, 5 arcsec. Derivation in estimator/README.md.
@@ -34,19 +34,19 @@ ParameterVector plausible_limit();
 
 struct CalibrationOptions {
   NoiseOptions noise;
-  int max_passes = 12;               // after the noise is known; at least 3 in all: forward, reverse, forward
+  int max_passes = 12;              // after the noise is known; at least 3 in all: forward, reverse, forward
   double convergence_sigma = 0.1;   // stop when no parameter moved by more than this fraction of its sigma
-  bool carried_covariance = false;   // for comparison only: keep P from pass to pass, counting data again
-  ParameterVector tolerance = default_tolerance();   // 1 sigma beyond which a parameter counts as not determined
+  bool carried_covariance = false;  // for comparison only: keep P from pass to pass, counting data again
+  ParameterVector tolerance = default_tolerance();  // 1 sigma beyond which a parameter counts as not determined
 };
 
 enum class PassDirection { forward, reverse };
 
 struct PassSummary {
   PassDirection direction = PassDirection::forward;
-  double seconds = 0.0;               // of data
-  double nis_mean = 0.0;              // normalised innovation squared per degree of freedom, 1 expected
-  double largest_move_sigma = 0.0;    // largest change of a parameter since the pass before, in its sigma
+  double seconds = 0.0;             // of data
+  double nis_mean = 0.0;            // normalised innovation squared per degree of freedom, 1 expected
+  double largest_move_sigma = 0.0;  // largest change of a parameter since the pass before, in its sigma
   // Convergence within the pass (Figures 6 to 11 of the source): about 200 epochs.
   std::vector<double> epoch_s;
   std::vector<ParameterVector> epoch_parameters;
@@ -58,7 +58,7 @@ struct SegmentSummary {
   bool rotation = false;
   double start_s = 0.0;
   double end_s = 0.0;
-  double outer_deg = 0.0;             // mean read-out, 0 where there is none
+  double outer_deg = 0.0;  // mean read-out, 0 where there is none
   double inner_deg = 0.0;
   double nis_mean = 0.0;
   int epochs = 0;
@@ -68,18 +68,18 @@ enum class Verdict { consistent, inconsistent, not_converged };
 
 struct Consistency {
   Verdict verdict = Verdict::consistent;
-  double nis_mean = 0.0;              // final pass, per degree of freedom
-  double nis_low = 0.0, nis_high = 0.0;          // its 99.9 % interval for a right model
-  double whiteness_p_value = 0.0;     // portmanteau test on the innovations of the final pass
-  double parity_max_sigma = 0.0;      // largest difference between last forward and last reverse answer, in sigma
-  double autocorrelation = 0.0;       // of the normalised innovations at lag 1, mean of the axes
-  std::string words;                  // one or two sentences for people
+  double nis_mean = 0.0;                 // final pass, per degree of freedom
+  double nis_low = 0.0, nis_high = 0.0;  // its 99.9 % interval for a right model
+  double whiteness_p_value = 0.0;        // portmanteau test on the innovations of the final pass
+  double parity_max_sigma = 0.0;         // largest difference between last forward and last reverse answer, in sigma
+  double autocorrelation = 0.0;          // of the normalised innovations at lag 1, mean of the axes
+  std::string words;                     // one or two sentences for people
 };
 
 // Two gimbal positions, dwelt in one after the other, and what they would leave of a direction's sigma.
 struct SupplyingTurn {
   GimbalPosition from, to;
-  double sigma_after = 0.0;           // in units of the tolerance
+  double sigma_after = 0.0;  // in units of the tolerance
 };
 
 // A direction in parameter space that the recording did not fix: unit vector in units of the tolerances.
@@ -91,24 +91,24 @@ struct UndeterminedDirection {
 };
 
 struct CalibrationResult {
-  ParameterVector value;              // SI
-  ParameterVector sigma;              // SI
+  ParameterVector value;  // SI
+  ParameterVector sigma;  // SI
   std::array<bool, sensor_parameter_count> determined{};
-  std::array<bool, sensor_parameter_count> plausible{};   // inside the physically possible range
-  ParameterMatrix covariance;         // SI
-  Matrix3 C_nb_start;                 // attitude of the IMU at the first sample's start
-  Attitude initial_attitude;          // of the vehicle, using the gimbal read-out there (zero where absent), rad
-  Vector3 attitude_sigma;             // phi north, up, east at the start, rad
-  double gyro_arw = 0.0, accel_vrw = 0.0, position_sigma = 0.0;   // in use; SI
-  double gyro_arw_sigma = 0.0;                                    // of the density as found; 0: not stated
-  double gyro_quantum = 0.0, accel_quantum = 0.0;                 // found in the increments; rad, m/s; 0: none
-  NoiseModel noise;                   // in use, with the motion of a moored base
-  bool moored = false;                // coloured motion of the base was found and modelled
+  std::array<bool, sensor_parameter_count> plausible{};  // inside the physically possible range
+  ParameterMatrix covariance;                            // SI
+  Matrix3 C_nb_start;                                    // attitude of the IMU at the first sample's start
+  Attitude initial_attitude;  // of the vehicle, using the gimbal read-out there (zero where absent), rad
+  Vector3 attitude_sigma;     // phi north, up, east at the start, rad
+  double gyro_arw = 0.0, accel_vrw = 0.0, position_sigma = 0.0;  // in use; SI
+  double gyro_arw_sigma = 0.0;                                   // of the density as found; 0: not stated
+  double gyro_quantum = 0.0, accel_quantum = 0.0;                // found in the increments; rad, m/s; 0: none
+  NoiseModel noise;                                              // in use, with the motion of a moored base
+  bool moored = false;                                           // coloured motion of the base was found and modelled
   std::vector<PassSummary> passes;
   std::vector<SegmentSummary> segments;
   Consistency consistency;
   std::vector<UndeterminedDirection> undetermined;
-  double elapsed_s = 0.0;             // filled by the caller: libraries do not ask the time
+  double elapsed_s = 0.0;  // filled by the caller: libraries do not ask the time
 };
 
 // Why no answer could be computed at all (as against a bad answer, which is a CalibrationResult that says so).
@@ -117,16 +117,16 @@ struct CalibrationFailure {
 };
 
 struct CalibrationProgress {
-  int pass = 0;                       // 1, 2, ...
+  int pass = 0;  // 1, 2, ...
   PassDirection direction = PassDirection::forward;
-  double fraction = 0.0;              // of this pass
-  ParameterVector value;              // SI
-  ParameterVector sigma;              // SI
+  double fraction = 0.0;  // of this pass
+  ParameterVector value;  // SI
+  ParameterVector sigma;  // SI
 };
 
 struct CalibrationOutcome {
   std::optional<CalibrationResult> result;
-  CalibrationFailure failure;         // where there is no result
+  CalibrationFailure failure;  // where there is no result
 };
 
 // Runs the whole calibration. `progress` may be empty; it is called from the calling thread a few times per pass.

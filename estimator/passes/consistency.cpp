@@ -10,7 +10,7 @@ namespace selfcal {
 namespace {
 
 constexpr int whiteness_lags = 20;
-constexpr double normal_999 = 3.29;   // two-sided 99.9 % of the normal distribution
+constexpr double normal_999 = 3.29;  // two-sided 99.9 % of the normal distribution
 
 // P(chi-squared with `degrees` > value), by Wilson and Hilferty's cube root; good to 1e-3 for degrees >= 20.
 double chi_squared_tail(double value, double degrees) {
@@ -63,19 +63,22 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
     c.words = "The passes did not settle: the answer still moves from pass to pass and must not be used.";
   } else if (nis_high || (coloured && c.nis_mean > 0.5)) {
     c.verdict = Verdict::inconsistent;
-    c.words = format("The data do not fit the 24-parameter model: innovations are %.2f times as strong as predicted (NIS), "
-                     "correlation %.2f from second to second (whiteness p = %.2g). Something is left out; the sigmas are "
-                     "too small.",
-                     c.nis_mean, c.autocorrelation, c.whiteness_p_value);
+    c.words = format(
+        "The data do not fit the 24-parameter model: innovations are %.2f times as strong as predicted (NIS), "
+        "correlation %.2f from second to second (whiteness p = %.2g). Something is left out; the sigmas are "
+        "too small.",
+        c.nis_mean, c.autocorrelation, c.whiteness_p_value);
   } else if (c.nis_mean < c.nis_low - density_margin) {
-    c.words = format("Nothing contradicts the model, but innovations are weaker than predicted (NIS %.3f): the noise given "
-                     "is larger than that of the data, and the sigmas are larger than they need be.",
-                     c.nis_mean);
+    c.words = format(
+        "Nothing contradicts the model, but innovations are weaker than predicted (NIS %.3f): the noise given "
+        "is larger than that of the data, and the sigmas are larger than they need be.",
+        c.nis_mean);
   } else {
     const char* colour = c.whiteness_p_value < 1e-3 ? "nearly white" : "white";
-    c.words = format("Innovations are as predicted (NIS %.3f) and %s (p = %.2g, correlation %.2f from second to second); "
-                     "forward and reverse passes agree within %.3f sigma.",
-                     c.nis_mean, colour, c.whiteness_p_value, c.autocorrelation, c.parity_max_sigma);
+    c.words = format(
+        "Innovations are as predicted (NIS %.3f) and %s (p = %.2g, correlation %.2f from second to second); "
+        "forward and reverse passes agree within %.3f sigma.",
+        c.nis_mean, colour, c.whiteness_p_value, c.autocorrelation, c.parity_max_sigma);
   }
   return c;
 }
@@ -87,8 +90,13 @@ std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segme
   std::vector<SegmentSummary> summaries;
   std::size_t next = 0;
   for (const Segment& segment : segments) {
-    SegmentSummary s{segment.rotation, segment.start_s, segment.end_s, segment.outer * 180.0 / M_PI,
-                     segment.inner * 180.0 / M_PI, 0.0, 0};
+    SegmentSummary s{segment.rotation,
+                     segment.start_s,
+                     segment.end_s,
+                     segment.outer * 180.0 / M_PI,
+                     segment.inner * 180.0 / M_PI,
+                     0.0,
+                     0};
     while (next < epochs.size() && epochs[next].interval_middle_s < segment.end_s) {
       s.nis_mean += (epochs[next].innovation.cwiseAbs2().cwiseQuotient(epochs[next].variance)).sum() / 3.0;
       ++s.epochs;
@@ -108,7 +116,7 @@ std::vector<UndeterminedDirection> undetermined_directions(const ParameterMatrix
       tolerance.cwiseInverse().asDiagonal() * covariance * tolerance.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<ParameterMatrix> eigen(scaled);
   std::vector<UndeterminedDirection> found;
-  for (int k = sensor_parameter_count - 1; k >= 0; --k) {   // largest first
+  for (int k = sensor_parameter_count - 1; k >= 0; --k) {  // largest first
     const double sigma = std::sqrt(std::max(0.0, eigen.eigenvalues()(k)));
     if (sigma <= 1.0) {
       break;

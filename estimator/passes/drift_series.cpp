@@ -5,15 +5,15 @@
 namespace selfcal {
 namespace {
 
-constexpr double turning_rate = 0.1;          // rad/s: a gimbal's; a base sways more slowly
+constexpr double turning_rate = 0.1;  // rad/s: a gimbal's; a base sways more slowly
 // 1 sigma of what the filter begins with, and of what the errors not yet found change when the gimbal turns.
-constexpr double first_position = 1.0;        // m
-constexpr double first_velocity = 0.2;        // m/s
-constexpr double first_acceleration = 1e-2;   // m/s^2: a tilt of 1 mrad
-constexpr double turn_acceleration = 1e-3;    // m/s^2 per interval: 100 ug
-constexpr double gravity = 9.8;               // m/s^2
+constexpr double first_position = 1.0;       // m
+constexpr double first_velocity = 0.2;       // m/s
+constexpr double first_acceleration = 1e-2;  // m/s^2: a tilt of 1 mrad
+constexpr double turn_acceleration = 1e-3;   // m/s^2 per interval: 100 ug
+constexpr double gravity = 9.8;              // m/s^2
 
-constexpr int drift_states = 3;               // position, velocity, acceleration
+constexpr int drift_states = 3;  // position, velocity, acceleration
 constexpr int most_states = drift_states + 2 * 8;
 using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_states, 1>;
 using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_states, most_states>;
@@ -136,7 +136,7 @@ void filter_axis(const DriftSeries& series, int axis, const DriftNoise& noise, c
   const auto count = static_cast<Eigen::Index>(series.size());
   out.value.resize(count);
   out.variance.resize(count);
-  filter.update();   // where the pass begins the position is known as well
+  filter.update();  // where the pass begins the position is known as well
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
     filter.propagate(series.position[i](axis), series.velocity[i](axis), series.turning[i]);

@@ -10,9 +10,9 @@ namespace selfcal {
 // One element per whole update interval, in the order of the pass.
 struct DriftSeries {
   double interval_s = 1.0;
-  double sign = 1.0;                          // of the pass
-  std::vector<Vector3> position, velocity;    // drive of the filter (N6), m and m/s
-  std::vector<bool> turning;                  // the gimbal turned
+  double sign = 1.0;                        // of the pass
+  std::vector<Vector3> position, velocity;  // drive of the filter (N6), m and m/s
+  std::vector<bool> turning;                // the gimbal turned
   std::size_t size() const { return position.size(); }
 };
 
@@ -21,15 +21,15 @@ DriftSeries drift_series(const PassInput& input);
 
 // Noise of one axis beside the motion of the base.
 struct DriftNoise {
-  double accel_vrw = 0.0;     // m/s^2/sqrt(Hz)
-  double gyro_arw = 0.0;      // rad/s/sqrt(Hz): tilts the base, gravity makes an acceleration of it
-  double white_sigma = 0.0;   // m, of the position
+  double accel_vrw = 0.0;    // m/s^2/sqrt(Hz)
+  double gyro_arw = 0.0;     // rad/s/sqrt(Hz): tilts the base, gravity makes an acceleration of it
+  double white_sigma = 0.0;  // m, of the position
 };
 
 // Innovations of the position given those before, and their variances, for one axis.
 struct AxisInnovations {
-  Eigen::ArrayXd value, variance;   // m, m^2
-  double log_likelihood = 0.0;      // less the constant
+  Eigen::ArrayXd value, variance;  // m, m^2
+  double log_likelihood = 0.0;     // less the constant
 };
 
 // Kalman filter of one axis, (M1)-(M3) of estimator/README.md: position, velocity and a wandering acceleration of the

@@ -6,25 +6,25 @@
 #include <complex>
 #include <numbers>
 #include <optional>
-#include <vector>
 #include <unsupported/Eigen/FFT>
+#include <vector>
 
 namespace selfcal {
 namespace {
 
 constexpr int most_oscillations = 8;
-constexpr int frequency_steps = 3;           // of the scoring, frequencies alone
-constexpr int scoring_steps = 12;            // of the scoring of all
+constexpr int frequency_steps = 3;  // of the scoring, frequencies alone
+constexpr int scoring_steps = 12;   // of the scoring of all
 // Periodogram of white noise, three axes, per axis's mean: gamma distributed with shape 3, median 2.674. Above 25 it is
 // a line: P = 25^2/2 exp(-25) a bin, once in some 10^5 series by chance; and the Bayesian information criterion asks
 // for no less (five unknowns, each 0.5 ln(3 x 3000)).
 constexpr double gamma3_median = 2.674;
 constexpr double line_power = 25.0;
-constexpr double enough = 0.5;               // gain of log likelihood that ends the scoring
-constexpr double least_sigma = 1e-6;         // m: less is not motion, a still base's noise is no smaller
+constexpr double enough = 0.5;        // gain of log likelihood that ends the scoring
+constexpr double least_sigma = 1e-6;  // m: less is not motion, a still base's noise is no smaller
 constexpr double least_decay_s = 10.0;
-constexpr double longest_decay = 1e6;        // in lengths of the series: a pure line, decimetres of it change by um
-constexpr double slowest_period_s = 60.0;    // slower is the wander of the navigation, which the filter knows
+constexpr double longest_decay = 1e6;      // in lengths of the series: a pure line, decimetres of it change by um
+constexpr double slowest_period_s = 60.0;  // slower is the wander of the navigation, which the filter knows
 
 // Unknowns: logarithm of the white sigma, then per oscillation omega (in 1/length of the series), logarithm of the
 // decay, and logarithms of the three sigmas. All of them move by about 1 where the likelihood changes its shape.
@@ -222,15 +222,14 @@ void MotionFit::gradient(const std::vector<Eigen::Index>& which, Eigen::VectorXd
       const Eigen::Index at = which[static_cast<std::size_t>(k)];
       const Eigen::Index within = (at - 1) % per_line;
       if (at > 0 && within >= 2 && within != 2 + axis) {
-        continue;   // the size in another axis
+        continue;  // the size in another axis
       }
       Unknowns theta = theta_;
       theta(at) += step;
       filter_one(theta, axis, moved);
       const Eigen::ArrayXd d_value = (moved.value - now.value) / step;
       const Eigen::ArrayXd d_variance = (moved.variance - now.variance) / step;
-      g(k) -= (d_value * now.value * inverse +
-               0.5 * d_variance * inverse * (1.0 - now.value.square() * inverse)).sum();
+      g(k) -= (d_value * now.value * inverse + 0.5 * d_variance * inverse * (1.0 - now.value.square() * inverse)).sum();
       rows.col(k).head(count) = (d_value * inverse.sqrt()).matrix();
       rows.col(k).tail(count) = (d_variance * inverse * std::sqrt(0.5)).matrix();
     }

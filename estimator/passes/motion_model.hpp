@@ -11,9 +11,9 @@ namespace selfcal {
 // c is the displacement. A stationary Gaussian process, the same when time runs backwards. decay to infinity: a pure
 // line of random amplitude and phase.
 struct Oscillation {
-  double omega = 0.0;     // rad/s
-  double decay_s = 0.0;   // of the correlation
-  double sigma = 0.0;     // m
+  double omega = 0.0;    // rad/s
+  double decay_s = 0.0;  // of the correlation
+  double sigma = 0.0;    // m
 };
 
 // Along one axis of n: the sum of its oscillations.
@@ -27,15 +27,15 @@ struct MotionModel {
 
 // One interval of an oscillation: c' = cosine c - sine s, s' = sine c + cosine s, each plus noise.
 struct OscillationStep {
-  double cosine = 0.0, sine = 0.0;   // damping included
-  double drive_variance = 0.0;       // m^2, of either
+  double cosine = 0.0, sine = 0.0;  // damping included
+  double drive_variance = 0.0;      // m^2, of either
   OscillationStep(const Oscillation& oscillation, double interval_s);
 };
 
 // The position of the site is observed at every update epoch as 0 = position error + motion + white noise.
 struct ObservationModel {
-  double sigma = 1e-5;                   // white, m, for a 1 s interval
-  std::array<MotionModel, 3> motion;     // north, up, east
+  double sigma = 1e-5;                // white, m, for a 1 s interval
+  std::array<MotionModel, 3> motion;  // north, up, east
   int state_count() const;
   // Of all motion states, axis by axis, [n x n].
   Eigen::MatrixXd transition(double interval_s) const;

@@ -12,12 +12,12 @@ constexpr double history_points = 200.0;
 struct DynamicModel {
   MatrixX Phi, L;
   VectorX q, drive;
-  std::array<VectorX, 3> h;   // observation row of each axis
+  std::array<VectorX, 3> h;  // observation row of each axis
 
   DynamicModel(const ObservationModel& observation, double interval_s, const ProcessNoise& noise) {
     const int d = StateLayout::navigation_count + observation.state_count();
     Phi = MatrixX::Zero(d, d);
-    L = MatrixX::Identity(d, d);   // the motion states are driven one by one
+    L = MatrixX::Identity(d, d);  // the motion states are driven one by one
     q = VectorX::Zero(d);
     drive = VectorX::Zero(d);
     L.topLeftCorner<9, 9>() = noise.L;
@@ -55,7 +55,7 @@ VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
 
 UdFilter make_filter(const PassInput& input, const StateLayout& layout) {
   VectorX mean = VectorX::Zero(layout.count());
-  if (!input.prior.carried) {   // the prior is about zero, the state about the linearisation
+  if (!input.prior.carried) {  // the prior is about zero, the state about the linearisation
     mean.segment<sensor_parameter_count>(layout.parameters()) = -input.parameters;
   }
   if (input.extra_prior_mean.size() > 0) {
@@ -78,9 +78,9 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   const StateLayout& layout = out.layout;
   UdFilter filter = make_filter(input, layout);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra);
-  DynamicModel model(input.noise.observation, input.interval_s,
-                     process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s,
-                                   input.sign));
+  DynamicModel model(
+      input.noise.observation, input.interval_s,
+      process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s, input.sign));
   const double noise_variance = input.noise.observation.sigma * input.noise.observation.sigma / input.interval_s;
   const int d = layout.dynamic_count();
   const double intervals = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s;
@@ -101,7 +101,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       progress(std::min(1.0, index / intervals), out.history_value.back(), out.history_sigma.back());
     }
   };
-  for (const VectorX& h : model.h) {   // where the pass begins the position is known as well
+  for (const VectorX& h : model.h) {  // where the pass begins the position is known as well
     filter.update(h, 0.0, noise_variance);
   }
   while (navigator.next(interval)) {
@@ -115,7 +115,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     filter.propagate(model.Phi, Gamma, model.drive, model.L, model.q);
     ++index;
     if (std::abs(interval.length_s - input.interval_s) > 0.1 * input.interval_s) {
-      continue;   // the remainder at the end of the data: noise and motion are those of a whole interval
+      continue;  // the remainder at the end of the data: noise and motion are those of a whole interval
     }
     if (observer != nullptr) {
       observer->propagated(interval, filter);

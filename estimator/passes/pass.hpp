@@ -17,25 +17,25 @@
 namespace selfcal {
 
 struct NoiseModel {
-  double gyro_arw = 0.0;      // rad/s/sqrt(Hz)
-  double accel_vrw = 0.0;     // m/s^2/sqrt(Hz)
+  double gyro_arw = 0.0;   // rad/s/sqrt(Hz)
+  double accel_vrw = 0.0;  // m/s^2/sqrt(Hz)
   ObservationModel observation;
 };
 
 // 1 sigma before any data. The navigation part is wide enough to say nothing.
 struct PriorModel {
-  double position = 10.0;                 // m
-  double velocity = 2.0;                  // m/s
-  double attitude = 0.2;                  // rad
-  VectorX parameter_sigma;                // [24 + extra], about zero
-  std::optional<MatrixX> carried;         // [24 x 24] instead, about the linearisation: counts data again
+  double position = 10.0;          // m
+  double velocity = 2.0;           // m/s
+  double attitude = 0.2;           // rad
+  VectorX parameter_sigma;         // [24 + extra], about zero
+  std::optional<MatrixX> carried;  // [24 x 24] instead, about the linearisation: counts data again
 };
 
 struct PassInput {
   const ImuData* data = nullptr;
-  ParameterVector parameters = ParameterVector::Zero();   // linearisation
-  VectorX extra_prior_mean;                               // [extra] prior mean less linearisation; may be empty
-  Matrix3 C_nb = Matrix3::Identity();                     // where the pass begins
+  ParameterVector parameters = ParameterVector::Zero();  // linearisation
+  VectorX extra_prior_mean;                              // [extra] prior mean less linearisation; may be empty
+  Matrix3 C_nb = Matrix3::Identity();                    // where the pass begins
   double sign = 1.0;
   double interval_s = 1.0;
   NoiseModel noise;
@@ -44,20 +44,20 @@ struct PassInput {
 };
 
 struct Epoch {
-  double time_s = 0.0;               // where the position is observed
-  double interval_middle_s = 0.0;    // of the data between this observation and the one before
-  Vector3 innovation;                // m, each given those before it
-  Vector3 variance;                  // predicted, m^2
-  Vector3 position;                  // position state after the update, m: minus the motion of the base
+  double time_s = 0.0;             // where the position is observed
+  double interval_middle_s = 0.0;  // of the data between this observation and the one before
+  Vector3 innovation;              // m, each given those before it
+  Vector3 variance;                // predicted, m^2
+  Vector3 position;                // position state after the update, m: minus the motion of the base
 };
 
 struct PassOutput {
   StateLayout layout;
-  VectorX mean;                      // of the state at the end of the pass
+  VectorX mean;  // of the state at the end of the pass
   MatrixX covariance;
-  Matrix3 C_nb;                      // attitude at the end, corrected
+  Matrix3 C_nb;  // attitude at the end, corrected
   std::vector<Epoch> epochs;
-  double nis_mean = 0.0;             // per degree of freedom
+  double nis_mean = 0.0;  // per degree of freedom
   double log_likelihood = 0.0;
   std::vector<double> history_s;
   std::vector<ParameterVector> history_value, history_sigma;

@@ -11,13 +11,13 @@ namespace {
 
 constexpr double dwell_s = 30.0;
 constexpr double move_s = 5.0;
-constexpr double worthwhile = 0.9;      // of sigma before
+constexpr double worthwhile = 0.9;  // of sigma before
 constexpr std::size_t most_named = 3;
 constexpr int quarters[] = {0, 90, 180, 270};
 
 struct Turn {
   GimbalPosition from, to;
-  ParameterMatrix covariance;   // after it
+  ParameterMatrix covariance;  // after it
 };
 
 std::vector<std::pair<GimbalPosition, GimbalPosition>> quarter_turns() {
@@ -100,7 +100,7 @@ Installation installation_of(const CalibrationResult& result, const earth::Posit
   installation.gyro_arw = result.gyro_arw;
   installation.accel_vrw = result.accel_vrw;
   installation.position_sigma = result.position_sigma;
-  for (const MotionModel& motion : result.noise.observation.motion) {   // what of a moored base cannot be foreseen
+  for (const MotionModel& motion : result.noise.observation.motion) {  // what of a moored base cannot be foreseen
     installation.position_sigma = std::max(installation.position_sigma, motion.unforeseen(1.0));
   }
   installation.tolerance = tolerance;

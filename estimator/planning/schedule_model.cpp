@@ -12,7 +12,7 @@ namespace selfcal {
 namespace {
 
 constexpr double interval_s = 1.0;
-constexpr int samples_per_interval = 50;   // 0.36 deg each at 90 deg in 5 s
+constexpr int samples_per_interval = 50;  // 0.36 deg each at 90 deg in 5 s
 
 // How far a move has come: rate and acceleration zero at both ends. How a move is made matters where a schedule is weak:
 // Table 2 on a level base would promise sigmas a third smaller from moves at constant rate.
@@ -33,7 +33,7 @@ Motion ideal_motion(const std::function<Matrix3(double)>& C_nb, const SiteModel&
     const Matrix3 C2 = C_nb((k + 1) * dt);
     const Vector3 angle =
         rotation_vector_from_matrix(C0.transpose() * matrix_from_rotation_vector(site.omega_ie_n * dt) * C2);
-    const Vector3 velocity = -dt / 6.0 * (C0 + 4.0 * C1 + C2).transpose() * site.gravity_n;   // Simpson
+    const Vector3 velocity = -dt / 6.0 * (C0 + 4.0 * C1 + C2).transpose() * site.gravity_n;  // Simpson
     motion.time_s.push_back((k + 1) * dt);
     motion.delta_theta.push_back({angle.x(), angle.y(), angle.z()});
     motion.delta_v.push_back({velocity.x(), velocity.y(), velocity.z()});
@@ -83,8 +83,7 @@ const ScheduleModel::Step& ScheduleModel::step(const GimbalPosition& from, const
   IntervalNavigator navigator(data, ParameterVector::Zero(), C_nb(0.0), 1.0, length);
   Interval interval;
   navigator.next(interval);
-  const ProcessNoise noise =
-      process_noise(site_, installation_.gyro_arw, installation_.accel_vrw, length, 1.0);
+  const ProcessNoise noise = process_noise(site_, installation_.gyro_arw, installation_.accel_vrw, length, 1.0);
   const double variance = installation_.position_sigma * installation_.position_sigma / length;
   return steps_.emplace(key, Step{interval.Phi, interval.Gamma, noise.L, noise.q, variance}).first->second;
 }

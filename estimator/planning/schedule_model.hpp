@@ -17,7 +17,7 @@ class ScheduleModel {
  public:
   explicit ScheduleModel(const Installation& installation);
 
-  UdFilter start() const;                     // the prior, and the first observation
+  UdFilter start() const;  // the prior, and the first observation
   void dwell(UdFilter& filter, const GimbalPosition& at, double seconds);
   void move(UdFilter& filter, const GimbalPosition& from, const GimbalPosition& to, double seconds);
 
@@ -30,7 +30,7 @@ class ScheduleModel {
     VectorX q;
     double noise_variance;
   };
-  using Key = std::array<double, 6>;          // from (outer, inner), to (outer, inner), interval length, index
+  using Key = std::array<double, 6>;  // from (outer, inner), to (outer, inner), interval length, index
   const Step& step(const GimbalPosition& from, const GimbalPosition& to, double seconds, int index, int count);
   void apply(UdFilter& filter, const Step& s) const;
 

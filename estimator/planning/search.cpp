@@ -12,7 +12,7 @@ namespace {
 struct Candidate {
   std::vector<GimbalPosition> positions;
   UdFilter filter;
-  double shortfall;   // 0 where every tolerance is met
+  double shortfall;  // 0 where every tolerance is met
 };
 
 // Sum over the parameters of ln(sigma/tolerance) where positive, and a little of the rest, so that of two equal
@@ -121,7 +121,8 @@ void Search::with_dwell(double dwell_s, double longest_s, SearchResult& best) {
         next.push_back(std::move(grown));
       }
     }
-    std::sort(next.begin(), next.end(), [](const Candidate& a, const Candidate& b) { return a.shortfall < b.shortfall; });
+    std::sort(next.begin(), next.end(),
+              [](const Candidate& a, const Candidate& b) { return a.shortfall < b.shortfall; });
     if (next.size() > static_cast<std::size_t>(options_.beam)) {
       next.erase(next.begin() + options_.beam, next.end());
     }
@@ -130,7 +131,7 @@ void Search::with_dwell(double dwell_s, double longest_s, SearchResult& best) {
       consider(beam[0].positions, dwell_s, longest_s, best);
       return;
     }
-    if (!best.found && beam[0].shortfall < least_shortfall) {   // the best so far, should none meet the tolerances
+    if (!best.found && beam[0].shortfall < least_shortfall) {  // the best so far, should none meet the tolerances
       least_shortfall = beam[0].shortfall;
       best.schedule = as_schedule(beam[0].positions, dwell_s, options_.rotation_s);
     }

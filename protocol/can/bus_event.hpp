@@ -13,12 +13,12 @@ enum class BusEvent : std::uint8_t {
   restarted,
   error_passive,
   error_warning,
-  error_active,         // recovered
-  controller_overrun,   // the controller itself lost a frame
+  error_active,        // recovered
+  controller_overrun,  // the controller itself lost a frame
   transmit_timeout,
-  not_acknowledged,     // nobody else on the bus
+  not_acknowledged,  // nobody else on the bus
   arbitration_lost,
-  protocol_error,       // form, stuff, CRC, bit error
+  protocol_error,  // form, stuff, CRC, bit error
   transceiver,
   other,
 };

@@ -16,7 +16,7 @@ class BusClock {
   Time transmit(const CanFrame& frame, Time now);
 
   Time free_at() const { return free_at_; }
-  Time busy() const { return busy_; }            // sum of all frames so far
+  Time busy() const { return busy_; }  // sum of all frames so far
   std::uint64_t frames() const { return frames_; }
   std::uint64_t data_bytes() const { return data_bytes_; }
   const BitRates& rates() const { return rates_; }

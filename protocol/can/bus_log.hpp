@@ -19,10 +19,10 @@
 namespace selfcal::can {
 
 struct LogEntry {
-  Time time{0};                 // since 1970, written to the microsecond
+  Time time{0};  // since 1970, written to the microsecond
   std::string interface;
   CanFrame frame;
-  bool error_frame = false;     // frame.id then holds the error class bits
+  bool error_frame = false;  // frame.id then holds the error class bits
 };
 
 inline constexpr std::size_t max_log_line = 192;

@@ -14,7 +14,7 @@ constexpr std::uint32_t fd_tail = 12;
 class BitCounter {
  public:
   void put(bool bit) {
-    if (stuff_due_) {   // held back until it is known that the stuffed part goes on
+    if (stuff_due_) {  // held back until it is known that the stuffed part goes on
       insert_stuff_bit();
     }
     crc_ = next_crc(bit);
@@ -56,7 +56,7 @@ class BitCounter {
     return static_cast<std::uint16_t>(feedback ? shifted ^ 0x4599 : shifted);
   }
 
-  bool last_ = true;   // the idle bus is recessive; run_ starts at SOF, which is dominant
+  bool last_ = true;  // the idle bus is recessive; run_ starts at SOF, which is dominant
   unsigned run_ = 0;
   bool stuff_due_ = false;
   bool in_data_phase_ = false;
@@ -68,16 +68,16 @@ class BitCounter {
 
 // SOF, identifier and the bits up to IDE and RTR/RRS.
 void put_arbitration(const CanFrame& frame, BitCounter& bits) {
-  bits.put(false);                                  // SOF
+  bits.put(false);  // SOF
   if (frame.extended) {
     bits.put(frame.id >> 18, 11);
-    bits.put(0b11, 2);                              // SRR, IDE
+    bits.put(0b11, 2);  // SRR, IDE
     bits.put(frame.id & 0x3FFFF, 18);
-    bits.put(!frame.fd && frame.remote);            // RTR or RRS
+    bits.put(!frame.fd && frame.remote);  // RTR or RRS
   } else {
     bits.put(frame.id, 11);
     bits.put(!frame.fd && frame.remote);
-    bits.put(false);                                // IDE
+    bits.put(false);  // IDE
   }
 }
 
@@ -90,7 +90,7 @@ void put_data(const CanFrame& frame, BitCounter& bits) {
 FrameBits classic_bits(const CanFrame& frame) {
   BitCounter bits;
   put_arbitration(frame, bits);
-  bits.put(0, frame.extended ? 2 : 1);              // reserved: r1 and r0, or FDF alone
+  bits.put(0, frame.extended ? 2 : 1);  // reserved: r1 and r0, or FDF alone
   bits.put(dlc_of_size(frame.size), 4);
   if (!frame.remote) {
     put_data(frame, bits);
@@ -103,7 +103,7 @@ FrameBits classic_bits(const CanFrame& frame) {
 FrameBits fd_bits(const CanFrame& frame) {
   BitCounter bits;
   put_arbitration(frame, bits);
-  bits.put(0b10, 2);                                // FDF, res
+  bits.put(0b10, 2);  // FDF, res
   bits.put(frame.bit_rate_switch);
   if (frame.bit_rate_switch) {
     bits.start_data_rate();
@@ -114,7 +114,7 @@ FrameBits fd_bits(const CanFrame& frame) {
   // Stuff count with parity (4) and CRC-17 or CRC-21; a fixed stuff bit before each four of these bits.
   const std::uint32_t checked = frame.size <= 16 ? 4 + 17 : 4 + 21;
   const std::uint32_t fixed_stuff = (checked + 3) / 4;
-  const std::uint32_t end = checked + fixed_stuff + 1;   // and the CRC delimiter
+  const std::uint32_t end = checked + fixed_stuff + 1;  // and the CRC delimiter
   FrameBits result{bits.nominal() + fd_tail, bits.data(), bits.stuff() + fixed_stuff};
   (frame.bit_rate_switch ? result.data : result.nominal) += end;
   return result;

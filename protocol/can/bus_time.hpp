@@ -15,14 +15,14 @@
 namespace selfcal::can {
 
 struct BitRates {
-  std::uint32_t nominal = 1'000'000;   // bit/s
-  std::uint32_t data = 5'000'000;      // bit/s, FD frames with bit-rate switch
+  std::uint32_t nominal = 1'000'000;  // bit/s
+  std::uint32_t data = 5'000'000;     // bit/s, FD frames with bit-rate switch
 };
 
 struct FrameBits {
-  std::uint32_t nominal = 0;   // bits at the nominal rate, intermission included
-  std::uint32_t data = 0;      // bits at the data rate
-  std::uint32_t stuff = 0;     // how many of all these are stuff bits
+  std::uint32_t nominal = 0;  // bits at the nominal rate, intermission included
+  std::uint32_t data = 0;     // bits at the data rate
+  std::uint32_t stuff = 0;    // how many of all these are stuff bits
 
   std::uint32_t total() const { return nominal + data; }
 };

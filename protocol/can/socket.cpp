@@ -32,7 +32,7 @@ struct Socket::Impl {
   int fd = -1;
   std::string interface;
   std::uint64_t lost = 0;
-  std::uint32_t overrun_count = 0;   // the kernel's, 32 bits
+  std::uint32_t overrun_count = 0;  // the kernel's, 32 bits
   std::vector<canfd_frame> raw;
   std::vector<iovec> vectors;
   std::vector<mmsghdr> headers;
@@ -91,8 +91,8 @@ Expected<void> Socket::Impl::configure(const SocketOptions& options) {
     const canid_t format = filter.extended ? CAN_EFF_FLAG : 0U;
     filters.push_back({filter.id | format, filter.mask | CAN_EFF_FLAG | CAN_RTR_FLAG});
   }
-  if (!filters.empty() && !set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
-                               static_cast<socklen_t>(filters.size() * sizeof(can_filter)))) {
+  if (!filters.empty() &&
+      !set(SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), static_cast<socklen_t>(filters.size() * sizeof(can_filter)))) {
     return failure("cannot set filters");
   }
   const can_err_mask_t errors = options.error_frames ? CAN_ERR_MASK : 0U;
@@ -138,8 +138,8 @@ Expected<void> Socket::Impl::bind_to_interface(bool fd_needed) {
     return failure("cannot read its MTU");
   }
   if (fd_needed && request.ifr_mtu < static_cast<int>(CANFD_MTU)) {
-    return fail(ErrorKind::device, fmt::format("CAN interface {}: MTU {} does not pass FD frames (needs {})",
-                                               interface, request.ifr_mtu, CANFD_MTU));
+    return fail(ErrorKind::device, fmt::format("CAN interface {}: MTU {} does not pass FD frames (needs {})", interface,
+                                               request.ifr_mtu, CANFD_MTU));
   }
   return {};
 }
@@ -160,11 +160,11 @@ void Socket::Impl::take(std::size_t i) {
     } else if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t count = 0;
       std::memcpy(&count, CMSG_DATA(c), sizeof count);
-      lost += count - overrun_count;   // modulo 2^32: the counter may wrap
+      lost += count - overrun_count;  // modulo 2^32: the counter may wrap
       overrun_count = count;
     }
   }
-  header.msg_controllen = control_bytes;   // the kernel wrote what it used
+  header.msg_controllen = control_bytes;  // the kernel wrote what it used
 }
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -200,8 +200,7 @@ int Socket::receive_buffer_granted() const {
 
 Expected<std::span<const ReceivedFrame>> Socket::receive() {
   Impl& s = *impl_;
-  const int count =
-      ::recvmmsg(s.fd, s.headers.data(), static_cast<unsigned>(s.headers.size()), MSG_DONTWAIT, nullptr);
+  const int count = ::recvmmsg(s.fd, s.headers.data(), static_cast<unsigned>(s.headers.size()), MSG_DONTWAIT, nullptr);
   if (count < 0) {
     if (errno == EAGAIN || errno == EINTR) {
       return std::span<const ReceivedFrame>{};

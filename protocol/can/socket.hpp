@@ -18,24 +18,24 @@ namespace selfcal::can {
 
 struct Filter {
   std::uint32_t id = 0;
-  std::uint32_t mask = 0x1FFFFFFF;   // a frame passes where (id & mask) agree
-  bool extended = false;             // only frames of this format pass
+  std::uint32_t mask = 0x1FFFFFFF;  // a frame passes where (id & mask) agree
+  bool extended = false;            // only frames of this format pass
 };
 
 struct SocketOptions {
-  std::string interface;             // "can0"
-  std::vector<Filter> filters;       // empty: everything
-  bool fd = true;                    // FD frames can be sent and received (needs MTU 72)
+  std::string interface;        // "can0"
+  std::vector<Filter> filters;  // empty: everything
+  bool fd = true;               // FD frames can be sent and received (needs MTU 72)
   bool error_frames = true;
-  int receive_buffer_bytes = 4 << 20;   // asked for; the kernel grants up to net.core.rmem_max without privilege
-  std::size_t batch = 256;           // frames per system call
-  bool kernel_time = false;          // ReceivedFrame::kernel_time is wanted; costs a control message per frame
+  int receive_buffer_bytes = 4 << 20;  // asked for; the kernel grants up to net.core.rmem_max without privilege
+  std::size_t batch = 256;             // frames per system call
+  bool kernel_time = false;            // ReceivedFrame::kernel_time is wanted; costs a control message per frame
 };
 
 struct ReceivedFrame {
   CanFrame frame;
-  Time kernel_time{0};               // since 1970, when the kernel got it; zero unless asked for
-  std::optional<BusEvent> event;     // an error frame: frame then holds its raw identifier and data
+  Time kernel_time{0};            // since 1970, when the kernel got it; zero unless asked for
+  std::optional<BusEvent> event;  // an error frame: frame then holds its raw identifier and data
 };
 
 class Socket {
@@ -45,7 +45,7 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  int fd() const;   // for poll(2); readable when receive() has something
+  int fd() const;  // for poll(2); readable when receive() has something
 
   // Up to one batch; empty when there is nothing. Valid until the next call. Fails (device) when the interface is down
   // or gone.
@@ -55,8 +55,8 @@ class Socket {
   // on POLLOUT or after a millisecond (ENOBUFS has no event).
   [[nodiscard]] Expected<std::size_t> send(std::span<const CanFrame> frames);
 
-  std::uint64_t lost_frames() const;      // by receive overrun since open (SO_RXQ_OVFL)
-  int receive_buffer_granted() const;     // bytes, as the kernel accounts them
+  std::uint64_t lost_frames() const;   // by receive overrun since open (SO_RXQ_OVFL)
+  int receive_buffer_granted() const;  // bytes, as the kernel accounts them
   const std::string& interface() const;
 
  private:

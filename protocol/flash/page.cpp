@@ -11,7 +11,7 @@ namespace selfcal::flash {
 namespace {
 
 constexpr std::size_t crc_at = 32;
-constexpr double temperature_lsb = 0.01;   // degC
+constexpr double temperature_lsb = 0.01;  // degC
 
 // The field of the CRC counts as zero.
 std::uint32_t page_crc(std::span<const std::uint8_t> bytes) {
@@ -62,7 +62,7 @@ std::string_view name(PageError error) {
 
 void encode_page(const Page& page, std::span<std::uint8_t, page_bytes> out) {
   assert(page.samples.size() <= samples_per_page);
-  std::ranges::fill(out, std::uint8_t{0xFF});   // as erased FLASH reads
+  std::ranges::fill(out, std::uint8_t{0xFF});  // as erased FLASH reads
   ByteWriter bytes(out);
   bytes.put(page_magic);
   bytes.put(page_format);

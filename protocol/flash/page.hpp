@@ -20,10 +20,10 @@ namespace selfcal::flash {
 inline constexpr std::size_t page_bytes = 4096;
 inline constexpr std::size_t page_header_bytes = 36;
 inline constexpr std::size_t sample_bytes = 28;
-inline constexpr std::size_t samples_per_page = (page_bytes - page_header_bytes) / sample_bytes;   // 145
+inline constexpr std::size_t samples_per_page = (page_bytes - page_header_bytes) / sample_bytes;  // 145
 inline constexpr std::uint32_t page_magic = 0x53435250;
 inline constexpr std::uint16_t page_format = 1;
-inline constexpr double counts_per_turn = 65536.0;   // gimbal read-outs
+inline constexpr double counts_per_turn = 65536.0;  // gimbal read-outs
 
 namespace page_flag {
 inline constexpr std::uint16_t last_of_run = 1;
@@ -33,7 +33,7 @@ inline constexpr std::uint16_t sensor_saturated = 2;
 struct SampleCounts {
   std::array<std::int32_t, 3> delta_theta{};
   std::array<std::int32_t, 3> delta_v{};
-  std::uint16_t outer = 0;   // of counts_per_turn
+  std::uint16_t outer = 0;  // of counts_per_turn
   std::uint16_t inner = 0;
 
   bool operator==(const SampleCounts&) const = default;
@@ -41,11 +41,11 @@ struct SampleCounts {
 
 struct Page {
   std::uint32_t run_id = 0;
-  std::uint32_t sequence = 0;        // page of the run, from 0
+  std::uint32_t sequence = 0;  // page of the run, from 0
   std::uint64_t first_sample = 0;
-  double temperature_c = 0.0;        // rounded to 0.01
+  double temperature_c = 0.0;  // rounded to 0.01
   std::uint16_t flags = 0;
-  std::vector<SampleCounts> samples; // at most samples_per_page
+  std::vector<SampleCounts> samples;  // at most samples_per_page
 };
 
 using PageBytes = std::array<std::uint8_t, page_bytes>;

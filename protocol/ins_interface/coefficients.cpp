@@ -45,8 +45,8 @@ Expected<Coefficients> decode_coefficients(std::span<const std::uint8_t> bytes) 
   }
   const std::uint32_t stored = stored_crc(bytes.first<coefficients_bytes>());
   if (const std::uint32_t computed = flash::crc32c(bytes.first(crc_at)); computed != stored) {
-    return fail(ErrorKind::bad_input, fmt::format("coefficient record: CRC 0x{:08X} is stored, the content has 0x{:08X}",
-                                                  stored, computed));
+    return fail(ErrorKind::bad_input,
+                fmt::format("coefficient record: CRC 0x{:08X} is stored, the content has 0x{:08X}", stored, computed));
   }
   if (const auto found = in.get<std::uint16_t>(); found != format_number) {
     return fail(ErrorKind::bad_input, fmt::format("coefficient record: format {} is unknown", found));

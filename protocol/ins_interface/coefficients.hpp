@@ -19,10 +19,10 @@ inline constexpr std::size_t coefficients_bytes = 260;
 inline constexpr std::size_t author_bytes = 32;
 
 struct Coefficients {
-  std::uint32_t version = 0;       // counts up with every calibration; 0: factory
-  std::int64_t date_s = 0;         // of the calibration, UTC, since 1970
-  std::string author;              // ASCII, 32 characters at most
-  std::array<double, coefficient_count> value{};   // SI
+  std::uint32_t version = 0;                      // counts up with every calibration; 0: factory
+  std::int64_t date_s = 0;                        // of the calibration, UTC, since 1970
+  std::string author;                             // ASCII, 32 characters at most
+  std::array<double, coefficient_count> value{};  // SI
 
   bool operator==(const Coefficients&) const = default;
 };

@@ -45,7 +45,7 @@ std::string dbc_text() {
   for (const Message& message : messages) {
     fmt::format_to(out, "BO_ {} {}: 8 {}\n", message.id, message.name, message.sender);
     for (const Signal& s : status_signals) {
-      if (s.frame_id == message.id) {   // @1+: little-endian, unsigned
+      if (s.frame_id == message.id) {  // @1+: little-endian, unsigned
         fmt::format_to(out, " SG_ {} : {}|{}@1+ ({},0) [{}|{}] \"{}\" Tester\n", s.name, s.start_bit, s.bits, s.factor,
                        s.minimum, s.maximum, s.unit);
       }

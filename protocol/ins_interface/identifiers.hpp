@@ -9,11 +9,11 @@
 namespace selfcal::ins {
 
 namespace can_id {
-inline constexpr std::uint32_t request = 0x640;       // tester to INS, default; settable
-inline constexpr std::uint32_t response = 0x648;      // INS to tester
-inline constexpr std::uint32_t functional = 0x7DF;    // tester to all
-inline constexpr std::uint32_t status = 0x650;        // INS, periodic: InsState
-inline constexpr std::uint32_t gimbal = 0x651;        // INS, periodic: InsGimbal
+inline constexpr std::uint32_t request = 0x640;     // tester to INS, default; settable
+inline constexpr std::uint32_t response = 0x648;    // INS to tester
+inline constexpr std::uint32_t functional = 0x7DF;  // tester to all
+inline constexpr std::uint32_t status = 0x650;      // INS, periodic: InsState
+inline constexpr std::uint32_t gimbal = 0x651;      // INS, periodic: InsGimbal
 }  // namespace can_id
 
 namespace did {
@@ -30,18 +30,18 @@ inline constexpr std::uint16_t sample_format = 0x0221;          // SampleFormatR
 }  // namespace did
 
 namespace routine {
-inline constexpr std::uint16_t self_calibration = 0x0301;       // start: run id u32; stop; result: RunRecord
-inline constexpr std::uint16_t erase_inactive = 0x0302;         // start: erase the inactive coefficient slot
-inline constexpr std::uint16_t commit_coefficients = 0x0303;    // start: CRC u32 of the record to be made valid
-inline constexpr std::uint16_t navigation_check = 0x0304;       // start: NavigationCheckRequest; result: ...Record
+inline constexpr std::uint16_t self_calibration = 0x0301;     // start: run id u32; stop; result: RunRecord
+inline constexpr std::uint16_t erase_inactive = 0x0302;       // start: erase the inactive coefficient slot
+inline constexpr std::uint16_t commit_coefficients = 0x0303;  // start: CRC u32 of the record to be made valid
+inline constexpr std::uint16_t navigation_check = 0x0304;     // start: NavigationCheckRequest; result: ...Record
 }  // namespace routine
 
-enum class Access : std::uint8_t { open, unlocked };   // unlocked: SecurityAccess and the extended session
+enum class Access : std::uint8_t { open, unlocked };  // unlocked: SecurityAccess and the extended session
 
 struct DataIdentifier {
   std::uint16_t id;
   std::string_view name;
-  Access write;          // meaningful if writable
+  Access write;  // meaningful if writable
   bool writable;
   std::string_view content;
 };
@@ -54,7 +54,7 @@ struct Routine {
 };
 extern const std::array<Routine, 4> routines;
 
-std::string_view did_name(std::uint16_t did);           // "unknown"
-std::string_view routine_name(std::uint16_t routine);   // "unknown"
+std::string_view did_name(std::uint16_t did);          // "unknown"
+std::string_view routine_name(std::uint16_t routine);  // "unknown"
 
 }  // namespace selfcal::ins

@@ -46,7 +46,7 @@ can::CanFrame blank(std::uint32_t id) {
 std::uint32_t angle_counts(const Signal& signal, double degrees) {
   const double turn = std::fmod(degrees, 360.0);
   const auto counts = static_cast<std::uint32_t>(std::lround((turn < 0 ? turn + 360.0 : turn) / signal.factor));
-  return counts % 36000;   // 359.996 rounds to 360: the same as 0
+  return counts % 36000;  // 359.996 rounds to 360: the same as 0
 }
 
 }  // namespace

@@ -11,13 +11,13 @@
 namespace selfcal::ins {
 
 enum class State : std::uint8_t {
-  starting = 0,      // after power-on, coefficients being read
+  starting = 0,  // after power-on, coefficients being read
   idle = 1,
-  rotating = 2,      // self-calibration: gimbal moves or dwells, data go to FLASH
-  complete = 3,      // schedule done, all pages written
-  aborted = 4,       // stopped by request
-  failed = 5,        // gimbal, sensor or FLASH failure
-  checking = 6,      // free-inertial navigation check
+  rotating = 2,  // self-calibration: gimbal moves or dwells, data go to FLASH
+  complete = 3,  // schedule done, all pages written
+  aborted = 4,   // stopped by request
+  failed = 5,    // gimbal, sensor or FLASH failure
+  checking = 6,  // free-inertial navigation check
 };
 std::string_view name(State state);
 
@@ -25,20 +25,20 @@ namespace fault {
 inline constexpr std::uint8_t gimbal = 1;
 inline constexpr std::uint8_t sensor = 2;
 inline constexpr std::uint8_t flash = 4;
-inline constexpr std::uint8_t coefficients = 8;   // no valid slot: the factory's are in force
+inline constexpr std::uint8_t coefficients = 8;  // no valid slot: the factory's are in force
 }  // namespace fault
 
 // What the frames told last. Angles as read out, 0 <= angle < 360.
 struct Status {
   State state = State::starting;
-  std::uint8_t faults = 0;            // of fault::
-  std::uint8_t position = 0;          // 1 first; 0: not in a schedule
-  bool moving = false;                // the gimbal turns
+  std::uint8_t faults = 0;    // of fault::
+  std::uint8_t position = 0;  // 1 first; 0: not in a schedule
+  bool moving = false;        // the gimbal turns
   bool unlocked = false;
-  std::uint32_t pages_written = 0;    // of this run, 24 bits
-  double outer_deg = 0.0;             // LSB 0.01
+  std::uint32_t pages_written = 0;  // of this run, 24 bits
+  double outer_deg = 0.0;           // LSB 0.01
   double inner_deg = 0.0;
-  double time_left_s = 0.0;           // of the rotation, on the INS's clock; LSB 0.1
+  double time_left_s = 0.0;  // of the rotation, on the INS's clock; LSB 0.1
 };
 
 // One signal of a status frame; little-endian, start bit as in a DBC.
@@ -51,7 +51,7 @@ struct Signal {
   double minimum;
   double maximum;
   std::string_view unit;
-  std::string_view values;      // "0=starting 1=idle ..." or empty
+  std::string_view values;  // "0=starting 1=idle ..." or empty
 };
 extern const std::array<Signal, 11> status_signals;
 

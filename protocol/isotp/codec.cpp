@@ -6,7 +6,7 @@
 namespace selfcal::isotp {
 namespace {
 
-constexpr std::uint32_t max_short_length = 4095;   // 12 bits
+constexpr std::uint32_t max_short_length = 4095;  // 12 bits
 using Decoded = tl::expected<Pdu, CodecError>;
 
 tl::unexpected<CodecError> no(CodecError error) { return tl::unexpected<CodecError>(error); }

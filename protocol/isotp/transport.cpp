@@ -123,7 +123,7 @@ Events Transport::on_frame(const can::CanFrame& frame, Time now) {
     }
     return events;
   }
-  if (!pdu) {   // 9.6.5.2: an invalid flow status ends the transmission; anything else malformed is ignored
+  if (!pdu) {  // 9.6.5.2: an invalid flow status ends the transmission; anything else malformed is ignored
     if (pdu.error() == CodecError::bad_flow_status && sender_.state == SendState::wait_flow) {
       give_up_sending(Result::invalid_flow_status, events);
     }
@@ -218,7 +218,7 @@ void Transport::on_consecutive(const ConsecutiveFrame& consecutive, Time now, Ev
   }
   const std::size_t wanted = std::min(receiver_.length - receiver_.done, receiver_.frame_payload);
   if (consecutive.payload.size() < wanted) {
-    return;   // too short for its place: ignored, and so missed by the next one's sequence number
+    return;  // too short for its place: ignored, and so missed by the next one's sequence number
   }
   std::ranges::copy(consecutive.payload.first(wanted),
                     receiver_.buffer.begin() + static_cast<std::ptrdiff_t>(receiver_.done));
@@ -236,12 +236,10 @@ void Transport::on_consecutive(const ConsecutiveFrame& consecutive, Time now, Ev
 
 void Transport::on_flow_control(const FlowControl& flow, Time now, Events& events) {
   if (sender_.state != SendState::wait_flow) {
-    return;   // 9.6.5.1: a flow control that nobody waits for is ignored
+    return;  // 9.6.5.1: a flow control that nobody waits for is ignored
   }
   switch (flow.status) {
-    case FlowStatus::overflow:
-      give_up_sending(Result::overflow, events);
-      return;
+    case FlowStatus::overflow: give_up_sending(Result::overflow, events); return;
     case FlowStatus::wait:
       sender_.deadline = now + options_.n_bs;
       if (++sender_.waits > options_.max_wait_frames) {
@@ -300,8 +298,7 @@ can::CanFrame Transport::opening_frame() const {
     return single_frame(message, options_.address.transmit_id);
   }
   can::CanFrame frame = blank_frame(options_.address.transmit_id);
-  encode_first(static_cast<std::uint32_t>(message.size()), message,
-               std::span(frame.data).first(options_.frame_bytes));
+  encode_first(static_cast<std::uint32_t>(message.size()), message, std::span(frame.data).first(options_.frame_bytes));
   finish_frame(frame, options_.frame_bytes);
   return frame;
 }
@@ -337,12 +334,8 @@ void Transport::sent_one(Time now, Events& events) {
 void Transport::advance_sender(Time now, Events& events) {
   switch (sender_.state) {
     case SendState::idle:
-    case SendState::wait_flow:
-      assert(false && "sent() without pending()");
-      return;
-    case SendState::single:
-      sender_.done = sender_.length;
-      break;
+    case SendState::wait_flow: assert(false && "sent() without pending()"); return;
+    case SendState::single: sender_.done = sender_.length; break;
     case SendState::first:
       sender_.done = first_frame_payload(static_cast<std::uint32_t>(sender_.length), options_.frame_bytes);
       sender_.sequence = 1;
@@ -380,7 +373,7 @@ Events Transport::on_time(Time now) {
     events.add(Result::timeout_cr);
   }
   if (functional_.waiting && now >= functional_.since + options_.n_as) {
-    functional_.waiting = false;   // nobody waits for it; the next one is due soon
+    functional_.waiting = false;  // nobody waits for it; the next one is due soon
   }
   if (sender_.state == SendState::wait_flow) {
     if (now >= sender_.deadline) {
@@ -406,7 +399,7 @@ std::optional<Time> Transport::next_transmission() const {
 }
 
 std::optional<Time> Transport::next_deadline() const {
-  std::optional<Time> earliest = next_transmission();   // always before the time-out of the same frame
+  std::optional<Time> earliest = next_transmission();  // always before the time-out of the same frame
   if (sender_.state == SendState::wait_flow) {
     keep_earliest(earliest, sender_.deadline);
   }
@@ -419,7 +412,7 @@ std::optional<Time> Transport::next_deadline() const {
 void Transport::hold_reception(bool hold, Time now) {
   held_ = hold;
   if (!hold && receiver_.active && receiver_.awaiting_hold) {
-    Events none;   // granting yields no event
+    Events none;  // granting yields no event
     grant_or_wait(now, none);
   }
 }

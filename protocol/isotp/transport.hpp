@@ -22,16 +22,16 @@ namespace selfcal::isotp {
 struct Address {
   std::uint32_t transmit_id = 0;
   std::uint32_t receive_id = 0;
-  std::optional<std::uint32_t> functional_id;   // one-to-many requests: single frames only
-  bool extended = false;                        // 29-bit identifiers
+  std::optional<std::uint32_t> functional_id;  // one-to-many requests: single frames only
+  bool extended = false;                       // 29-bit identifiers
 };
 
 struct Options {
   Address address;
   bool fd = false;
-  bool bit_rate_switch = true;          // FD only
-  std::size_t frame_bytes = 8;          // longest frame to send: 8, or with fd one of 12 16 20 24 32 48 64
-  bool padding = true;                  // short frames are filled up to 8 bytes (FD lengths are always filled)
+  bool bit_rate_switch = true;  // FD only
+  std::size_t frame_bytes = 8;  // longest frame to send: 8, or with fd one of 12 16 20 24 32 48 64
+  bool padding = true;          // short frames are filled up to 8 bytes (FD lengths are always filled)
   std::uint8_t padding_byte = 0xCC;
   std::uint8_t block_size = 0;          // told to the sender when we receive
   std::uint8_t st_min = 0;              // told to the sender, raw code
@@ -53,16 +53,16 @@ enum class Result : std::uint8_t {
   timeout_cr,           // no consecutive frame
   wrong_sequence,       // a frame was lost or doubled: reception given up
   invalid_flow_status,
-  unexpected_frame,     // a new message began before the old one ended: the old one is given up
-  too_many_waits,       // the peer said WAIT too often: message given up
-  held_too_long,        // we did: reception given up
-  overflow,             // the peer cannot take our message
-  message_too_long,     // the peer's message does not fit; it was told so
+  unexpected_frame,  // a new message began before the old one ended: the old one is given up
+  too_many_waits,    // the peer said WAIT too often: message given up
+  held_too_long,     // we did: reception given up
+  overflow,          // the peer cannot take our message
+  message_too_long,  // the peer's message does not fit; it was told so
 };
 
 std::string_view name(Result result);
 bool is_failure(Result result);
-bool concerns_sending(Result result);   // failure of our message (else of the peer's)
+bool concerns_sending(Result result);  // failure of our message (else of the peer's)
 
 // What one call brought about; never more than four results.
 class Events {
@@ -79,7 +79,7 @@ class Events {
 
 class Transport {
  public:
-  explicit Transport(const Options& options);   // aborts on options that no bus has (our own mistake)
+  explicit Transport(const Options& options);  // aborts on options that no bus has (our own mistake)
 
   // False when a message is still being sent, or it is empty or longer than max_message. The bytes are copied.
   [[nodiscard]] bool send(std::span<const std::uint8_t> message, Time now);
@@ -88,8 +88,8 @@ class Transport {
   bool sending() const { return sender_.state != SendState::idle; }
   bool receiving() const { return receiver_.active; }
 
-  bool accepts(const can::CanFrame& frame) const;   // is addressed to us
-  Events on_frame(const can::CanFrame& frame, Time now);   // other frames are ignored
+  bool accepts(const can::CanFrame& frame) const;         // is addressed to us
+  Events on_frame(const can::CanFrame& frame, Time now);  // other frames are ignored
   Events on_time(Time now);
 
   // The frames that may go out now, at most out.size(); asking does not change anything. Takes flow control first.
@@ -108,7 +108,7 @@ class Transport {
   // While held, a peer that wants to send gets WAIT (repeated each n_bs/2, at most max_wait_frames times).
   void hold_reception(bool hold, Time now);
 
-  void reset();   // drop everything under way, on both sides
+  void reset();  // drop everything under way, on both sides
 
   const Options& options() const { return options_; }
 
@@ -118,12 +118,12 @@ class Transport {
     SendState state = SendState::idle;
     std::vector<std::uint8_t> buffer;
     std::size_t length = 0;
-    std::size_t done = 0;               // bytes the bus has taken
-    std::uint8_t sequence = 0;          // of the next consecutive frame
-    unsigned block_left = 0;            // frames until flow control; 0: no limit
+    std::size_t done = 0;       // bytes the bus has taken
+    std::uint8_t sequence = 0;  // of the next consecutive frame
+    unsigned block_left = 0;    // frames until flow control; 0: no limit
     Time separation{0};
-    Time due{0};                        // the next frame may go out
-    Time deadline{0};                   // wait_flow: N_Bs
+    Time due{0};       // the next frame may go out
+    Time deadline{0};  // wait_flow: N_Bs
     unsigned waits = 0;
   };
   struct Receiver {
@@ -131,15 +131,15 @@ class Transport {
     std::vector<std::uint8_t> buffer;
     std::size_t length = 0;
     std::size_t done = 0;
-    std::size_t frame_payload = 0;      // of every consecutive frame but the last: as long as the first frame
-    std::uint8_t sequence = 0;          // expected next
-    unsigned block_left = 0;            // frames until we owe flow control; 0: no limit
-    Time deadline{0};                   // N_Cr
-    bool awaiting_hold = false;         // WAIT was said, CTS is owed
+    std::size_t frame_payload = 0;  // of every consecutive frame but the last: as long as the first frame
+    std::uint8_t sequence = 0;      // expected next
+    unsigned block_left = 0;        // frames until we owe flow control; 0: no limit
+    Time deadline{0};               // N_Cr
+    bool awaiting_hold = false;     // WAIT was said, CTS is owed
     unsigned waits = 0;
     Time next_wait{0};
   };
-  struct Owed {                         // a frame that waits for the bus
+  struct Owed {  // a frame that waits for the bus
     bool waiting = false;
     Time since{0};
     can::CanFrame frame;

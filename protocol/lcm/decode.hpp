@@ -52,7 +52,7 @@ class Walk {
     skip(4);
     return static_cast<std::int32_t>(value);
   }
-  void text() {   // its length counts the NUL behind it
+  void text() {  // its length counts the NUL behind it
     const std::int32_t length = integer();
     sound_ = sound_ && length >= 1;
     skip(sound_ ? static_cast<std::size_t>(length) : 0);
@@ -65,7 +65,7 @@ class Walk {
 
 inline bool lengths_are_sound(std::string_view fields, std::span<const std::uint8_t> bytes) {
   Walk walk(bytes);
-  walk.skip(8);   // the hash
+  walk.skip(8);  // the hash
   std::int32_t count = 0;
   for (const char field : fields) {
     if (field == 'n') {

@@ -13,17 +13,17 @@ namespace {
 
 constexpr double lowest_rate_hz = 1.0;
 constexpr double highest_rate_hz = 20000.0;
-constexpr double rate_tolerance = 1e-3;        // a crystal is within 1e-4; a wrong rate is wrong by percents
-constexpr double gap_intervals = 1.5;          // half an interval of jitter is no gap; a lost sample is a whole one
+constexpr double rate_tolerance = 1e-3;  // a crystal is within 1e-4; a wrong rate is wrong by percents
+constexpr double gap_intervals = 1.5;    // half an interval of jitter is no gap; a lost sample is a whole one
 constexpr double gravity_mps2 = 9.806;
-constexpr double gravity_tolerance = 0.05;     // normal gravity differs by 0.3 %, no sensor error reaches 1 %
-constexpr double lowest_height_m = -500.0;     // the Dead Sea's shore is at -430
+constexpr double gravity_tolerance = 0.05;  // normal gravity differs by 0.3 %, no sensor error reaches 1 %
+constexpr double lowest_height_m = -500.0;  // the Dead Sea's shore is at -430
 constexpr double highest_height_m = 20000.0;
 
 tl::unexpected<Error> bad(std::string message) { return fail(ErrorKind::bad_input, std::move(message)); }
 
 Expected<void> check_in_range(std::string_view name, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {   // a NaN too
+  if (!(value >= low && value <= high)) {  // a NaN too
     return bad(fmt::format("{} = {} is outside {} to {}", name, value, low, high));
   }
   return {};
@@ -95,9 +95,8 @@ Expected<void> check_all_finite(const Recording& recording) {
   const auto velocity = check_finite("delta_v_mps", recording.delta_v_mps.data()->data(), rows, 3);
   const auto outer = check_finite("gimbal_outer_rad", recording.gimbal_outer_rad.data(), rows, 1);
   const auto inner = check_finite("gimbal_inner_rad", recording.gimbal_inner_rad.data(), rows, 1);
-  const auto temperature =
-      check_finite("temperature_c", recording.temperature_c.data(),
-                   recording.temperature_channels > 0 ? rows : 0, recording.temperature_channels);
+  const auto temperature = check_finite("temperature_c", recording.temperature_c.data(),
+                                        recording.temperature_channels > 0 ? rows : 0, recording.temperature_channels);
   const auto schedule =
       recording.schedule_deg.empty()
           ? Expected<void>{}
@@ -114,11 +113,12 @@ Expected<std::optional<std::string>> check_time(const Recording& recording, cons
   const std::vector<double>& time = recording.time_s;
   const double nominal = 1.0 / recording.sample_rate_hz;
   std::optional<std::string> gap;
-  double lost_s = 0.0;   // in gaps: not the rate's fault
+  double lost_s = 0.0;  // in gaps: not the rate's fault
   for (std::size_t row = 1; row < time.size(); ++row) {
     const double interval = time[row] - time[row - 1];
     if (!(interval > 0.0)) {
-      return bad(fmt::format("time_s: row {}: {} s is not after row {}'s {} s", row, time[row], row - 1, time[row - 1]));
+      return bad(
+          fmt::format("time_s: row {}: {} s is not after row {}'s {} s", row, time[row], row - 1, time[row - 1]));
     }
     if (interval > gap_intervals * nominal) {
       lost_s += interval - nominal;

@@ -41,8 +41,12 @@ std::string_view next_field(std::string_view& line, bool& more) {
   more = end != std::string_view::npos;
   std::string_view field = line.substr(0, end);
   line.remove_prefix(more ? end + 1 : line.size());
-  while (field.starts_with(' ')) field.remove_prefix(1);
-  while (field.ends_with(' ')) field.remove_suffix(1);
+  while (field.starts_with(' ')) {
+    field.remove_prefix(1);
+  }
+  while (field.ends_with(' ')) {
+    field.remove_suffix(1);
+  }
   return field;
 }
 
@@ -115,8 +119,8 @@ std::string quoted_field(std::string_view field) {
   return fmt::format("\"{}\"{}", field.substr(0, longest), field.size() > longest ? "..." : "");
 }
 
-Expected<void> parse_row(std::string_view line, const Header& header, const std::string& name,
-                         std::size_t line_number, std::vector<double>& values) {
+Expected<void> parse_row(std::string_view line, const Header& header, const std::string& name, std::size_t line_number,
+                         std::vector<double>& values) {
   std::size_t column = 0;
   for (bool more = true; more; ++column) {
     const std::string_view field = next_field(line, more);
@@ -191,9 +195,8 @@ std::string format_samples(const Recording& recording) {
   for (std::size_t k = 0; k < recording.size(); ++k) {
     const auto& theta = recording.delta_theta_rad[k];
     const auto& velocity = recording.delta_v_mps[k];
-    fmt::format_to(out, "{},{},{},{},{},{},{},{},{}", recording.time_s[k], theta[0], theta[1], theta[2],
-                   velocity[0], velocity[1], velocity[2], recording.gimbal_outer_rad[k],
-                   recording.gimbal_inner_rad[k]);
+    fmt::format_to(out, "{},{},{},{},{},{},{},{},{}", recording.time_s[k], theta[0], theta[1], theta[2], velocity[0],
+                   velocity[1], velocity[2], recording.gimbal_outer_rad[k], recording.gimbal_inner_rad[k]);
     for (std::size_t channel = 0; channel < recording.temperature_channels; ++channel) {
       fmt::format_to(out, ",{}", recording.temperature_c[k * recording.temperature_channels + channel]);
     }

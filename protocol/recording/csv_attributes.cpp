@@ -14,8 +14,7 @@ Expected<void> check_format(const TomlFile& file) {
     return tl::unexpected(format.error());
   }
   if (*format != recording_format) {
-    return tl::unexpected(
-        file.error_at("format", fmt::format("\"{}\", \"{}\" expected", *format, recording_format)));
+    return tl::unexpected(file.error_at("format", fmt::format("\"{}\", \"{}\" expected", *format, recording_format)));
   }
   const Expected<double> version = file.number("version");
   if (!version) {
@@ -71,12 +70,24 @@ Expected<Recording> parse_attributes(std::string_view toml, const std::string& n
     return {};
   };
   Expected<void> read = keep(sound_text(*file, "serial"), recording.serial);
-  if (read) read = keep(file->number("sample_rate_hz"), recording.sample_rate_hz);
-  if (read) read = keep(file->number("latitude_deg"), recording.latitude_deg);
-  if (read) read = keep(file->number("longitude_deg"), recording.longitude_deg);
-  if (read) read = keep(file->number("height_m"), recording.height_m);
-  if (read) read = keep(file->optional_number("dwell_s"), recording.dwell_s);
-  if (read) read = keep(file->optional_number("rotation_s"), recording.rotation_s);
+  if (read) {
+    read = keep(file->number("sample_rate_hz"), recording.sample_rate_hz);
+  }
+  if (read) {
+    read = keep(file->number("latitude_deg"), recording.latitude_deg);
+  }
+  if (read) {
+    read = keep(file->number("longitude_deg"), recording.longitude_deg);
+  }
+  if (read) {
+    read = keep(file->number("height_m"), recording.height_m);
+  }
+  if (read) {
+    read = keep(file->optional_number("dwell_s"), recording.dwell_s);
+  }
+  if (read) {
+    read = keep(file->optional_number("rotation_s"), recording.rotation_s);
+  }
   if (read && file->has("start_time_utc")) {
     read = keep(sound_text(*file, "start_time_utc"), recording.start_time_utc);
   }

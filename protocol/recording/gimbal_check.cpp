@@ -26,9 +26,7 @@ Eigen::Quaterniond integrated_rotation(const Recording& recording, std::size_t f
   return rotation.normalized();
 }
 
-double angle_deg(const Eigen::Quaterniond& rotation) {
-  return Eigen::AngleAxisd(rotation).angle() / units::degree;
-}
+double angle_deg(const Eigen::Quaterniond& rotation) { return Eigen::AngleAxisd(rotation).angle() / units::degree; }
 
 }  // namespace
 

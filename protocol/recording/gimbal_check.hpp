@@ -12,10 +12,10 @@ namespace selfcal {
 struct GimbalContradiction {
   std::size_t first_row = 0;
   std::size_t last_row = 0;
-  double outer_turn_deg = 0.0;      // of the read-out, first row to last row, within half a turn
+  double outer_turn_deg = 0.0;  // of the read-out, first row to last row, within half a turn
   double inner_turn_deg = 0.0;
-  double gyro_turn_deg = 0.0;       // angle that the gyros integrate to
-  double disagreement_deg = 0.0;    // angle of the rotation between the two
+  double gyro_turn_deg = 0.0;     // angle that the gyros integrate to
+  double disagreement_deg = 0.0;  // angle of the rotation between the two
   double tolerance_deg = 0.0;
 };
 

@@ -119,7 +119,7 @@ Expected<std::string> Reader::text(const char* attribute) const {
       return bad("attribute {}: {}", attribute, hdf5::last_error());
     }
     value.assign(buffer.data(), strnlen(buffer.data(), size));
-    value.erase(value.find_last_not_of(' ') + 1);   // space-padded strings
+    value.erase(value.find_last_not_of(' ') + 1);  // space-padded strings
   }
   if (const auto fault = text_fault(value)) {
     return bad("attribute {}: {}", attribute, *fault);
@@ -150,10 +150,9 @@ Expected<void> Reader::read_attributes(Recording& recording) const {
     const char* name;
     double* to;
   };
-  for (const auto& [attribute, to] : {Number{"sample_rate_hz", &recording.sample_rate_hz},
-                                      Number{"latitude_deg", &recording.latitude_deg},
-                                      Number{"longitude_deg", &recording.longitude_deg},
-                                      Number{"height_m", &recording.height_m}}) {
+  for (const auto& [attribute, to] :
+       {Number{"sample_rate_hz", &recording.sample_rate_hz}, Number{"latitude_deg", &recording.latitude_deg},
+        Number{"longitude_deg", &recording.longitude_deg}, Number{"height_m", &recording.height_m}}) {
     const Expected<double> value = number(attribute);
     if (!value) {
       return tl::unexpected(value.error());
@@ -249,16 +248,15 @@ Expected<std::vector<std::array<double, Columns>>> Reader::table(const char* dat
     return tl::unexpected(opened.error());
   }
   if (shape.dimensions != 2 || shape.columns != Columns) {
-    const std::string found = shape.dimensions == 1 ? fmt::format("[{}]", shape.rows)
-                                                    : fmt::format("[{}, {}]", shape.rows, shape.columns);
+    const std::string found =
+        shape.dimensions == 1 ? fmt::format("[{}]", shape.rows) : fmt::format("[{}, {}]", shape.rows, shape.columns);
     return bad("dataset {}: shape {}, [N, {}] expected", dataset, found, Columns);
   }
   if (shape.rows > row_limit) {
     return bad("dataset {}: {} rows, at most {} allowed", dataset, shape.rows, row_limit);
   }
   std::vector<std::array<double, Columns>> values(shape.rows);
-  const Expected<void> read =
-      values.empty() ? Expected<void>{} : transfer(*opened, dataset, values.data()->data());
+  const Expected<void> read = values.empty() ? Expected<void>{} : transfer(*opened, dataset, values.data()->data());
   if (!read) {
     return tl::unexpected(read.error());
   }
@@ -302,11 +300,21 @@ Expected<Recording> Reader::read() {
     return {};
   };
   Expected<void> read = keep(column("time_s"), recording.time_s);
-  if (read) read = keep(table<3>("delta_theta_rad", most_rows), recording.delta_theta_rad);
-  if (read) read = keep(table<3>("delta_v_mps", most_rows), recording.delta_v_mps);
-  if (read) read = keep(column("gimbal_outer_rad"), recording.gimbal_outer_rad);
-  if (read) read = keep(column("gimbal_inner_rad"), recording.gimbal_inner_rad);
-  if (read) read = read_temperature(recording);
+  if (read) {
+    read = keep(table<3>("delta_theta_rad", most_rows), recording.delta_theta_rad);
+  }
+  if (read) {
+    read = keep(table<3>("delta_v_mps", most_rows), recording.delta_v_mps);
+  }
+  if (read) {
+    read = keep(column("gimbal_outer_rad"), recording.gimbal_outer_rad);
+  }
+  if (read) {
+    read = keep(column("gimbal_inner_rad"), recording.gimbal_inner_rad);
+  }
+  if (read) {
+    read = read_temperature(recording);
+  }
   if (read && has_dataset("schedule_deg")) {
     read = keep(table<2>("schedule_deg", most_positions), recording.schedule_deg);
   }

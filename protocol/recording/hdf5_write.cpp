@@ -13,8 +13,8 @@ namespace {
 
 using hdf5::Handle;
 
-constexpr hsize_t chunk_rows = 16384;      // 128 kB a column: large enough for deflate, small beside the 1 MB cache
-constexpr unsigned deflate_level = 4;      // level 9 is 4 times slower for 2 % less
+constexpr hsize_t chunk_rows = 16384;  // 128 kB a column: large enough for deflate, small beside the 1 MB cache
+constexpr unsigned deflate_level = 4;  // level 9 is 4 times slower for 2 % less
 constexpr std::size_t image_increment = std::size_t{4} << 20;
 
 bool write_text(hid_t file, const char* name, const std::string& value) {
@@ -49,10 +49,9 @@ bool write_dataset(hid_t file, const char* name, const double* values, hsize_t r
       H5Pset_deflate(layout.get(), deflate_level) < 0) {
     return false;
   }
-  const Handle dataset(
-      H5Dcreate2(file, name, H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, layout.get(), H5P_DEFAULT), H5Dclose);
-  return dataset &&
-         H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0;
+  const Handle dataset(H5Dcreate2(file, name, H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, layout.get(), H5P_DEFAULT),
+                       H5Dclose);
+  return dataset && H5Dwrite(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0;
 }
 
 bool write_attributes(hid_t file, const Recording& recording) {
@@ -79,8 +78,7 @@ bool write_datasets(hid_t file, const Recording& recording) {
           write_dataset(file, "temperature_c", recording.temperature_c.data(), rows,
                         recording.temperature_channels > 1 ? recording.temperature_channels : 0)) &&
          (recording.schedule_deg.empty() ||
-          write_dataset(file, "schedule_deg", recording.schedule_deg.data()->data(),
-                        recording.schedule_deg.size(), 2));
+          write_dataset(file, "schedule_deg", recording.schedule_deg.data()->data(), recording.schedule_deg.size(), 2));
 }
 
 // The whole file in memory: HDF5 never sees the disk, so a full one cannot leave it with half-written metadata, and
@@ -88,8 +86,8 @@ bool write_datasets(hid_t file, const Recording& recording) {
 Expected<std::string> file_image(const Recording& recording) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   const bool in_memory = H5Pset_fapl_core(access.get(), image_increment, false) >= 0;
-  const Handle file(
-      in_memory ? H5Fcreate("recording", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()) : H5I_INVALID_HID, H5Fclose);
+  const Handle file(in_memory ? H5Fcreate("recording", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()) : H5I_INVALID_HID,
+                    H5Fclose);
   if (!file || !write_attributes(file.get(), recording) || !write_datasets(file.get(), recording) ||
       H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) {
     return fail(ErrorKind::internal, hdf5::last_error());
@@ -109,8 +107,8 @@ Expected<void> write_hdf5(const Recording& recording, const std::filesystem::pat
   for (const std::size_t rows : {recording.delta_theta_rad.size(), recording.delta_v_mps.size(),
                                  recording.gimbal_outer_rad.size(), recording.gimbal_inner_rad.size()}) {
     if (rows != recording.size() || rows == 0) {
-      return fail(ErrorKind::internal, fmt::format("{}: recording with columns of {} and {} rows", path.string(),
-                                                   recording.size(), rows));
+      return fail(ErrorKind::internal,
+                  fmt::format("{}: recording with columns of {} and {} rows", path.string(), recording.size(), rows));
     }
   }
   const Expected<std::string> image = file_image(recording);

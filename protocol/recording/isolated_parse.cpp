@@ -58,7 +58,8 @@ Expected<Recording> parse_isolated(const std::string& name, const std::function<
   const SharedMemory memory;
   const pid_t child = memory.descriptor < 0 ? -1 : ::fork();
   if (child < 0) {
-    return fail(ErrorKind::internal, fmt::format("{}: cannot start a process to read it: {}", name, std::strerror(errno)));
+    return fail(ErrorKind::internal,
+                fmt::format("{}: cannot start a process to read it: {}", name, std::strerror(errno)));
   }
   if (child == 0) {
     run_child(memory.descriptor, name, parse);
@@ -66,7 +67,8 @@ Expected<Recording> parse_isolated(const std::string& name, const std::function<
   int status = 0;
   while (::waitpid(child, &status, 0) < 0) {
     if (errno != EINTR) {
-      return fail(ErrorKind::internal, fmt::format("{}: lost the process that reads it: {}", name, std::strerror(errno)));
+      return fail(ErrorKind::internal,
+                  fmt::format("{}: lost the process that reads it: {}", name, std::strerror(errno)));
     }
   }
   if (WIFSIGNALED(status)) {
@@ -74,7 +76,8 @@ Expected<Recording> parse_isolated(const std::string& name, const std::function<
                                                   WTERMSIG(status), ::strsignal(WTERMSIG(status))));
   }
   if (WEXITSTATUS(status) != 0) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: damaged: its reader ended with status {}", name, WEXITSTATUS(status)));
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: damaged: its reader ended with status {}", name, WEXITSTATUS(status)));
   }
   ::lseek(memory.descriptor, 0, SEEK_SET);
   return read_bytes(memory.descriptor);

@@ -106,7 +106,7 @@ class Reader {
   bool good_ = true;
 };
 
-constexpr int no_error = 0;   // ErrorKind starts at 2
+constexpr int no_error = 0;  // ErrorKind starts at 2
 
 }  // namespace
 

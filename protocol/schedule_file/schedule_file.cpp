@@ -43,8 +43,7 @@ Expected<std::vector<double>> read_dwells(const TomlFile& file, std::size_t posi
   }
   for (const double dwell : *dwells) {
     if (!(dwell > 0.0) || dwell > max_dwell_s) {
-      return tl::unexpected(
-          file.error_at("dwell_s", fmt::format("{} s is outside (0, {}] s", dwell, max_dwell_s)));
+      return tl::unexpected(file.error_at("dwell_s", fmt::format("{} s is outside (0, {}] s", dwell, max_dwell_s)));
     }
   }
   return dwells;
@@ -89,8 +88,8 @@ Expected<Schedule> parse_schedule(std::string_view toml, const std::string& name
   }
   schedule.rotation_s = rotation->value_or(schedule.rotation_s);
   if (!(schedule.rotation_s > 0.0) || schedule.rotation_s > max_rotation_s) {
-    return tl::unexpected(file->error_at(
-        "rotation_s", fmt::format("{} s is outside (0, {}] s", schedule.rotation_s, max_rotation_s)));
+    return tl::unexpected(
+        file->error_at("rotation_s", fmt::format("{} s is outside (0, {}] s", schedule.rotation_s, max_rotation_s)));
   }
   return schedule;
 }
@@ -109,8 +108,7 @@ std::string format_schedule(const Schedule& schedule) {
   for (const GimbalPosition& position : schedule.positions) {
     text += fmt::format("  [{}, {}],\n", position.outer_deg, position.inner_deg);
   }
-  text += fmt::format("]\ndwell_s = [{}]\nrotation_s = {}\n", fmt::join(schedule.dwell_s, ", "),
-                      schedule.rotation_s);
+  text += fmt::format("]\ndwell_s = [{}]\nrotation_s = {}\n", fmt::join(schedule.dwell_s, ", "), schedule.rotation_s);
   return text;
 }
 

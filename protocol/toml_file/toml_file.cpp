@@ -147,8 +147,7 @@ Expected<std::vector<double>> TomlFile::numbers(std::string_view key) const {
   }
   std::vector<double> values;
   for (const toml::node& element : *array) {
-    const Expected<double> value =
-        number_of(document_->name, element, fmt::format("{}[{}]", key, values.size()));
+    const Expected<double> value = number_of(document_->name, element, fmt::format("{}[{}]", key, values.size()));
     if (!value) {
       return tl::unexpected(value.error());
     }

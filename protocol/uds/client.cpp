@@ -11,19 +11,15 @@ namespace {
 std::size_t identifier_size(std::uint8_t service) {
   switch (service) {
     case service::read_data:
-    case service::write_data:
-      return 2;
-    case service::routine_control:
-      return 3;
-    default:
-      return 0;
+    case service::write_data: return 2;
+    case service::routine_control: return 3;
+    default: return 0;
   }
 }
 
 }  // namespace
 
-Client::Client(const isotp::Options& options, const ClientTimings& timings)
-    : transport_(options), timings_(timings) {}
+Client::Client(const isotp::Options& options, const ClientTimings& timings) : transport_(options), timings_(timings) {}
 
 bool Client::request(std::span<const std::uint8_t> message, Time now) {
   if (waiting_ || !transport_.send(message, now)) {
@@ -80,22 +76,19 @@ std::optional<Outcome> Client::handle(const isotp::Events& events, Time now) {
       return std::nullopt;
     }
     switch (result) {
-      case isotp::Result::sent:
-        deadline_ = now + timings_.p2;
-        break;
+      case isotp::Result::sent: deadline_ = now + timings_.p2; break;
       case isotp::Result::reception_started:
-        deadline_.reset();   // N_Cr watches from here on
+        deadline_.reset();  // N_Cr watches from here on
         break;
       case isotp::Result::received:
         if (auto outcome = judge_message(now)) {
           return outcome;
         }
         break;
-      case isotp::Result::received_functional:   // another tester speaks
-      case isotp::Result::unexpected_frame:      // the message that displaced the old one may be the answer
+      case isotp::Result::received_functional:  // another tester speaks
+      case isotp::Result::unexpected_frame:     // the message that displaced the old one may be the answer
         break;
-      default:
-        return finish({Outcome::Kind::transport, {}, 0, result});
+      default: return finish({Outcome::Kind::transport, {}, 0, result});
     }
   }
   return std::nullopt;
@@ -110,7 +103,7 @@ std::optional<Outcome> Client::judge_message(Time now) {
     return finish({Outcome::Kind::positive, message, 0, isotp::Result::received});
   }
   if (!deadline_ && !transport_.sending()) {
-    deadline_ = now + timings_.p2;   // the stranger was a long message, which had stopped the clock
+    deadline_ = now + timings_.p2;  // the stranger was a long message, which had stopped the clock
   }
   if (message[0] != service::negative_response || message.size() < 2 || message[1] != service_) {
     return std::nullopt;

@@ -16,23 +16,23 @@
 namespace selfcal::uds {
 
 struct ClientTimings {
-  Time p2 = std::chrono::milliseconds(150);         // to the first frame of the answer, bus delay included
-  Time p2_star = std::chrono::seconds(5);           // the same after response-pending
-  Time pending_limit = std::chrono::seconds(60);    // of response-pending altogether
-  Time tester_present = std::chrono::seconds(2);    // interval; S3 of the server is 5 s
+  Time p2 = std::chrono::milliseconds(150);       // to the first frame of the answer, bus delay included
+  Time p2_star = std::chrono::seconds(5);         // the same after response-pending
+  Time pending_limit = std::chrono::seconds(60);  // of response-pending altogether
+  Time tester_present = std::chrono::seconds(2);  // interval; S3 of the server is 5 s
 };
 
 // What became of the request. Exactly one outcome comes of each request that is not cancelled.
 struct Outcome {
   enum class Kind : std::uint8_t {
-    positive,        // response: whole message, service + 0x40 first
-    negative,        // nrc
-    timeout,         // nothing within P2 or P2*
-    transport,       // ISO-TP failed: why
-    malformed,       // an answer to something else, or no answer at all
+    positive,   // response: whole message, service + 0x40 first
+    negative,   // nrc
+    timeout,    // nothing within P2 or P2*
+    transport,  // ISO-TP failed: why
+    malformed,  // an answer to something else, or no answer at all
   };
   Kind kind = Kind::positive;
-  std::span<const std::uint8_t> response;   // valid until the next on_frame()
+  std::span<const std::uint8_t> response;  // valid until the next on_frame()
   std::uint8_t nrc = 0;
   isotp::Result why = isotp::Result::sent;
 };
@@ -44,8 +44,8 @@ class Client {
   // False when a request is under way or the message cannot be sent.
   [[nodiscard]] bool request(std::span<const std::uint8_t> message, Time now);
   bool busy() const { return waiting_; }
-  void cancel();               // forget the request and drop what is under way; a late answer is ignored
-  void keep_session(bool keep, Time now);   // TesterPresent, response suppressed
+  void cancel();                           // forget the request and drop what is under way; a late answer is ignored
+  void keep_session(bool keep, Time now);  // TesterPresent, response suppressed
   void set_timings(const ClientTimings& timings) { timings_ = timings; }
 
   bool accepts(const can::CanFrame& frame) const { return transport_.accepts(frame); }
@@ -65,10 +65,10 @@ class Client {
   ClientTimings timings_;
   bool waiting_ = false;
   std::uint8_t service_ = 0;
-  std::array<std::uint8_t, 4> answered_by_{};   // how the positive response begins: service and identifier
+  std::array<std::uint8_t, 4> answered_by_{};  // how the positive response begins: service and identifier
   std::size_t answered_by_size_ = 0;
-  std::optional<Time> deadline_;         // P2 or P2*, runs while nothing is being received
-  std::optional<Time> pending_until_;    // no more response-pending after this
+  std::optional<Time> deadline_;       // P2 or P2*, runs while nothing is being received
+  std::optional<Time> pending_until_;  // no more response-pending after this
   std::optional<Time> next_tester_present_;
 };
 

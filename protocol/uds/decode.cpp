@@ -9,7 +9,7 @@
 namespace selfcal::uds {
 namespace {
 
-constexpr std::uint32_t longest_message = 65535;   // what is announced as longer is broken or not ours
+constexpr std::uint32_t longest_message = 65535;  // what is announced as longer is broken or not ours
 
 std::string stamp(Time time) {
   const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(time).count();
@@ -20,8 +20,8 @@ std::string status_line(const can::CanFrame& frame, Time time) {
   std::string line = fmt::format("{} status  ", stamp(time));
   for (const ins::Signal& signal : ins::status_signals) {
     if (signal.frame_id == frame.id) {
-      line += fmt::format(" {}={:g}{}", signal.name, ins::raw_signal(signal, frame.payload()) * signal.factor,
-                          signal.unit);
+      line +=
+          fmt::format(" {}={:g}{}", signal.name, ins::raw_signal(signal, frame.payload()) * signal.factor, signal.unit);
     }
   }
   return line;

@@ -41,7 +41,7 @@ class LogDecoder {
     std::uint32_t id = 0;
     std::string_view label;
     std::vector<std::uint8_t> bytes;
-    std::size_t length = 0;          // 0: no message under way
+    std::size_t length = 0;  // 0: no message under way
     std::uint8_t sequence = 0;
   };
   std::optional<std::string> on_stream(Stream& stream, const can::CanFrame& frame, Time time);

@@ -50,8 +50,7 @@ std::string body_text(std::uint8_t service, ByteView body, bool response) {
   switch (service) {
     case service::session_control:
       return body.empty() ? "" : fmt::format(" {}", session_name(body[0] & 0x7FU)) + data_text(body.subspan(1));
-    case service::security_access:
-      return body.empty() ? "" : security_text(body[0] & 0x7FU, body.subspan(1));
+    case service::security_access: return body.empty() ? "" : security_text(body[0] & 0x7FU, body.subspan(1));
     case service::read_data:
     case service::write_data:
       if (const auto did = in.get<std::uint16_t>(); in.ok()) {
@@ -76,8 +75,7 @@ std::string body_text(std::uint8_t service, ByteView body, bool response) {
       break;
     case service::transfer_data:
       return body.empty() ? "" : fmt::format(" block {}, {} bytes", body[0], body.size() - 1);
-    default:
-      break;
+    default: break;
   }
   return data_text(body);
 }

@@ -32,8 +32,8 @@ constexpr std::uint8_t positive(std::uint8_t service) { return static_cast<std::
 // Checks that the response starts as it must and has at least `minimum` bytes.
 Expected<void> check(ByteView response, std::uint8_t service, ByteView echo, std::size_t minimum) {
   if (response.size() < std::max(minimum, 1 + echo.size())) {
-    return fail(ErrorKind::device, fmt::format("{}: the response has only {} bytes", service_name(service),
-                                               response.size()));
+    return fail(ErrorKind::device,
+                fmt::format("{}: the response has only {} bytes", service_name(service), response.size()));
   }
   if (response[0] != positive(service)) {
     return fail(ErrorKind::device, fmt::format("{}: the response begins with 0x{:02X} instead of 0x{:02X}",
@@ -69,9 +69,7 @@ Bytes tester_present_request(bool suppress_response) {
 Bytes seed_request() { return message(service::security_access, security_seed_level); }
 Bytes key_request(ByteView key) { return with_tail(message(service::security_access, security_key_level), key); }
 Bytes read_request(std::uint16_t did) { return message(service::read_data, did); }
-Bytes write_request(std::uint16_t did, ByteView record) {
-  return with_tail(message(service::write_data, did), record);
-}
+Bytes write_request(std::uint16_t did, ByteView record) { return with_tail(message(service::write_data, did), record); }
 Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView option) {
   return with_tail(message(service::routine_control, code(action), routine), option);
 }

@@ -28,8 +28,8 @@ Bytes key_request(ByteView key);
 Bytes read_request(std::uint16_t did);
 Bytes write_request(std::uint16_t did, ByteView record);
 Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView option = {});
-Bytes upload_request(std::uint32_t first_page, std::uint32_t bytes);   // format 0x44; the address is a page number
-Bytes transfer_request(std::uint8_t block);                            // 1 first; after 0xFF comes 0x00
+Bytes upload_request(std::uint32_t first_page, std::uint32_t bytes);  // format 0x44; the address is a page number
+Bytes transfer_request(std::uint8_t block);                           // 1 first; after 0xFF comes 0x00
 Bytes transfer_exit_request();
 
 // Responses, as the client reads them
@@ -42,13 +42,13 @@ struct SessionTimings {
 // All zeros: already unlocked.
 [[nodiscard]] Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response);
 [[nodiscard]] Expected<void> read_key_response(ByteView response);
-[[nodiscard]] Expected<ByteView> read_read_response(ByteView response, std::uint16_t did);        // the record
+[[nodiscard]] Expected<ByteView> read_read_response(ByteView response, std::uint16_t did);  // the record
 [[nodiscard]] Expected<void> read_write_response(ByteView response, std::uint16_t did);
 [[nodiscard]] Expected<ByteView> read_routine_response(ByteView response, RoutineAction action,
-                                                       std::uint16_t routine);                    // the status record
-[[nodiscard]] Expected<std::uint32_t> read_upload_response(ByteView response);    // longest TransferData response, bytes
-[[nodiscard]] Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block);   // the data
-[[nodiscard]] Expected<ByteView> read_transfer_exit_response(ByteView response);                  // the parameter record
+                                                       std::uint16_t routine);  // the status record
+[[nodiscard]] Expected<std::uint32_t> read_upload_response(ByteView response);  // longest TransferData response, bytes
+[[nodiscard]] Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block);  // the data
+[[nodiscard]] Expected<ByteView> read_transfer_exit_response(ByteView response);                 // the parameter record
 
 // What a TransferData response of `max_block` bytes carries: two of them are service and block counter.
 inline constexpr std::size_t transfer_overhead = 2;

@@ -11,7 +11,7 @@ namespace selfcal::uds {
 Expected<std::array<std::uint8_t, 16>> answer_seed(const SecurityKey& key, std::span<const std::uint8_t> seed) {
   const std::unique_ptr<EVP_MAC, void (*)(EVP_MAC*)> mac(EVP_MAC_fetch(nullptr, "CMAC", nullptr), &EVP_MAC_free);
   const std::unique_ptr<EVP_MAC_CTX, void (*)(EVP_MAC_CTX*)> context(mac ? EVP_MAC_CTX_new(mac.get()) : nullptr,
-                                                                    &EVP_MAC_CTX_free);
+                                                                     &EVP_MAC_CTX_free);
   char cipher[] = "AES-128-CBC";
   const OSSL_PARAM parameters[] = {OSSL_PARAM_construct_utf8_string(OSSL_MAC_PARAM_CIPHER, cipher, 0),
                                    OSSL_PARAM_construct_end()};

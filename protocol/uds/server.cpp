@@ -7,9 +7,8 @@ namespace selfcal::uds {
 namespace {
 
 bool has_sub_function(std::uint8_t service) {
-  return service == service::session_control || service == service::ecu_reset ||
-         service == service::security_access || service == service::routine_control ||
-         service == service::tester_present;
+  return service == service::session_control || service == service::ecu_reset || service == service::security_access ||
+         service == service::routine_control || service == service::tester_present;
 }
 
 // ISO 14229-1, 7.5.3: a functional request gets no answer that says "not I".
@@ -19,10 +18,8 @@ bool silent_when_functional(std::uint8_t nrc) {
     case Nrc::sub_function_not_supported:
     case Nrc::request_out_of_range:
     case Nrc::sub_function_not_supported_in_session:
-    case Nrc::service_not_supported_in_session:
-      return true;
-    default:
-      return false;
+    case Nrc::service_not_supported_in_session: return true;
+    default: return false;
   }
 }
 
@@ -47,10 +44,10 @@ void Server::handle(const isotp::Events& events, Time now) {
     if (result == isotp::Result::received || result == isotp::Result::received_functional) {
       take_request(result == isotp::Result::received_functional, now);
     } else if (result == isotp::Result::sent && !queued_.empty()) {
-      static_cast<void>(transport_.send(queued_, now));   // just became free, and the length was checked
+      static_cast<void>(transport_.send(queued_, now));  // just became free, and the length was checked
       queued_.clear();
     } else if (isotp::is_failure(result) && isotp::concerns_sending(result)) {
-      queued_.clear();   // the tester is gone or deaf; it will ask again
+      queued_.clear();  // the tester is gone or deaf; it will ask again
     }
   }
 }
@@ -59,7 +56,7 @@ void Server::take_request(bool functional, Time now) {
   const auto message = transport_.message();
   static constexpr std::array<std::uint8_t, 2> keep_alive = {service::tester_present, suppress_response_bit};
   if (std::ranges::equal(message, keep_alive) || !idle()) {
-    return;   // the session timer was renewed; and of a second request beside the first one the client hears nothing
+    return;  // the session timer was renewed; and of a second request beside the first one the client hears nothing
   }
   request_.assign(message.begin(), message.end());
   functional_ = functional;
@@ -74,12 +71,12 @@ void Server::take_request(bool functional, Time now) {
     return;
   }
   later_ = true;
-  pending_at_ = now + timings_.p2 / 2;   // well before the tester loses patience
+  pending_at_ = now + timings_.p2 / 2;  // well before the tester loses patience
 }
 
 void Server::respond(std::span<const std::uint8_t> response, Time now) {
   if (!later_) {
-    return;   // a reset came between
+    return;  // a reset came between
   }
   later_ = false;
   pending_at_.reset();
@@ -100,7 +97,7 @@ void Server::deliver(std::span<const std::uint8_t> response, Time now) {
     return;
   }
   if (!transport_.send(response, now)) {
-    queued_.assign(response.begin(), response.end());   // response-pending is still on its way out
+    queued_.assign(response.begin(), response.end());  // response-pending is still on its way out
   }
 }
 
@@ -136,7 +133,7 @@ std::optional<Time> Server::next_deadline() const {
 void Server::run_session_timer(bool run, Time now) {
   if (!run) {
     session_until_.reset();
-  } else if (!session_until_) {   // whoever asks again and again must not wind it up
+  } else if (!session_until_) {  // whoever asks again and again must not wind it up
     session_until_ = now + timings_.s3;
   }
 }

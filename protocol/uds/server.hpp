@@ -18,12 +18,12 @@ class RequestHandler {
   virtual ~RequestHandler() = default;
 
   enum class Answer : std::uint8_t {
-    now,      // `response` holds the message, positive or negative
-    later,    // Server::respond() will be called; response-pending is sent meanwhile
+    now,    // `response` holds the message, positive or negative
+    later,  // Server::respond() will be called; response-pending is sent meanwhile
   };
   // request has at least one byte. `response` is empty, with capacity kept from call to call.
   virtual Answer handle(std::span<const std::uint8_t> request, Bytes& response, Time now) = 0;
-  virtual void session_expired(Time now) = 0;   // no request for S3: back to the default session, locked
+  virtual void session_expired(Time now) = 0;  // no request for S3: back to the default session, locked
 };
 
 struct ServerTimings {
@@ -47,11 +47,11 @@ class Server {
   // The answer to a request for which the handler said `later`.
   void respond(std::span<const std::uint8_t> response, Time now);
   bool responding_later() const { return later_; }
-  bool idle() const { return !later_ && !transport_.sending(); }   // everything is out: a reset may happen
+  bool idle() const { return !later_ && !transport_.sending(); }  // everything is out: a reset may happen
 
   // On in every session but the default one; may be told over and over, only requests renew it.
   void run_session_timer(bool run, Time now);
-  void reset();                                 // as after power-on
+  void reset();  // as after power-on
 
  private:
   void handle(const isotp::Events& events, Time now);
@@ -63,12 +63,12 @@ class Server {
   RequestHandler& handler_;
   Bytes request_;
   Bytes response_;
-  Bytes queued_;                         // an answer that waits until response-pending is out
+  Bytes queued_;  // an answer that waits until response-pending is out
   bool later_ = false;
-  bool functional_ = false;              // how the request in hand came
-  bool suppress_ = false;                // it asked for no positive response
-  bool told_pending_ = false;            // response-pending was sent: the answer must be sent too
-  std::optional<Time> pending_at_;       // next response-pending
+  bool functional_ = false;         // how the request in hand came
+  bool suppress_ = false;           // it asked for no positive response
+  bool told_pending_ = false;       // response-pending was sent: the answer must be sent too
+  std::optional<Time> pending_at_;  // next response-pending
   std::optional<Time> session_until_;
 };
 

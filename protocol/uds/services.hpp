@@ -21,17 +21,17 @@ inline constexpr std::uint8_t tester_present = 0x3E;
 inline constexpr std::uint8_t negative_response = 0x7F;
 }  // namespace service
 
-inline constexpr std::uint8_t positive_offset = 0x40;         // response service = request service + this
-inline constexpr std::uint8_t suppress_response_bit = 0x80;   // in the sub-function
+inline constexpr std::uint8_t positive_offset = 0x40;        // response service = request service + this
+inline constexpr std::uint8_t suppress_response_bit = 0x80;  // in the sub-function
 
-enum class Session : std::uint8_t { standard = 1, programming = 2, extended = 3 };   // "default" is a keyword
+enum class Session : std::uint8_t { standard = 1, programming = 2, extended = 3 };  // "default" is a keyword
 enum class ResetType : std::uint8_t { hard = 1, key_off_on = 2, soft = 3 };
 enum class RoutineAction : std::uint8_t { start = 1, stop = 2, result = 3 };
 inline constexpr std::uint8_t security_seed_level = 1;
 inline constexpr std::uint8_t security_key_level = 2;
 
 enum class Nrc : std::uint8_t {
-  none = 0x00,                             // not a response: "no objection"
+  none = 0x00,  // not a response: "no objection"
   general_reject = 0x10,
   service_not_supported = 0x11,
   sub_function_not_supported = 0x12,
@@ -54,8 +54,8 @@ enum class Nrc : std::uint8_t {
   service_not_supported_in_session = 0x7F,
 };
 
-std::string_view service_name(std::uint8_t service);   // of the request; "unknown service"
-std::string_view nrc_name(std::uint8_t nrc);           // as in ISO 14229-1, "unknown" for the rest
-std::string describe_nrc(std::uint8_t nrc);            // "conditionsNotCorrect (0x22)"
+std::string_view service_name(std::uint8_t service);  // of the request; "unknown service"
+std::string_view nrc_name(std::uint8_t nrc);          // as in ISO 14229-1, "unknown" for the rest
+std::string describe_nrc(std::uint8_t nrc);           // "conditionsNotCorrect (0x22)"
 
 }  // namespace selfcal::uds

@@ -16,13 +16,13 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t frames_per_call = 128;
-constexpr double status_interval_s = 0.2;              // INS time, but
-constexpr double least_real_interval_s = 0.02;         // never more often than this in real time
+constexpr double status_interval_s = 0.2;       // INS time, but
+constexpr double least_real_interval_s = 0.02;  // never more often than this in real time
 // Largest steps of the INS's clock in one turn of the loop. During an upload small ones, so that frames go out as a
 // real bus would carry them, however fast the clock is asked to run. A compressed clock does not make up for what the
 // host takes from all of us: the tester's time-outs run in real time, and it would meet an INS that is far ahead.
 constexpr double longest_step_s = 2.0;
-constexpr double longest_compressed_step_s = 0.02;   // times the speed
+constexpr double longest_compressed_step_s = 0.02;  // times the speed
 constexpr double longest_step_in_upload_s = 0.025;
 // How long the loop sleeps where no frame comes: while nothing is under way, no longer than until the next status.
 constexpr int short_sleep_ms = 1, long_sleep_ms = 10;
@@ -31,9 +31,7 @@ constexpr int short_sleep_ms = 1, long_sleep_ms = 10;
 constexpr Time patience = 200ms;
 constexpr std::uint64_t fault_stream = 77;
 
-Time real_now() {
-  return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch());
-}
+Time real_now() { return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch()); }
 
 double seconds(Time t) { return std::chrono::duration<double>(t).count(); }
 
@@ -89,9 +87,7 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       random_(options.seed, fault_stream),
       faulty_(options.scenario) {}
 
-Time BusNode::ins_time() const {
-  return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_));
-}
+Time BusNode::ins_time() const { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_)); }
 
 void BusNode::reset(Time now) {
   instrument_.power_on(now_s_);
@@ -134,7 +130,7 @@ void BusNode::receive(Time now) {
       now_s_ = transaction() ? heard_s : now_s_;
       bus_.transmit(received.frame, ins_time());
       tester_heard_ = now;
-      if (instrument_.ready() && !acts(FaultKind::bus_off)) {   // nobody listens while the INS starts
+      if (instrument_.ready() && !acts(FaultKind::bus_off)) {  // nobody listens while the INS starts
         server_.on_frame(received.frame, now);
       }
     }
@@ -257,7 +253,7 @@ bool BusNode::send_all(std::span<const can::CanFrame> frames) {
       return false;
     }
     done += *sent;
-    if (done < frames.size()) {   // the queue is full: wait for the kernel, the INS's clock stands meanwhile
+    if (done < frames.size()) {  // the queue is full: wait for the kernel, the INS's clock stands meanwhile
       pollfd waiting{socket_->fd(), POLLOUT, 0};
       ::poll(&waiting, 1, 1);
     }
@@ -389,7 +385,7 @@ void BusNode::run(const volatile int& stop) {
     }
     pollfd waiting{socket_ ? socket_->fd() : -1, POLLIN, 0};
     if (more_to_send_) {
-      ::sched_yield();   // on one processor the tester takes what it was sent, instead of the queue filling up
+      ::sched_yield();  // on one processor the tester takes what it was sent, instead of the queue filling up
     }
     ::poll(&waiting, 1, sleep_ms());
   }

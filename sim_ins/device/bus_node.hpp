@@ -22,7 +22,7 @@ namespace selfcal::sim {
 struct FrameFaults {
   double drop = 0.0;
   double duplicate = 0.0;
-  double corrupt = 0.0;         // one bit of the data flips, as if its CRC had let it pass
+  double corrupt = 0.0;  // one bit of the data flips, as if its CRC had let it pass
 };
 
 struct NodeOptions {
@@ -30,16 +30,16 @@ struct NodeOptions {
   std::uint32_t request_id = 0;
   std::uint32_t response_id = 0;
   std::uint32_t functional_id = 0;
-  std::uint32_t status_id = 0;           // and status_id + 1
+  std::uint32_t status_id = 0;  // and status_id + 1
   bool extended_ids = false;
   bool fd = false;
   can::BitRates rates;
-  double speed = 1.0;                    // INS seconds per second
-  double turnaround_ms = 0.0;            // INS time from an answer to the tester's next request, in an upload
-  double patience = 1.0;                 // stretches N_As, N_Bs, N_Cr and S3, which run in real time
+  double speed = 1.0;          // INS seconds per second
+  double turnaround_ms = 0.0;  // INS time from an answer to the tester's next request, in an upload
+  double patience = 1.0;       // stretches N_As, N_Bs, N_Cr and S3, which run in real time
   FrameFaults frame_faults;
-  Scenario scenario;                     // faults of the bus, of status and answers, by time
-  std::optional<double> reset_at_s;      // INS time of one spontaneous reset
+  Scenario scenario;                 // faults of the bus, of status and answers, by time
+  std::optional<double> reset_at_s;  // INS time of one spontaneous reset
   std::uint64_t seed = 1;
   DiagnosticOptions diagnostics;
 };
@@ -83,13 +83,13 @@ class BusNode {
   Turnaround turnaround_;
   Random random_;
   FaultyBus faulty_;
-  std::vector<can::CanFrame> spoilt_;   // kept for its storage
+  std::vector<can::CanFrame> spoilt_;  // kept for its storage
   double next_intrusion_s_ = 0.0;
 
-  double now_s_ = 0.0;              // INS time
-  Time step_began_{0};              // INS time before its last step
+  double now_s_ = 0.0;  // INS time
+  Time step_began_{0};  // INS time before its last step
   Time real_before_{0};
-  Time tester_heard_{0};            // real time of its last frame
+  Time tester_heard_{0};  // real time of its last frame
   Time retry_at_{0};
   bool more_to_send_ = false;
   double next_status_s_ = 0.0;

@@ -15,16 +15,16 @@ namespace {
 using uds::Nrc;
 
 constexpr std::string_view software_version = "sim_ins 1.0";
-constexpr std::uint32_t free_attempts = 3;                   // wrong keys before the delay
+constexpr std::uint32_t free_attempts = 3;  // wrong keys before the delay
 constexpr Time delay_after_wrong_keys = std::chrono::seconds(10);
 constexpr uds::SessionTimings timings{std::chrono::milliseconds(50), std::chrono::seconds(5)};
 
 uds::Bytes as_bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
 template <typename Array>
-uds::Bytes as_bytes(const Array& array)
-  requires requires { array.size(); } && (!std::is_convertible_v<Array, std::string_view>)
-{
+uds::Bytes as_bytes(const Array& array) requires requires {
+  array.size();
+} &&(!std::is_convertible_v<Array, std::string_view>) {
   return {array.begin(), array.end()};
 }
 
@@ -51,8 +51,8 @@ void Diagnostics::session_expired(Time) {
 
 uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& response, Time now) {
   const double written_before_s = instrument_.flash().ready_at_s();
-  const Reply reply = options_.answer_all_with ? Reply(tl::unexpected(*options_.answer_all_with))
-                                               : dispatch(request, now, response);
+  const Reply reply =
+      options_.answer_all_with ? Reply(tl::unexpected(*options_.answer_all_with)) : dispatch(request, now, response);
   if (!reply) {
     const auto negative = uds::negative_response(request[0], reply.error());
     response.assign(negative.begin(), negative.end());
@@ -63,7 +63,7 @@ uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& respon
   if (written_at_s <= written_before_s) {
     return Answer::now;
   }
-  answer_ = Waiting{response, written_at_s};   // nothing is said to be written before it is
+  answer_ = Waiting{response, written_at_s};  // nothing is said to be written before it is
   return Answer::later;
 }
 
@@ -114,11 +114,10 @@ Diagnostics::Reply Diagnostics::session_control(View request) {
     return tl::unexpected(Nrc::incorrect_message_length);
   }
   const auto session = static_cast<uds::Session>(request[1] & ~uds::suppress_response_bit);
-  if (session != uds::Session::standard && session != uds::Session::programming &&
-      session != uds::Session::extended) {
+  if (session != uds::Session::standard && session != uds::Session::programming && session != uds::Session::extended) {
     return tl::unexpected(Nrc::sub_function_not_supported);
   }
-  if (session != session_) {   // a change of session locks again
+  if (session != session_) {  // a change of session locks again
     unlocked_ = false;
     upload_.reset();
   }
@@ -165,7 +164,7 @@ Diagnostics::Reply Diagnostics::give_seed(Time now) {
     return tl::unexpected(Nrc::required_time_delay_not_expired);
   }
   std::array<std::uint8_t, uds::seed_bytes> seed{};
-  if (unlocked_) {   // all zeros: nothing to answer
+  if (unlocked_) {  // all zeros: nothing to answer
     return uds::seed_response(seed);
   }
   if (options_.seed_salt != 0) {
@@ -184,7 +183,7 @@ Diagnostics::Reply Diagnostics::take_key(View key, Time now) {
     return tl::unexpected(Nrc::request_sequence_error);
   }
   const auto expected = uds::answer_seed(options_.key, *seed_);
-  seed_.reset();   // an answer counts once: a recorded one is worth nothing
+  seed_.reset();  // an answer counts once: a recorded one is worth nothing
   const Counters& counters = instrument_.counters().get();
   if (!expected || !uds::equal_in_constant_time(*expected, key)) {
     const std::uint32_t wrong = counters.wrong_keys + 1;
@@ -271,7 +270,7 @@ Diagnostics::Reply Diagnostics::write_data(View request) {
       return tl::unexpected(Nrc::request_out_of_range);
     }
     if (!instrument_.coefficients().write_inactive(*set)) {
-      return tl::unexpected(Nrc::general_programming_failure);   // not erased
+      return tl::unexpected(Nrc::general_programming_failure);  // not erased
     }
   }
   return uds::write_response(id);
@@ -371,7 +370,7 @@ Diagnostics::Reply Diagnostics::transfer(View request, uds::Bytes& response) {
   Upload& u = *upload_;
   const std::uint8_t block = request[1];
   if (block == static_cast<std::uint8_t>(u.next_block - 1) && u.last_size > 0) {
-    u.done -= u.last_size;   // the block before, asked for again
+    u.done -= u.last_size;  // the block before, asked for again
   } else if (block == u.next_block) {
     ++u.next_block;
   } else {

@@ -14,9 +14,9 @@ namespace selfcal::sim {
 
 struct DiagnosticOptions {
   uds::SecurityKey key{};
-  std::uint32_t longest_response = 4095;      // of TransferData, bytes
-  std::optional<uds::Nrc> answer_all_with;    // fault on demand: every request is refused so
-  std::uint64_t seed_salt = 0;                // 0: seeds from the system's entropy; else reproducible (tests)
+  std::uint32_t longest_response = 4095;    // of TransferData, bytes
+  std::optional<uds::Nrc> answer_all_with;  // fault on demand: every request is refused so
+  std::uint64_t seed_salt = 0;              // 0: seeds from the system's entropy; else reproducible (tests)
 };
 
 class Diagnostics : public uds::RequestHandler {
@@ -28,7 +28,7 @@ class Diagnostics : public uds::RequestHandler {
   std::optional<uds::Bytes> take_answer();
   void session_expired(Time now) override;
 
-  void power_on(Time now);                            // default session, locked
+  void power_on(Time now);  // default session, locked
   void answer_all_with(std::optional<uds::Nrc> nrc) { options_.answer_all_with = nrc; }
   void set_instrument_time(double now_s) { now_s_ = now_s; }
   bool unlocked() const { return unlocked_; }
@@ -63,21 +63,21 @@ class Diagnostics : public uds::RequestHandler {
   uds::Session session_ = uds::Session::standard;
   bool unlocked_ = false;
   bool reset_wanted_ = false;
-  std::optional<std::array<std::uint8_t, uds::seed_bytes>> seed_;   // given out, not yet answered: used once
+  std::optional<std::array<std::uint8_t, uds::seed_bytes>> seed_;  // given out, not yet answered: used once
   std::uint64_t seeds_given_ = 0;
   Time locked_until_{0};
 
   struct Waiting {
     uds::Bytes response;
-    double due_s = 0.0;              // INS time
+    double due_s = 0.0;  // INS time
   };
   std::optional<Waiting> answer_;
 
   struct Upload {
     std::uint32_t first_page = 0, bytes = 0;
-    std::uint32_t done = 0;          // bytes handed over
+    std::uint32_t done = 0;  // bytes handed over
     std::uint8_t next_block = 1;
-    std::uint32_t last_size = 0;     // of the block before, should it be asked for again
+    std::uint32_t last_size = 0;  // of the block before, should it be asked for again
   };
   std::optional<Upload> upload_;
   std::uint32_t pages_served_ = 0;

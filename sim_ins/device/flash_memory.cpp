@@ -100,7 +100,8 @@ std::uint8_t* FlashMemory::place(std::size_t offset) {
 
 // One operation of the chip. Where the power goes in it, all before it is done, and of it what the power lasts for.
 void FlashMemory::operate(std::size_t offset, std::span<const std::uint8_t> result, double duration_s) {
-  const auto lasts = budget_ ? static_cast<std::size_t>(std::min<std::uint64_t>(*budget_, result.size())) : result.size();
+  const auto lasts =
+      budget_ ? static_cast<std::size_t>(std::min<std::uint64_t>(*budget_, result.size())) : result.size();
   std::uint8_t* const here = place(offset);
   const double begin_s = ready_at_s();
   pending_.push_back({offset,
@@ -121,7 +122,7 @@ void FlashMemory::operate(std::size_t offset, std::span<const std::uint8_t> resu
 
 void FlashMemory::program(std::size_t offset, std::span<const std::uint8_t> bytes) {
   assert(offset + bytes.size() <= size());
-  while (!bytes.empty()) {   // one page of the chip after another
+  while (!bytes.empty()) {  // one page of the chip after another
     const std::size_t count = std::min(flash_program_bytes - offset % flash_program_bytes, bytes.size());
     std::array<std::uint8_t, flash_program_bytes> result{};
     std::transform(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count), place(offset), result.begin(),
@@ -160,7 +161,7 @@ void FlashMemory::advance(double now_s) {
 
 void FlashMemory::cut_power(double now_s) {
   advance(now_s);
-  while (!pending_.empty()) {   // the latest first, should two have written to the same place
+  while (!pending_.empty()) {  // the latest first, should two have written to the same place
     const Operation& operation = pending_.back();
     std::copy(operation.before.begin() + static_cast<std::ptrdiff_t>(operation.done), operation.before.end(),
               place(operation.offset) + operation.done);
@@ -189,7 +190,7 @@ void FlashMemory::store(std::size_t offset, std::span<const std::uint8_t> bytes)
 void FlashMemory::write(std::size_t offset, std::span<const std::uint8_t> bytes) const {
   while (!bytes.empty()) {
     const ssize_t put = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (put <= 0) {   // a full disk under the simulator: the chip itself has no such failure
+    if (put <= 0) {  // a full disk under the simulator: the chip itself has no such failure
       fmt::print(stderr, "sim_ins: FLASH file: {}\n", std::strerror(errno));
       return;
     }

@@ -21,8 +21,8 @@ inline constexpr std::size_t flash_program_bytes = 256;  // largest unit that is
 // Typical times of a serial NOR chip: Winbond W25Q64JV, AC characteristics, t_PP 0.8 ms (at most 3 ms) and t_SE 45 ms (at
 // most 400 ms).
 struct FlashTimings {
-  double program_s = 0.8e-3;   // of up to 256 bytes that lie in one page of the chip
-  double erase_s = 45e-3;      // of a block
+  double program_s = 0.8e-3;  // of up to 256 bytes that lie in one page of the chip
+  double erase_s = 45e-3;     // of a block
 };
 
 // Thrown by a write during which the power went; nobody but the owner of the simulated power supply catches it.
@@ -40,14 +40,14 @@ class FlashMemory {
   // What the chip will hold when it has done all that was asked of it: the INS keeps in RAM what it is writing. Within
   // one block.
   std::span<const std::uint8_t> read(std::size_t offset, std::size_t count) const;
-  void program(std::size_t offset, std::span<const std::uint8_t> bytes);   // new = old AND bytes, byte after byte
+  void program(std::size_t offset, std::span<const std::uint8_t> bytes);  // new = old AND bytes, byte after byte
   void erase(std::size_t block);
   std::uint32_t erase_count(std::size_t block) const { return wear_[block]; }
   std::size_t size() const { return blocks_.size() * flash_block_bytes; }
 
   // The clock, seconds on any scale that does not go back: what is done by now is done for good.
   void advance(double now_s);
-  double ready_at_s() const;                // when all that was asked for is done; in the past where nothing waits
+  double ready_at_s() const;  // when all that was asked for is done; in the past where nothing waits
   bool busy() const { return !pending_.empty(); }
 
   // The power goes, now: bytes that the chip had not come to are as they were before.
@@ -59,9 +59,9 @@ class FlashMemory {
  private:
   struct Operation {
     std::size_t offset = 0;
-    std::vector<std::uint8_t> before;      // what a power cut leaves of the bytes not done
+    std::vector<std::uint8_t> before;  // what a power cut leaves of the bytes not done
     std::vector<std::uint8_t> after;
-    std::size_t done = 0;                  // bytes
+    std::size_t done = 0;  // bytes
     double begin_s = 0.0, end_s = 0.0;
   };
 
@@ -69,19 +69,19 @@ class FlashMemory {
   void operate(std::size_t offset, std::span<const std::uint8_t> result, double duration_s);
   void settle(Operation& operation, std::size_t done);
   void store(std::size_t offset, std::span<const std::uint8_t> bytes);
-  void write(std::size_t offset, std::span<const std::uint8_t> bytes) const;   // to the file
+  void write(std::size_t offset, std::span<const std::uint8_t> bytes) const;  // to the file
 
   using Block = std::array<std::uint8_t, flash_block_bytes>;
-  std::uint8_t* place(std::size_t offset);   // with a block of its own behind it
+  std::uint8_t* place(std::size_t offset);  // with a block of its own behind it
 
-  std::vector<std::unique_ptr<Block>> blocks_;   // null: erased, and never written since this process began
-  std::vector<std::uint32_t> wear_;          // since this process began
+  std::vector<std::unique_ptr<Block>> blocks_;  // null: erased, and never written since this process began
+  std::vector<std::uint32_t> wear_;             // since this process began
   int fd_ = -1;
   std::size_t file_bytes_ = 0;
   std::optional<std::uint64_t> budget_;
   FlashTimings timings_;
   double now_s_ = 0.0;
-  std::deque<Operation> pending_;            // in order of time, one ends where the next begins
+  std::deque<Operation> pending_;  // in order of time, one ends where the next begins
 };
 
 }  // namespace selfcal::sim

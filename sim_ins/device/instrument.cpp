@@ -15,7 +15,7 @@ namespace selfcal::sim {
 namespace {
 
 constexpr double start_up_s = 1.0;
-constexpr std::uint64_t gimbal_stream = 2;             // as simulate(): the same seed gives the same recording
+constexpr std::uint64_t gimbal_stream = 2;  // as simulate(): the same seed gives the same recording
 constexpr double stuck_noticed_after_s = 2.0;
 
 std::uint16_t gimbal_counts(double angle) {
@@ -40,8 +40,8 @@ double degrees_in_turn(double radians) {
 
 }  // namespace
 
-Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics,
-                       FlashMemory flash, const InstrumentFaults& faults)
+Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
+                       const InstrumentFaults& faults)
     : config_(config),
       seed_(seed),
       physics_(physics),
@@ -63,12 +63,11 @@ Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config
   ins::Coefficients factory;
   factory.author = "factory";
   instrument->coefficients_.write_factory_if_blank(factory);
-  instrument->flash_.advance(instrument->flash_.ready_at_s());   // at the works, with all the time it takes
+  instrument->flash_.advance(instrument->flash_.ready_at_s());  // at the works, with all the time it takes
   return instrument;
 }
 
-Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& schedule,
-                                                             const Scenario& scenario) const {
+Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& schedule, const Scenario& scenario) const {
   Random random(seed_, gimbal_stream);
   const GimbalMotion planned = plan_gimbal(config_.gimbal, schedule, random);
   auto imu = ImuSimulator::create(config_, spoil_gimbal(scenario, planned), seed_, physics_);
@@ -79,7 +78,7 @@ Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& sch
 }
 
 void Instrument::power_on(double now_s) {
-  flash_.cut_power(now_s);   // the line that resets the processor resets the chip
+  flash_.cut_power(now_s);  // the line that resets the processor resets the chip
   imu_.reset();
   navigation_.reset();
   check_ = {};
@@ -230,8 +229,8 @@ Expected<void> Instrument::start_navigation_check(const ins::NavigationCheckRequ
     return tl::unexpected(imu.error());
   }
   imu_ = std::move(*imu);
-  const auto set = request.compensation == ins::Slot::factory ? coefficients_.factory()
-                                                              : std::optional(coefficients_.in_force());
+  const auto set =
+      request.compensation == ins::Slot::factory ? coefficients_.factory() : std::optional(coefficients_.in_force());
   const earth::Position start{config_.latitude_deg * units::degree, config_.longitude_deg * units::degree,
                               config_.height_m};
   navigation_ = std::make_unique<FreeInertialNavigation>(start, imu_->motion().at(0.0).C_nb,
@@ -288,8 +287,13 @@ ins::Status Instrument::status() const {
 }
 
 ins::StateRecord Instrument::state_record() const {
-  return {state_,  faults_, coefficients_.in_force_slot(),   coefficients_.in_force().version,
-          coefficients_.in_force_crc(), run_id_, counters_.get().power_cycles};
+  return {state_,
+          faults_,
+          coefficients_.in_force_slot(),
+          coefficients_.in_force().version,
+          coefficients_.in_force_crc(),
+          run_id_,
+          counters_.get().power_cycles};
 }
 
 ins::RunRecord Instrument::run_record() const {

@@ -21,22 +21,21 @@ namespace selfcal::sim {
 
 // What is to go wrong, on the INS's clock counted from the start of a rotation. Unset: nothing does.
 struct InstrumentFaults {
-  std::optional<double> stuck_after_s;        // the gimbal stands still from then on; the INS notices and fails
-  std::optional<double> frozen_after_s;       // the IMU repeats its last increments
-  std::optional<double> saturated_after_s;    // the accelerometers read full scale
-  Scenario scenario;                          // gimbal and sensor faults of it
-  std::optional<std::uint32_t> spoilt_page;   // its first upload comes with a flipped bit
+  std::optional<double> stuck_after_s;       // the gimbal stands still from then on; the INS notices and fails
+  std::optional<double> frozen_after_s;      // the IMU repeats its last increments
+  std::optional<double> saturated_after_s;   // the accelerometers read full scale
+  Scenario scenario;                         // gimbal and sensor faults of it
+  std::optional<std::uint32_t> spoilt_page;  // its first upload comes with a flipped bit
 };
 
 class Instrument {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<Instrument>> create(const SimConfig& config, std::uint64_t seed,
-                                                                    const ConcealedPhysics& physics,
-                                                                    FlashMemory flash,
+                                                                    const ConcealedPhysics& physics, FlashMemory flash,
                                                                     const InstrumentFaults& faults);
 
-  void power_on(double now_s);                       // also after a reset: all is lost but what the FLASH had done
-  void advance(double now_s);                        // everything due up to then happens
+  void power_on(double now_s);  // also after a reset: all is lost but what the FLASH had done
+  void advance(double now_s);   // everything due up to then happens
 
   // Self-calibration. Fails with what stands in its way.
   [[nodiscard]] Expected<void> set_schedule(const ins::ScheduleRecord& schedule);
@@ -50,7 +49,7 @@ class Instrument {
   const ins::NavigationCheckRecord& navigation_check() const { return check_; }
 
   ins::State state() const { return state_; }
-  ins::Status status() const;                        // `unlocked` is the server's to fill
+  ins::Status status() const;  // `unlocked` is the server's to fill
   ins::StateRecord state_record() const;
   ins::RunRecord run_record() const;
   ins::SampleFormatRecord sample_format() const;
@@ -93,13 +92,13 @@ class Instrument {
   std::optional<ins::ScheduleRecord> schedule_;
 
   std::unique_ptr<ImuSimulator> imu_;
-  double epoch_s_ = 0.0;                  // INS time of the rotation's or check's first sample interval
+  double epoch_s_ = 0.0;  // INS time of the rotation's or check's first sample interval
   std::uint64_t samples_ = 0, samples_wanted_ = 0;
   std::uint32_t run_id_ = 0;
   flash::Page page_;
   ImuSample last_sample_;
   std::optional<double> stopped_at_s_;
-  std::optional<double> gimbal_noticed_s_;   // when the INS notices that the gimbal goes wrong, in the rotation
+  std::optional<double> gimbal_noticed_s_;  // when the INS notices that the gimbal goes wrong, in the rotation
 
   std::unique_ptr<FreeInertialNavigation> navigation_;
   ins::NavigationCheckRecord check_;

@@ -20,8 +20,8 @@ FreeInertialNavigation::FreeInertialNavigation(const earth::Position& start, con
   constexpr auto K = static_cast<std::size_t>(parameter::gyro_scale);
   constexpr auto G = static_cast<std::size_t>(parameter::gyro_misalignment);
   Matrix3 model;
-  model << 1.0 + c_[K], c_[G], c_[G + 1],            //
-      c_[G + 2], 1.0 + c_[K + 1], c_[G + 3],         //
+  model << 1.0 + c_[K], c_[G], c_[G + 1],     //
+      c_[G + 2], 1.0 + c_[K + 1], c_[G + 3],  //
       c_[G + 4], c_[G + 5], 1.0 + c_[K + 2];
   gyro_inverse_ = model.inverse();
 }
@@ -68,8 +68,8 @@ void FreeInertialNavigation::step(const Vector3& delta_theta, const Vector3& del
   latitude_ += dt * 0.5 * (north_before + north_velocity_) / radius_north;
   longitude_ += dt * 0.5 * (east_before + east_velocity_) / radius_east;
 
-  attitude_ = quaternion_from_rotation_vector(-dt * (omega_ie + omega_en)) * attitude_ *
-              quaternion_from_rotation_vector(turn);
+  attitude_ =
+      quaternion_from_rotation_vector(-dt * (omega_ie + omega_en)) * attitude_ * quaternion_from_rotation_vector(turn);
   attitude_.normalize();
   max_horizontal_ = std::max(max_horizontal_, std::hypot(north_m(), east_m()));
 }

@@ -14,7 +14,7 @@ namespace selfcal::sim {
 
 class FreeInertialNavigation {
  public:
-  using Coefficients = std::array<double, ins::coefficient_count>;   // SI, order of geometry's table
+  using Coefficients = std::array<double, ins::coefficient_count>;  // SI, order of geometry's table
 
   FreeInertialNavigation(const earth::Position& start, const Matrix3& C_nb, const Coefficients& coefficients);
 
@@ -32,10 +32,10 @@ class FreeInertialNavigation {
   earth::Position start_;
   Coefficients c_;
   Matrix3 gyro_inverse_;
-  Eigen::Quaterniond attitude_;      // b to n
+  Eigen::Quaterniond attitude_;  // b to n
   double latitude_, longitude_;
   double north_velocity_ = 0.0, east_velocity_ = 0.0;
-  double north_radius_, east_radius_;   // lengths of a radian of latitude and longitude at the start
+  double north_radius_, east_radius_;  // lengths of a radian of latitude and longitude at the start
   double max_horizontal_ = 0.0;
 };
 

@@ -12,10 +12,26 @@
 namespace selfcal::sim {
 namespace {
 
-constexpr std::array<std::string_view, fault_kinds> names{
-    "drop", "duplicate", "reorder", "corrupt", "delay", "bus_off", "babble", "reset", "stuck_gimbal", "overshoot",
-    "wrong_direction", "saturated_gyro", "saturated_accel", "frozen_gyro", "frozen_accel", "late_status",
-    "wrong_status", "second_tester", "nrc", "spoilt_page"};
+constexpr std::array<std::string_view, fault_kinds> names{"drop",
+                                                          "duplicate",
+                                                          "reorder",
+                                                          "corrupt",
+                                                          "delay",
+                                                          "bus_off",
+                                                          "babble",
+                                                          "reset",
+                                                          "stuck_gimbal",
+                                                          "overshoot",
+                                                          "wrong_direction",
+                                                          "saturated_gyro",
+                                                          "saturated_accel",
+                                                          "frozen_gyro",
+                                                          "frozen_accel",
+                                                          "late_status",
+                                                          "wrong_status",
+                                                          "second_tester",
+                                                          "nrc",
+                                                          "spoilt_page"};
 
 std::optional<FaultKind> kind_of(std::string_view name) {
   const auto found = std::find(names.begin(), names.end(), name);
@@ -229,7 +245,7 @@ void FaultyBus::flush(double t, std::vector<can::CanFrame>& out) {
     babbled_until_ = t;
     return;
   }
-  constexpr std::size_t at_most = 64;   // a call; what a slow host misses is not made up for
+  constexpr std::size_t at_most = 64;  // a call; what a slow host misses is not made up for
   for (std::size_t k = 0; k < at_most && babbled_until_ < t; ++k) {
     can::CanFrame noise;
     noise.id = 0x100;

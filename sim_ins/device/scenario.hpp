@@ -25,29 +25,39 @@
 namespace selfcal::sim {
 
 enum class FaultKind : std::uint8_t {
-  drop, duplicate, reorder, corrupt, delay,             // frames the INS sends: each with `probability`
-  bus_off,                                              // neither sends nor hears
-  babble,                                               // a node floods the bus with `value` frames a second
-  reset,                                                // the INS restarts at `at_s`
-  stuck_gimbal, overshoot, wrong_direction,             // move number `value` (1 first); overshoot by `amount` degrees
-  saturated_gyro, saturated_accel, frozen_gyro, frozen_accel,   // axis `value`; saturated at `amount` counts
-  late_status, wrong_status,                            // no status frames; state says idle
-  second_tester,                                        // somebody else asks for the serial number, `value` times a second
-  nrc,                                                  // every request is answered with NRC `value`
-  spoilt_page,                                          // raw page `value` is read out wrong `amount` times (once, if 0)
+  drop,
+  duplicate,
+  reorder,
+  corrupt,
+  delay,    // frames the INS sends: each with `probability`
+  bus_off,  // neither sends nor hears
+  babble,   // a node floods the bus with `value` frames a second
+  reset,    // the INS restarts at `at_s`
+  stuck_gimbal,
+  overshoot,
+  wrong_direction,  // move number `value` (1 first); overshoot by `amount` degrees
+  saturated_gyro,
+  saturated_accel,
+  frozen_gyro,
+  frozen_accel,  // axis `value`; saturated at `amount` counts
+  late_status,
+  wrong_status,   // no status frames; state says idle
+  second_tester,  // somebody else asks for the serial number, `value` times a second
+  nrc,            // every request is answered with NRC `value`
+  spoilt_page,    // raw page `value` is read out wrong `amount` times (once, if 0)
 };
 
 inline constexpr std::size_t fault_kinds = 20;
 
 struct Fault {
   FaultKind kind = FaultKind::drop;
-  double at_s = 0.0;              // from here, INS time: since the rotation began (sensors), else since power-on,
-  std::optional<ins::State> state;   // or since the INS first got into this state
-  double for_s = 1e12;            // for so long
+  double at_s = 0.0;                // from here, INS time: since the rotation began (sensors), else since power-on,
+  std::optional<ins::State> state;  // or since the INS first got into this state
+  double for_s = 1e12;              // for so long
   double probability = 1.0;
   double value = 0.0;
   double amount = 0.0;
-  bool detected = true;           // gimbal faults: the INS notices and fails
+  bool detected = true;  // gimbal faults: the INS notices and fails
 };
 
 struct Scenario {

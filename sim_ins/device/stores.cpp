@@ -9,7 +9,7 @@ namespace selfcal::sim {
 namespace {
 
 constexpr std::size_t mark_offset = flash_block_bytes - 4;
-constexpr std::uint32_t mark_key = 0x600DC0DE;      // mark = CRC of the record xor this
+constexpr std::uint32_t mark_key = 0x600DC0DE;  // mark = CRC of the record xor this
 constexpr std::size_t counter_block = 3;
 constexpr std::size_t counter_bytes = 16;
 constexpr std::size_t run_block = 5;
@@ -173,7 +173,7 @@ void RawStore::find_pages() {
   while (first_ > 0 && held(first_ - 1)) {
     --first_;
   }
-  samples_ = std::uint64_t{newest->sequence} * flash::samples_per_page + newest->samples.size();   // all others are full
+  samples_ = std::uint64_t{newest->sequence} * flash::samples_per_page + newest->samples.size();  // all others are full
 }
 
 void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
@@ -183,7 +183,7 @@ void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
   writer.put(pages_expected);
   writer.put(flash::crc32c(std::span(bytes).first(8)));
   for (const std::size_t block : {std::size_t{0}, raw_ring_pages - 1, raw_ring_pages - 2}) {
-    flash_.erase(raw_ring_first_block + block);   // before the header names the run
+    flash_.erase(raw_ring_first_block + block);  // before the header names the run
   }
   flash_.erase(run_block);
   flash_.program(run_block * flash_block_bytes, bytes);
@@ -197,11 +197,11 @@ void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {
 void RawStore::append(const flash::Page& page) {
   flash::PageBytes bytes;
   flash::encode_page(page, bytes);
-  flash_.erase(raw_ring_first_block + (written_ + 1) % raw_ring_pages);   // what follows is blank at every moment
+  flash_.erase(raw_ring_first_block + (written_ + 1) % raw_ring_pages);  // what follows is blank at every moment
   flash_.program((raw_ring_first_block + written_ % raw_ring_pages) * flash_block_bytes, bytes);
   samples_ += page.samples.size();
   ++written_;
-  constexpr auto most = static_cast<std::uint32_t>(raw_ring_pages - 1);   // one block is blank
+  constexpr auto most = static_cast<std::uint32_t>(raw_ring_pages - 1);  // one block is blank
   first_ = std::max(first_, written_ - std::min(written_, most));
 }
 

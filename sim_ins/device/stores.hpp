@@ -16,7 +16,7 @@
 namespace selfcal::sim {
 
 inline constexpr std::size_t raw_ring_first_block = 16;
-inline constexpr std::size_t raw_ring_pages = 8192;    // 33.5 MB: 98 minutes at 200 Hz
+inline constexpr std::size_t raw_ring_pages = 8192;  // 33.5 MB: 98 minutes at 200 Hz
 inline constexpr std::size_t flash_bytes = (raw_ring_first_block + raw_ring_pages) * flash_block_bytes;
 static_assert(flash::page_bytes == flash_block_bytes);
 
@@ -33,15 +33,15 @@ class CoefficientStore {
   ins::Slot in_force_slot() const { return slot_; }
   const ins::Coefficients& in_force() const { return in_force_; }
   std::uint32_t in_force_crc() const;
-  bool fell_back() const { return fell_back_; }   // a slot was written once, but none is valid
+  bool fell_back() const { return fell_back_; }  // a slot was written once, but none is valid
   ins::Slot inactive_slot() const { return slot_ == ins::Slot::a ? ins::Slot::b : ins::Slot::a; }
 
   std::optional<ins::Coefficients> factory() const { return read(ins::Slot::factory); }
-  std::optional<ins::Coefficients> inactive() const { return read(inactive_slot()); }   // committed or not
+  std::optional<ins::Coefficients> inactive() const { return read(inactive_slot()); }  // committed or not
   void erase_inactive();
   bool inactive_blank() const;
-  bool write_inactive(const ins::Coefficients& set);    // false: not erased
-  bool commit_inactive(std::uint32_t crc);              // false: no record of this CRC there
+  bool write_inactive(const ins::Coefficients& set);  // false: not erased
+  bool commit_inactive(std::uint32_t crc);            // false: no record of this CRC there
 
  private:
   std::optional<ins::Coefficients> read(ins::Slot slot) const;
@@ -57,7 +57,7 @@ class CoefficientStore {
 struct Counters {
   std::uint32_t generation = 0;
   std::uint32_t power_cycles = 0;
-  std::uint32_t wrong_keys = 0;      // since the last right one
+  std::uint32_t wrong_keys = 0;  // since the last right one
 };
 
 class CounterStore {
@@ -79,22 +79,22 @@ class RawStore {
  public:
   explicit RawStore(FlashMemory& flash) : flash_(flash) {}
 
-  void power_on();                                       // finds the latest run and how far it got
+  void power_on();  // finds the latest run and how far it got
   void begin(std::uint32_t run_id, std::uint32_t pages_expected);
   void append(const flash::Page& page);
   void end() { complete_ = true; }
 
   ins::DirectoryRecord directory() const;
   std::uint32_t pages_written() const { return written_; }
-  std::uint32_t first_page() const { return first_; }    // the oldest that is held
+  std::uint32_t first_page() const { return first_; }  // the oldest that is held
   std::span<const std::uint8_t> page(std::uint32_t index) const;
   // Fault on demand: a bit of the page flips in the next `times` readings.
   void spoil(std::uint32_t index, int times);
   std::optional<std::uint32_t> spoilt() const { return spoilt_; }
-  void mend();                                           // one reading done
+  void mend();  // one reading done
 
  private:
-  std::optional<flash::Page> page_of_run(std::size_t block) const;   // in a block of the ring, whole and of this run
+  std::optional<flash::Page> page_of_run(std::size_t block) const;  // in a block of the ring, whole and of this run
   void find_pages();
 
   FlashMemory& flash_;

@@ -12,10 +12,10 @@ class Turnaround {
  public:
   explicit Turnaround(double milliseconds) : seconds_(milliseconds / 1000.0) {}
 
-  void answer_sent() { answered_ = true; }   // a frame of it
+  void answer_sent() { answered_ = true; }  // a frame of it
   // The time at which the tester's frame comes, where the clock shows now_s and the bus has been free since free_s.
   double heard(const can::CanFrame& frame, double now_s, double free_s) {
-    if (frame.size > 0 && frame.data[0] >> 4 == 3) {   // flow control comes from the tester's driver, at once
+    if (frame.size > 0 && frame.data[0] >> 4 == 3) {  // flow control comes from the tester's driver, at once
       return now_s;
     }
     const bool charged = answered_;

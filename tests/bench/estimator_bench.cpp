@@ -15,8 +15,8 @@
 namespace selfcal::bench {
 namespace {
 
-constexpr double limit_s = 0.5;            // three passes over 588,000 samples
-constexpr double session_s = 2940.0;       // 19 dwells of 150 s and 18 moves of 5 s
+constexpr double limit_s = 0.5;       // three passes over 588,000 samples
+constexpr double session_s = 2940.0;  // 19 dwells of 150 s and 18 moves of 5 s
 constexpr double session_rate_hz = 200.0;
 
 NoiseModel noise() {
@@ -61,8 +61,8 @@ void passes_of_a_session(benchmark::State& state) {
   for (auto _ : state) {
     three_passes(data);
   }
-  state.counters["of_limit"] = benchmark::Counter(
-      limit_s * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["of_limit"] = benchmark::Counter(limit_s * static_cast<double>(state.iterations()),
+                                                  benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(passes_of_a_session)->Unit(benchmark::kMillisecond);
 
@@ -139,15 +139,28 @@ void against_samples(benchmark::State& state, const Samples& samples) {
 void by_length(benchmark::State& state) {
   against_samples(state, ideal_samples(60.0 * static_cast<double>(state.range(0)), session_rate_hz));
 }
-BENCHMARK(by_length)->Arg(10)->Arg(49)->Arg(180)->Arg(720)->Arg(1440)->Unit(benchmark::kMillisecond)->Complexity(
-    benchmark::oN);
+BENCHMARK(by_length)
+    ->Arg(10)
+    ->Arg(49)
+    ->Arg(180)
+    ->Arg(720)
+    ->Arg(1440)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity(benchmark::oN);
 
 // Against the rate, 49 minutes: a part for every interval (the filter), which the rate does not change, and a part
 // for every sample.
 void by_rate(benchmark::State& state) {
   against_samples(state, ideal_samples(session_s, static_cast<double>(state.range(0))));
 }
-BENCHMARK(by_rate)->Arg(50)->Arg(100)->Arg(200)->Arg(500)->Arg(1000)->Arg(2000)->Unit(benchmark::kMillisecond)
+BENCHMARK(by_rate)
+    ->Arg(50)
+    ->Arg(100)
+    ->Arg(200)
+    ->Arg(500)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->Unit(benchmark::kMillisecond)
     ->Complexity(benchmark::oN);
 
 }  // namespace

@@ -28,7 +28,9 @@ struct Samples {
     return data;
   }
   // Of all samples, as the estimator is given them.
-  double bytes() const { return static_cast<double>(time_s.size()) * (3.0 * sizeof(double) + 2.0 * sizeof(delta_v[0])); }
+  double bytes() const {
+    return static_cast<double>(time_s.size()) * (3.0 * sizeof(double) + 2.0 * sizeof(delta_v[0]));
+  }
 
   static earth::Position site() { return {40.0 * units::degree, 116.0 * units::degree, 50.0}; }
 };
@@ -53,7 +55,7 @@ inline Samples ideal_samples(double duration_s, double rate_hz) {
   s.inner.reserve(count);
   s.delta_theta.reserve(count);
   s.delta_v.reserve(count);
-  Matrix3 C = Matrix3::Identity();   // of b at the sample's start; the vehicle stands level and north
+  Matrix3 C = Matrix3::Identity();  // of b at the sample's start; the vehicle stands level and north
   for (std::size_t k = 0; k < count; ++k) {
     const double end = static_cast<double>(k + 1) * dt;
     const auto at = std::min(positions - 1, static_cast<std::size_t>(end / (dwell_s + move_s)));

@@ -32,7 +32,7 @@ double status_bytes(const std::string& key) {
 double peak_ratio(double minutes) {
   const double program = status_bytes("VmRSS");
   const Samples samples = ideal_samples(60.0 * minutes, 200.0);
-  CalibrationOptions options;   // ideal data have no noise to be found
+  CalibrationOptions options;  // ideal data have no noise to be found
   options.noise.gyro_arw = 0.001 * units::degree_per_sqrt_hour;
   options.noise.accel_vrw = 5.0 * units::micro_g_per_sqrt_hz;
   const CalibrationOutcome outcome = calibrate(samples.view(), options);

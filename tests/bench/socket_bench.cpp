@@ -27,9 +27,9 @@
 namespace selfcal {
 namespace {
 
-constexpr double real_fd_bus_bytes_per_s = 436e3;   // ceiling of FD 1/5 Mbit/s with blocks of 65535
+constexpr double real_fd_bus_bytes_per_s = 436e3;  // ceiling of FD 1/5 Mbit/s with blocks of 65535
 constexpr double asked_for = 5.0;
-constexpr std::size_t batch = 256;                  // below the 278 frames of a default receive buffer
+constexpr std::size_t batch = 256;  // below the 278 frames of a default receive buffer
 
 Time now() { return std::chrono::steady_clock::now().time_since_epoch(); }
 
@@ -130,7 +130,7 @@ class Bare {
       s = open(interface);
     }
     for (std::size_t i = 0; i < batch; ++i) {
-      frames_[i].can_id = 0x700;   // past the filters of the others
+      frames_[i].can_id = 0x700;  // past the filters of the others
       frames_[i].len = fd ? 64 : 8;
       vectors_[i] = {&frames_[i], bytes_};
       headers_[i].msg_hdr.msg_iov = &vectors_[i];
@@ -145,7 +145,9 @@ class Bare {
   Bare(const Bare&) = delete;
   Bare& operator=(const Bare&) = delete;
 
-  bool good() const { return std::ranges::none_of(sockets_, [](int s) { return s < 0; }); }
+  bool good() const {
+    return std::ranges::none_of(sockets_, [](int s) { return s < 0; });
+  }
 
   // False where a frame does not get through.
   bool carry(std::size_t frames) {
@@ -190,7 +192,7 @@ struct Case {
 void mark(const char* what, const Case& c, double bytes) {
   fmt::print("{} {:.0f} {}\n", what, bytes, c.name);
   std::fflush(stdout);
-  ::sleep(1);   // while who reads it looks at the clock
+  ::sleep(1);  // while who reads it looks at the clock
 }
 
 Expected<bool> measure(const char* interface, const Case& c, double megabytes, bool alone) {
@@ -209,7 +211,7 @@ Expected<bool> measure(const char* interface, const Case& c, double megabytes, b
   }
   const double payload = static_cast<double>(c.block - 2);
   std::size_t blocks = static_cast<std::size_t>(megabytes * 1e6 / payload) + 1;
-  const std::size_t frames = c.block / (c.fd ? 63 : 7) + 3;   // request and flow control too
+  const std::size_t frames = c.block / (c.fd ? 63 : 7) + 3;  // request and flow control too
   double ours_s = 0.0;
   double bare_s = 0.0;
   const std::size_t slice = 65535 / c.block;
@@ -241,10 +243,11 @@ Expected<bool> measure(const char* interface, const Case& c, double megabytes, b
     return lost == 0;
   }
   const double times_real = bytes / ours_s / real_fd_bus_bytes_per_s;
-  fmt::print("{:<20} {:8.0f} kB/s {:6.1f} times the real FD bus; {:.0f} % of the bare system calls' {:.1f} times; {} "
-             "lost\n",
-             c.name, bytes / ours_s / 1e3, times_real, 100.0 * bare_s / ours_s,
-             bytes / bare_s / real_fd_bus_bytes_per_s, lost);
+  fmt::print(
+      "{:<20} {:8.0f} kB/s {:6.1f} times the real FD bus; {:.0f} % of the bare system calls' {:.1f} times; {} "
+      "lost\n",
+      c.name, bytes / ours_s / 1e3, times_real, 100.0 * bare_s / ours_s, bytes / bare_s / real_fd_bus_bytes_per_s,
+      lost);
   return lost == 0 && (!c.fd || times_real >= asked_for);
 }
 

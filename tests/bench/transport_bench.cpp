@@ -20,7 +20,7 @@ namespace {
 struct Case {
   const char* name;
   bool fd;
-  std::size_t message_bytes;       // of a TransferData response, 2 bytes of which are service and counter
+  std::size_t message_bytes;  // of a TransferData response, 2 bytes of which are service and counter
   double ceiling_bytes_per_s;
 };
 
@@ -67,7 +67,7 @@ void exchange(isotp::Transport& tester, isotp::Transport& ins, std::span<const s
     carry(tester, ins, bus, now, frames);
   }
   if (!answered || tester.message().size() != response.size()) {
-    std::abort();   // what is measured must also be right
+    std::abort();  // what is measured must also be right
   }
 }
 
@@ -102,8 +102,7 @@ void block_transfer(benchmark::State& state, const Case& c, bool sample_like) {
   const double rate = paced_blocks * static_cast<double>(c.message_bytes - 2) / bus_seconds;
   state.counters["bus_kB_per_s"] = rate / 1e3;
   state.counters["of_ceiling"] = rate / c.ceiling_bytes_per_s;
-  state.counters["times_real"] =
-      benchmark::Counter(payload / c.ceiling_bytes_per_s, benchmark::Counter::kIsRate);
+  state.counters["times_real"] = benchmark::Counter(payload / c.ceiling_bytes_per_s, benchmark::Counter::kIsRate);
 }
 
 }  // namespace
@@ -112,10 +111,9 @@ void block_transfer(benchmark::State& state, const Case& c, bool sample_like) {
 int main(int argc, char** argv) {
   for (const auto& c : selfcal::cases) {
     for (const bool sample_like : {false, true}) {
-      benchmark::RegisterBenchmark(std::string(c.name).append(sample_like ? ", sample-like" : ", random").c_str(),
-                                   [&c, sample_like](benchmark::State& state) {
-                                     selfcal::block_transfer(state, c, sample_like);
-                                   });
+      benchmark::RegisterBenchmark(
+          std::string(c.name).append(sample_like ? ", sample-like" : ", random").c_str(),
+          [&c, sample_like](benchmark::State& state) { selfcal::block_transfer(state, c, sample_like); });
     }
   }
   benchmark::Initialize(&argc, argv);

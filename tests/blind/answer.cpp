@@ -43,8 +43,12 @@ const char* words(diagnosis::DiagnosisVerdict verdict) {
 }
 
 ordered_json to_json(const Finding& f) {
-  ordered_json j = {{"effect", f.effect}, {"class", f.equivalent}, {"stochastic", f.stochastic},
-                    {"log_p", f.log_p}, {"held_out_gain", f.held_out_gain}, {"probability", f.probability}};
+  ordered_json j = {{"effect", f.effect},
+                    {"class", f.equivalent},
+                    {"stochastic", f.stochastic},
+                    {"log_p", f.log_p},
+                    {"held_out_gain", f.held_out_gain},
+                    {"probability", f.probability}};
   j["parameters"] = ordered_json::object();
   for (const auto& p : f.parameters) {
     j["parameters"][p.name] = {p.value, p.sigma};
@@ -53,7 +57,10 @@ ordered_json to_json(const Finding& f) {
 }
 
 ordered_json to_json(const diagnosis::Adequacy& a) {
-  return {{"accepted", a.accepted}, {"nis", a.nis}, {"log_p_white", a.log_p_white}, {"map", a.largest_sigma},
+  return {{"accepted", a.accepted},
+          {"nis", a.nis},
+          {"log_p_white", a.log_p_white},
+          {"map", a.largest_sigma},
           {"log_p_structure", a.log_p_structure}};
 }
 
@@ -135,7 +142,7 @@ int run(std::span<char*> a) {
 int main(int argc, char** argv) {
   try {
     return run({argv, static_cast<std::size_t>(argc)});
-  } catch (const std::exception& e) {   // a noise that is no number, a missing name
+  } catch (const std::exception& e) {  // a noise that is no number, a missing name
     std::fprintf(stderr, "selfcal_blind_answer: %s\n", e.what());
     return 3;
   }

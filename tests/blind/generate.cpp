@@ -66,7 +66,7 @@ Expected<ordered_json> to_json(const blind::Case& c) {
   j["seed"] = c.seed;
   j["dwell_s"] = c.schedule.dwell_s.front();
   j["rotation_s"] = c.schedule.rotation_s;
-  j["last_outer_deg"] = c.schedule.positions[13].outer_deg;   // where the two named schedules differ
+  j["last_outer_deg"] = c.schedule.positions[13].outer_deg;  // where the two named schedules differ
   j["rate_hz"] = c.config.sample_rate_hz;
   j["site_deg"] = {c.config.latitude_deg, c.config.longitude_deg};
   j["attitude_deg"] = {c.config.roll_deg, c.config.pitch_deg, c.config.heading_deg};
@@ -173,8 +173,9 @@ int run(std::span<char*> a) {
   const bool record = command == "record" && a.size() == 8;
   if ((!key && !record) || !parse(a[2], seed) || !parse(a[3], size.clean) || !parse(a[4], size.repeats) ||
       (record && !parse(a[6], number)) || (key && !parse(a[5], first))) {
-    fmt::print(stderr, "usage: selfcal_blind_generate key SEED CLEAN REPEATS FIRST FILE\n"
-                       "       selfcal_blind_generate record SEED CLEAN REPEATS KEY NUMBER FILE\n");
+    fmt::print(stderr,
+               "usage: selfcal_blind_generate key SEED CLEAN REPEATS FIRST FILE\n"
+               "       selfcal_blind_generate record SEED CLEAN REPEATS KEY NUMBER FILE\n");
     return 2;
   }
   auto recipes = blind::recipes(size, seed);
@@ -193,7 +194,7 @@ int run(std::span<char*> a) {
 int main(int argc, char** argv) {
   try {
     return run({argv, static_cast<std::size_t>(argc)});
-  } catch (const std::exception& e) {   // a key that was edited: a value of another type, a missing name
+  } catch (const std::exception& e) {  // a key that was edited: a value of another type, a missing name
     std::fprintf(stderr, "selfcal_blind_generate: %s\n", e.what());
     return 3;
   }

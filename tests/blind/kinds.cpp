@@ -61,7 +61,12 @@ const std::vector<Kind>& table() {
       {"gyro_g_rate_sensitivity", outside, axes, 0.02, {}, {}, 0.0},
       {"lagged_thermal_gradient", outside, {"gyro_x", "gyro_y", "gyro_z"}, 0.001, {{"tau_s", 100.0, 600.0}}, {}, 0.0},
       {"accel_turn_hysteresis", outside, axes, 20.0, {}, {}, 0.0},
-      {"gyro_gimbal_field", outside, {"outer_x", "outer_y", "outer_z", "inner_x", "inner_y", "inner_z"}, 0.01, {}, {},
+      {"gyro_gimbal_field",
+       outside,
+       {"outer_x", "outer_y", "outer_z", "inner_x", "inner_y", "inner_z"},
+       0.01,
+       {},
+       {},
        0.0},
       {"time_base", invisible, {"scale"}, 5.0, {}, {}, 0.0},
       {"gyro_noise_level", noise, axes, 0.0, {}, {}, 0.0},
@@ -164,12 +169,11 @@ std::vector<Column> columns_of(const Kind& kind, const sim::SimConfig& config, c
     sim::PhysicsEffect above = effect, below = effect;
     above.values[place(d, c.name)] *= std::exp(step);
     below.values[place(d, c.name)] *= std::exp(-step);
-    columns.push_back({{{above}}, {{below}}, 2.0 * step, std::log(c.high / c.low) / std::sqrt(12.0), 0.0,
-                       0.0});
+    columns.push_back({{{above}}, {{below}}, 2.0 * step, std::log(c.high / c.low) / std::sqrt(12.0), 0.0, 0.0});
   }
   // A scale that follows a temperature without a channel: the block's own time constant is unknown.
   if (!config.temperature.recorded && kind.id.ends_with("_scale_temperature")) {
-    constexpr double step = 0.05, spread = 0.5;   // drawn from 300 to 1500 s: sigma of its logarithm
+    constexpr double step = 0.05, spread = 0.5;  // drawn from 300 to 1500 s: sigma of its logarithm
     const double tau = config.temperature.warm_up_tau_s;
     columns.push_back({{{effect}}, {{effect}}, 2.0 * step, spread, tau * std::exp(step), tau * std::exp(-step)});
   }

@@ -7,8 +7,8 @@
 
 #include "sim_ins/config.hpp"
 #include "sim_ins/physics.hpp"
-#include "tests/blind/response.hpp"
 #include "sim_ins/random.hpp"
+#include "tests/blind/response.hpp"
 
 namespace selfcal::blind {
 
@@ -17,14 +17,14 @@ enum class KindGroup { catalogue, outside, invisible, noise };
 // Drawn from [low, high], on a logarithmic scale.
 struct DrawnConstant {
   std::string_view name;
-  double low = 0.0, high = 0.0;      // in the unit of the physics file
+  double low = 0.0, high = 0.0;  // in the unit of the physics file
 };
 
 struct Kind {
   std::string_view id;
   KindGroup group = KindGroup::catalogue;
-  std::vector<std::string_view> components;   // those that may differ from zero
-  double typical = 0.0;                       // of a component, in the unit of the physics file
+  std::vector<std::string_view> components;  // those that may differ from zero
+  double typical = 0.0;                      // of a component, in the unit of the physics file
   std::vector<DrawnConstant> constants;
   // Components to take where the recording has no temperature channel; empty: the same.
   std::vector<std::string_view> without_temperature;

@@ -10,11 +10,11 @@
 namespace selfcal::blind {
 namespace {
 
-constexpr double largest_size = 40.0;   // typical sizes
+constexpr double largest_size = 40.0;  // typical sizes
 const std::vector<double> strengths = {0.3, 1.0, 3.0, 6.0, 10.0};
 // What can be seen well has no size of its own: every logarithm is as likely.
 constexpr double range_from = 6.0, range_to = 100.0;
-constexpr int range_cases = 2;          // of every effect
+constexpr int range_cases = 2;  // of every effect
 
 std::vector<std::string> ids_of(KindGroup group) {
   std::vector<std::string> ids;
@@ -90,10 +90,10 @@ double reference_temperature(const Case& c) {
 // Where the base is level a drift with the sine of the inner angle is a g-sensitivity; and most slow drifts are alike.
 Expected<double> unlike_twins(const Filtered& filtered, const sim::SimConfig& config,
                               const sim::PhysicsEffect& concealed) {
-  sim::Random random(1, 1);   // of the columns only their span counts
+  sim::Random random(1, 1);  // of the columns only their span counts
   double least = HUGE_VAL;
-  for (const char* id : {"gyro_g_sensitivity", "gyro_magnetic_sensitivity", "gyro_drift_ramp", "gyro_temperature",
-                         "gyro_temperature"}) {
+  for (const char* id :
+       {"gyro_g_sensitivity", "gyro_magnetic_sensitivity", "gyro_drift_ramp", "gyro_temperature", "gyro_temperature"}) {
     const Kind& kind = kind_called(id);
     const sim::PhysicsEffect drawn = draw_effect(kind, config, random);
     const auto left = filtered.unlike({{concealed}}, columns_of(kind, config, drawn, 1.0));
@@ -121,7 +121,7 @@ Expected<ConcealedEffect> sized(const Case& c, const Kind& kind, sim::Random& ra
     if (!response) {
       return tl::unexpected(response.error());
     }
-    double strength = response->sigmas;   // of the unit
+    double strength = response->sigmas;  // of the unit
     if (by_likeness) {
       const auto left = unlike_twins(*filtered, c.config, unit);
       if (!left) {
@@ -191,7 +191,7 @@ std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed) {
       all.push_back({"noise", {id}, 0.0});
     }
   }
-  for (std::size_t k = all.size(); k > 1; --k) {   // Fisher and Yates
+  for (std::size_t k = all.size(); k > 1; --k) {  // Fisher and Yates
     std::swap(all[k - 1], all[static_cast<std::size_t>(random.uniform() * static_cast<double>(k))]);
   }
   return all;
@@ -203,7 +203,7 @@ Case begun(const Recipe& recipe, int number, sim::Random& random) {
   Case c;
   c.number = number;
   c.recipe = recipe;
-  c.seed = random.bits() >> 12;        // exact in JSON
+  c.seed = random.bits() >> 12;  // exact in JSON
   install(c, random);
   return c;
 }

@@ -14,12 +14,12 @@ namespace selfcal::blind {
 
 struct TrialSize {
   int clean = 300;
-  int repeats = 1;             // of every effect at every strength; 0: none
+  int repeats = 1;  // of every effect at every strength; 0: none
 };
 
 // One case before anything is drawn.
 struct Recipe {
-  std::string stratum;         // clean, single, range, pair, outside, unlike, invisible, noise
+  std::string stratum;  // clean, single, range, pair, outside, unlike, invisible, noise
   std::vector<std::string> effects;
   // Sigmas of the bound, each effect alone; `unlike`: that the best of its twins leaves; 0: typical size.
   double strength = 0.0;
@@ -30,7 +30,7 @@ std::vector<Recipe> recipes(const TrialSize& size, std::uint64_t seed);
 
 struct ConcealedEffect {
   sim::PhysicsEffect physics;
-  Response response;           // of this effect alone, at its size; zero where a bound has no meaning (noise)
+  Response response;  // of this effect alone, at its size; zero where a bound has no meaning (noise)
   // SI: bound of the 24 with all of the effect's coefficients and constants to be estimated; zero where not computed.
   ParameterVector augmented_sigma = ParameterVector::Zero();
   // Outside the catalogue: sigmas that the best of its likely twins (gyro drifts with attitude and time) leaves; below

@@ -12,12 +12,12 @@
 namespace selfcal::blind {
 namespace {
 
-constexpr double still_base_sigma = 1e-6;   // m: the least that the calibration takes a still base for
+constexpr double still_base_sigma = 1e-6;  // m: the least that the calibration takes a still base for
 
 // Attitude where the first sample starts: the gimbal read-out is free of noise in the configuration used here.
 Matrix3 start_attitude(const sim::SimConfig& config, const Recording& recording) {
-  return attitude_matrix({config.roll_deg * units::degree, config.pitch_deg * units::degree,
-                           config.heading_deg * units::degree}) *
+  return attitude_matrix(
+             {config.roll_deg * units::degree, config.pitch_deg * units::degree, config.heading_deg * units::degree}) *
          gimbal_matrix(recording.gimbal_outer_rad.front(), recording.gimbal_inner_rad.front());
 }
 
@@ -47,7 +47,7 @@ Expected<Filtered> Filtered::make(const sim::SimConfig& config, const Schedule& 
   f.quiet_ = config;
   f.quiet_.gyro_arw_deg_per_sqrt_h = 0.0;
   f.quiet_.accel_vrw_ug_per_sqrt_hz = 0.0;
-  f.quiet_.gyro_lsb_arcsec = 1e-5;       // counts of 32 bits still hold 30 deg/s at 50 Hz
+  f.quiet_.gyro_lsb_arcsec = 1e-5;  // counts of 32 bits still hold 30 deg/s at 50 Hz
   f.quiet_.accel_lsb_m_per_s = 1e-9;
   f.quiet_.gimbal.readout_noise_arcsec = 0.0;
   f.schedule_ = schedule;
@@ -146,7 +146,7 @@ Expected<double> Filtered::unlike(const sim::ConcealedPhysics& physics, const st
     return tl::unexpected(concealed ? made.error() : concealed.error());
   }
   Eigen::MatrixXd information = made->D.transpose() * made->D;
-  information.diagonal().array() += 1e-6;   // sizes up to 1000 of the columns' own
+  information.diagonal().array() += 1e-6;  // sizes up to 1000 of the columns' own
   const Eigen::VectorXd score = made->D.transpose() * concealed->innovation;
   return std::sqrt(std::max(0.0, concealed->innovation.squaredNorm() - score.dot(information.ldlt().solve(score))));
 }

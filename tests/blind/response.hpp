@@ -20,9 +20,9 @@
 namespace selfcal::blind {
 
 struct Response {
-  double sigmas = 0.0;        // size over the bound of its sigma
-  ParameterVector shift = ParameterVector::Zero();   // SI: what the estimates of the 24 move by
-  ParameterVector sigma = ParameterVector::Zero();   // SI: bound of the 24, effect not fitted
+  double sigmas = 0.0;                              // size over the bound of its sigma
+  ParameterVector shift = ParameterVector::Zero();  // SI: what the estimates of the 24 move by
+  ParameterVector sigma = ParameterVector::Zero();  // SI: bound of the 24, effect not fitted
 };
 
 // A direction of the augmented model: (plus - minus) / step, whose size is known beforehand to be 0 +-prior.
@@ -30,7 +30,7 @@ struct Column {
   sim::ConcealedPhysics plus, minus;
   double step = 1.0;
   double prior = 1.0;
-  double plus_warm_up_s = 0.0, minus_warm_up_s = 0.0;   // time constants of the block's temperature; 0: as configured
+  double plus_warm_up_s = 0.0, minus_warm_up_s = 0.0;  // time constants of the block's temperature; 0: as configured
 };
 
 // One installation, schedule and seed without physics, and what any physics changes. `config` with its noise as the
@@ -47,17 +47,17 @@ class Filtered {
 
  private:
   struct Difference {
-    Eigen::VectorXd innovation;   // normalised
+    Eigen::VectorXd innovation;  // normalised
     ParameterVector shift;
   };
   struct Design {
-    Eigen::MatrixXd D, S;         // one column each: of innovations, of the 24
+    Eigen::MatrixXd D, S;  // one column each: of innovations, of the 24
   };
   Expected<Design> design(const std::vector<Column>& columns) const;
   Expected<Difference> difference(const sim::ConcealedPhysics& physics, double warm_up_s = 0.0) const;
   ParameterMatrix covariance() const;
 
-  sim::SimConfig assumed_, quiet_;   // with the noise that the filter assumes; without any
+  sim::SimConfig assumed_, quiet_;  // with the noise that the filter assumes; without any
   Schedule schedule_;
   std::uint64_t seed_ = 0;
   ParameterVector truth_;

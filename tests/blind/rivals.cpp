@@ -75,9 +75,9 @@ void always_on(const diagnosis::SignaturePass& pass, const diagnosis::SignatureR
   const Eigen::MatrixXd covariance = solver.solve(Eigen::MatrixXd::Identity(size.size(), size.size()));
   const int at = rows.pass.layout.parameters();
   answers.always_on_value = about + rows.pass.mean.segment<sensor_parameter_count>(at) + rows.shift * size;
-  answers.always_on_sigma =
-      (rows.pass.covariance.diagonal().segment<sensor_parameter_count>(at) +
-       (rows.shift * covariance * rows.shift.transpose()).diagonal()).cwiseSqrt();
+  answers.always_on_sigma = (rows.pass.covariance.diagonal().segment<sensor_parameter_count>(at) +
+                             (rows.shift * covariance * rows.shift.transpose()).diagonal())
+                                .cwiseSqrt();
   for (const Candidate& c : pass.candidates()) {
     for (const int k : columns_of(c)) {
       if (std::abs(size(k)) > claim * std::sqrt(covariance(k, k))) {

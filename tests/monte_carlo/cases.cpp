@@ -7,7 +7,7 @@
 namespace selfcal::monte_carlo {
 namespace {
 
-constexpr std::uint64_t case_stream = 71;   // of the seed; the simulator takes others
+constexpr std::uint64_t case_stream = 71;  // of the seed; the simulator takes others
 
 // The reference motion, no two runs alike: phases anywhere, periods within 20 %, amplitudes 0.5 to 2 times.
 void vary(std::vector<sim::Sine>& sines, sim::Random& random) {
@@ -24,8 +24,13 @@ const std::vector<Case>& all_cases() {
   static const std::vector<Case> cases = {
       {.name = "horizontal", .schedule = "horizontal"},
       {.name = "table2-pitch90", .schedule = "table2", .pitch_deg = 90.0},
-      {.name = "horizontal-60s", .schedule = "horizontal", .dwell_s = 60.0, .latitude_deg = -33.0, .roll_deg = 4.0,
-       .pitch_deg = -7.0, .heading_deg = 285.0},
+      {.name = "horizontal-60s",
+       .schedule = "horizontal",
+       .dwell_s = 60.0,
+       .latitude_deg = -33.0,
+       .roll_deg = 4.0,
+       .pitch_deg = -7.0,
+       .heading_deg = 285.0},
       {.name = "moored", .schedule = "horizontal", .moored = true},
       {.name = "table2-level", .schedule = "table2"},
   };

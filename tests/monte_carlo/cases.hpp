@@ -12,11 +12,11 @@ namespace selfcal::monte_carlo {
 
 struct Case {
   std::string_view name;
-  std::string_view schedule;              // as named_schedule() knows it
+  std::string_view schedule;  // as named_schedule() knows it
   double dwell_s = 150.0;
   double latitude_deg = 40.0;
   double roll_deg = 0.0, pitch_deg = 0.0;
-  double heading_deg = -1.0;              // negative: drawn for every run
+  double heading_deg = -1.0;  // negative: drawn for every run
   bool moored = false;
 };
 

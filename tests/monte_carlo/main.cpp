@@ -86,9 +86,11 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of the first run; the others follow")->capture_default_str();
   app.add_option("--rate", options.rate_hz, "sample rate, Hz")->check(CLI::Range(50.0, 1000.0))->capture_default_str();
   app.add_option("--controls", options.control_runs, "runs per case that also try the negative controls")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--confidence", options.limits.confidence, "of the NEES interval")
-      ->check(CLI::Range(0.5, 0.99999))->capture_default_str();
+      ->check(CLI::Range(0.5, 0.99999))
+      ->capture_default_str();
   app.add_option("--jobs", options.jobs, "threads")->check(CLI::Range(1, 64))->capture_default_str();
   app.add_flag("--json", options.as_json, "JSON on standard output");
   try {

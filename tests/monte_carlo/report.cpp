@@ -10,7 +10,7 @@
 namespace selfcal::monte_carlo {
 namespace {
 
-constexpr double chance = 0.999;   // of a right estimator passing a ratio that few runs make coarse
+constexpr double chance = 0.999;  // of a right estimator passing a ratio that few runs make coarse
 
 // Upper limit of a root mean square of `degrees` squares of expected value 1.
 double rms_limit(double limit, double degrees, double probability) {
@@ -58,9 +58,7 @@ void take(const Trial& t, Sums& sums, CaseReport& report) {
 
 std::string interval(const Ratio& r) { return fmt::format("{:.3f} [{:.3f}, {:.3f}]", r.value, r.low, r.high); }
 
-nlohmann::ordered_json json(const Ratio& r) {
-  return {{"value", r.value}, {"low", r.low}, {"high", r.high}};
-}
+nlohmann::ordered_json json(const Ratio& r) { return {{"value", r.value}, {"low", r.low}, {"high", r.high}}; }
 
 }  // namespace
 
@@ -87,8 +85,7 @@ CaseReport evaluate(const std::string& name, const std::vector<Trial>& trials, c
   }
   const double n = report.runs;
   // Errors of one run are correlated; the determined directions are what scatters independently.
-  report.overall = {std::sqrt(sums.bound.mean() / n), 0.0,
-                    rms_limit(limits.overall, sums.nees.degrees, chance)};
+  report.overall = {std::sqrt(sums.bound.mean() / n), 0.0, rms_limit(limits.overall, sums.nees.degrees, chance)};
   const double shared = 1.0 - (1.0 - chance) / sensor_parameter_count;
   for (int i = 0; i < sensor_parameter_count; ++i) {
     report.single[static_cast<std::size_t>(i)] = {std::sqrt(sums.bound(i) / n), 0.0,
@@ -114,7 +111,8 @@ std::string text(const CaseReport& r) {
   }
   out += fmt::format("  rms(error)/bound   {:.3f} (limit {:.3f}); against the plan {:.3f}\n", r.overall.value,
                      r.overall.high, r.overall_plan);
-  out += fmt::format("  NEES per degree    {}\n  gyro drift alone   {}\n", interval(r.nees), interval(r.gyro_drift_nees));
+  out +=
+      fmt::format("  NEES per degree    {}\n  gyro drift alone   {}\n", interval(r.nees), interval(r.gyro_drift_nees));
   for (std::size_t k = 0; k < r.controls.size(); ++k) {
     if (r.controls[k].high > 0.0) {
       out += fmt::format("  {:<18} {} {}\n", control_names[k], interval(r.controls[k]),
@@ -152,9 +150,9 @@ nlohmann::ordered_json json(const CaseReport& r) {
   j["arw_found"] = r.arw_ratio;
   j["vrw_found"] = r.vrw_ratio;
   for (std::size_t i = 0; i < r.single.size(); ++i) {
-    j["parameters"][std::string(sensor_parameters[i].name)] = {
-        {"rms_over_bound", r.single[i].value}, {"limit", r.single[i].high},
-        {"sigma_over_bound", r.own_bound(static_cast<int>(i))}};
+    j["parameters"][std::string(sensor_parameters[i].name)] = {{"rms_over_bound", r.single[i].value},
+                                                               {"limit", r.single[i].high},
+                                                               {"sigma_over_bound", r.own_bound(static_cast<int>(i))}};
   }
   return j;
 }

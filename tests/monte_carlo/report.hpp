@@ -15,27 +15,27 @@ namespace selfcal::monte_carlo {
 struct Limits {
   double overall = 1.10;
   double single = 1.35;
-  double confidence = 0.95;   // of the NEES interval
+  double confidence = 0.95;  // of the NEES interval
 };
 
 struct Ratio {
-  double value = 0.0, low = 0.0, high = 0.0;   // within [low, high] is right
+  double value = 0.0, low = 0.0, high = 0.0;  // within [low, high] is right
   bool holds() const { return value >= low && value <= high; }
 };
 
 struct CaseReport {
   std::string name;
   int runs = 0;
-  std::vector<std::string> failures;      // seed and reason
-  Ratio overall;                          // rms(error)/bound
+  std::vector<std::string> failures;  // seed and reason
+  Ratio overall;                      // rms(error)/bound
   std::array<Ratio, sensor_parameter_count> single;
-  double overall_plan = 0.0;              // rms(error)/plan over the determined parameters' subspace: for information
-  ParameterVector own_bound;              // the estimator's sigma over the bound, root mean square
-  Ratio nees, gyro_drift_nees;            // per degree of freedom
-  std::array<Ratio, control_names.size()> controls;   // high 0: not run; right is OUTSIDE
+  double overall_plan = 0.0;    // rms(error)/plan over the determined parameters' subspace: for information
+  ParameterVector own_bound;    // the estimator's sigma over the bound, root mean square
+  Ratio nees, gyro_drift_nees;  // per degree of freedom
+  std::array<Ratio, control_names.size()> controls;  // high 0: not run; right is OUTSIDE
   int consistent = 0, inconsistent = 0, not_converged = 0;
   int most_passes = 0;
-  double nis = 0.0, arw_ratio = 0.0, vrw_ratio = 0.0;   // means
+  double nis = 0.0, arw_ratio = 0.0, vrw_ratio = 0.0;  // means
   bool holds() const;
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 struct TrueNoise {
   double gyro_arw, accel_vrw;
-  double position_sigma;   // of a still base
+  double position_sigma;  // of a still base
 };
 
 // A still base does not move at all; what is left is the velocity quantum, carried on: lsb/sqrt(12) in velocity at
@@ -32,7 +32,7 @@ ParameterVector bound(const ImuData& data, const ParameterVector& truth, const T
   PassInput input;
   input.data = &data;
   input.parameters = truth;
-  input.C_nb = result.C_nb_start;   // only where the model is linearised
+  input.C_nb = result.C_nb_start;  // only where the model is linearised
   input.noise.gyro_arw = noise.gyro_arw;
   input.noise.accel_vrw = noise.accel_vrw;
   input.noise.observation.sigma = noise.position_sigma;

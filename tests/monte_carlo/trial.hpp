@@ -23,17 +23,17 @@ inline constexpr std::array<std::string_view, 3> control_names = {"noise / 2", "
 
 struct Trial {
   std::uint64_t seed = 0;
-  std::string failure;                  // not empty: no answer
-  ParameterVector error_bound;          // error over the bound of this very run
-  ParameterVector error_plan;           // error over what predict() promises for the commanded schedule
-  ParameterVector own_bound;            // the estimator's own sigma over the bound
+  std::string failure;          // not empty: no answer
+  ParameterVector error_bound;  // error over the bound of this very run
+  ParameterVector error_plan;   // error over what predict() promises for the commanded schedule
+  ParameterVector own_bound;    // the estimator's own sigma over the bound
   Nees nees;
-  Nees gyro_drift;                      // the three drifts alone, with their own covariance
-  std::array<Nees, control_names.size()> controls;   // zero degrees: not run
+  Nees gyro_drift;                                  // the three drifts alone, with their own covariance
+  std::array<Nees, control_names.size()> controls;  // zero degrees: not run
   Verdict verdict = Verdict::consistent;
   int passes = 0;
   double nis = 0.0;
-  double arw_ratio = 0.0, vrw_ratio = 0.0;   // noise densities found, over the true ones
+  double arw_ratio = 0.0, vrw_ratio = 0.0;  // noise densities found, over the true ones
 };
 
 Trial run_trial(const Case& c, double sample_rate_hz, std::uint64_t seed, bool with_controls);

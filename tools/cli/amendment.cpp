@@ -105,7 +105,7 @@ std::string equation_text(const Finding& f, double mean_temperature_c, double la
   if (thermal && measured) {
     text += key_value("reference_c", mean_temperature_c);
   }
-  if (f.effect == "gyro_magnetic_sensitivity") {   // the field that the coefficients were found with
+  if (f.effect == "gyro_magnetic_sensitivity") {  // the field that the coefficients were found with
     const Vector3 field = diagnosis::dipole_field(latitude);
     text += key_value("field_north", field(0)) + key_value("field_up", field(1)) + key_value("field_east", field(2));
   }
@@ -164,7 +164,9 @@ Schedule schedule_of(const Recording& recording, const ImuData& data) {
   double turning = 0.0;
   std::size_t turns = 0;
   GimbalPosition last;
-  const auto nearest = [](double angle_deg, double to_deg) { return to_deg + std::remainder(angle_deg - to_deg, 360.0); };
+  const auto nearest = [](double angle_deg, double to_deg) {
+    return to_deg + std::remainder(angle_deg - to_deg, 360.0);
+  };
   for (const Segment& s : find_segments(data)) {
     if (s.rotation) {
       turning += s.end_s - s.start_s;

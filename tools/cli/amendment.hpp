@@ -25,7 +25,6 @@ Schedule schedule_of(const Recording& recording, const ImuData& data);
 
 // physics.toml, sim.toml and schedule.toml in `folder`, which is made where it is not there.
 Expected<void> write_amendment(const std::filesystem::path& folder, const diagnosis::Diagnosis& diagnosis,
-                               const diagnosis::AssumedNoise& assumed, const Recording& recording,
-                               const ImuData& data);
+                               const diagnosis::AssumedNoise& assumed, const Recording& recording, const ImuData& data);
 
 }  // namespace selfcal::cli

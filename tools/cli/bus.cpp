@@ -47,7 +47,7 @@ class StopSignals {
     ::sigemptyset(&both);
     ::sigaddset(&both, SIGINT);
     ::sigaddset(&both, SIGTERM);
-    ::sigprocmask(SIG_BLOCK, &both, &outside_);   // delivered inside ppoll() alone: none is missed
+    ::sigprocmask(SIG_BLOCK, &both, &outside_);  // delivered inside ppoll() alone: none is missed
   }
   const sigset_t* while_waiting() const { return &outside_; }
 
@@ -84,7 +84,7 @@ Expected<int> log_bus(const LogArguments& arguments) {
   std::array<char, can::max_log_line> buffer{};
   std::uint64_t written = 0;
   while (stop_asked == 0 && (!arguments.count || written < *arguments.count)) {
-    std::fflush(stdout);   // what has come is shown before the wait
+    std::fflush(stdout);  // what has come is shown before the wait
     std::optional<double> left;
     if (arguments.seconds) {
       left = *arguments.seconds - std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -167,9 +167,7 @@ CommandRun configure(CLI::App& app) {
   decode_app->add_option("--response-id", decode->decoder.response_id, "INS to tester")->capture_default_str();
   decode_app->add_option("--functional-id", decode->decoder.functional_id, "tester to all")->capture_default_str();
   decode_app->add_flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
-  return [log_app, log, decode]() -> Expected<int> {
-    return log_app->parsed() ? log_bus(*log) : decode_log(*decode);
-  };
+  return [log_app, log, decode]() -> Expected<int> { return log_app->parsed() ? log_bus(*log) : decode_log(*decode); };
 }
 
 const CommandRegistration registration{{"bus", "log and decode the CAN bus", configure}};

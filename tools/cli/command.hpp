@@ -29,7 +29,7 @@ using CommandRun = std::function<Expected<int>()>;
 struct Command {
   std::string name;
   std::string description;
-  std::function<CommandRun(CLI::App&)> configure;   // adds options to the subcommand's parser
+  std::function<CommandRun(CLI::App&)> configure;  // adds options to the subcommand's parser
 };
 
 class CommandRegistration {

@@ -11,7 +11,6 @@
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
-#include "protocol/recording/atomic_file.hpp"
 #include "tools/cli/amendment.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/diagnose_output.hpp"
@@ -73,7 +72,8 @@ Expected<int> compare_with(const DiagnoseArguments& arguments, const ImuData& da
   }
   const diagnosis::ComparisonOutcome outcome = [&] {
     ProgressLine line;
-    return diagnosis::compare(data, (*simulation)->data, options, [&line](const std::string& words) { line.show(words); });
+    return diagnosis::compare(data, (*simulation)->data, options,
+                              [&line](const std::string& words) { line.show(words); });
   }();
   if (!outcome.comparison) {
     return fail(ErrorKind::bad_input,
@@ -110,8 +110,8 @@ Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::
                            const diagnosis::DiagnosisOptions& options, const Opened& opened) {
   Expected<void> written;
   if (!arguments.physics.empty()) {
-    written = write_file_atomically(arguments.physics,
-                                    physics_text(diagnosis, options.assumed, opened.data.site.latitude));
+    written =
+        write_file_atomically(arguments.physics, physics_text(diagnosis, options.assumed, opened.data.site.latitude));
   }
   if (written && !arguments.amended.empty()) {
     written = write_amendment(arguments.amended, diagnosis, options.assumed, opened.loaded.recording, opened.data);
@@ -149,7 +149,8 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
 Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis) {
   fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate).dump() + "\n"
                                   : diagnosis_text(diagnosis));
-  for (const std::string* asked : {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
+  for (const std::string* asked :
+       {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
     if (!asked->empty()) {
       return fail(ErrorKind::bad_input, fmt::format("{}: {}: nothing to do with {}", arguments.recording,
                                                     diagnosis.faults.front().words, *asked));

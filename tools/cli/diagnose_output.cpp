@@ -33,7 +33,9 @@ std::string text_of(const Finding& f) {
 std::string places_text(const std::vector<diagnosis::Located>& places, const std::vector<diagnosis::Located>& by) {
   constexpr std::size_t most = 5;
   std::string text;
-  const auto add = [&](const diagnosis::Located& l) { text += fmt::format("  {:.1f} sigma  {}\n", l.significance, l.words); };
+  const auto add = [&](const diagnosis::Located& l) {
+    text += fmt::format("  {:.1f} sigma  {}\n", l.significance, l.words);
+  };
   std::for_each(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(std::min(most, places.size())), add);
   std::for_each(by.begin(), by.end(), add);
   return text;
@@ -132,16 +134,16 @@ std::string comparison_text(const diagnosis::Comparison& c) {
   const diagnosis::Diagnosis& d = c.diagnosis;
   std::string text = d.mismatch ? "recording and simulation differ\n" : "recording and simulation agree\n";
   for (const Adequacy* a : {&d.before, &d.after}) {
-    text += fmt::format("{} NIS of the difference {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n",
-                        a == &d.before ? "before:" : "after: ", a->nis, a->largest_sigma,
-                        a->log_p_white / std::log(10.0));
+    text +=
+        fmt::format("{} NIS of the difference {:.3f}, largest misfit {:.1f} sigma, whiteness log10 p {:.1f}\n",
+                    a == &d.before ? "before:" : "after: ", a->nis, a->largest_sigma, a->log_p_white / std::log(10.0));
   }
   if (!d.before.accepted) {
     text += "where:\n";
     for (std::size_t k = 0; k < std::min<std::size_t>(5, d.located.size()); ++k) {
-      text += fmt::format("  {:.1f} sigma  {}: {:.3g} {} more in the recording\n", d.located[k].significance,
-                          d.located[k].words, d.located[k].size,
-                          d.located[k].axis.starts_with("gyro") ? "deg/h" : "ug");
+      text +=
+          fmt::format("  {:.1f} sigma  {}: {:.3g} {} more in the recording\n", d.located[k].significance,
+                      d.located[k].words, d.located[k].size, d.located[k].axis.starts_with("gyro") ? "deg/h" : "ug");
     }
   }
   if (!c.in_both.empty()) {
@@ -173,25 +175,24 @@ std::string comparison_text(const diagnosis::Comparison& c) {
   text += differing == 0 ? " none\n" : "\n";
   constexpr double noticeable = 0.2 * units::degree;
   if (c.attitude_difference > noticeable) {
-    text += fmt::format("attitudes differ by up to {:.2f} deg: what both hold and no name was found for cancels only to that degree\n",
-                        c.attitude_difference / units::degree);
+    text += fmt::format(
+        "attitudes differ by up to {:.2f} deg: what both hold and no name was found for cancels only to that degree\n",
+        c.attitude_difference / units::degree);
   }
   return text;
 }
 
 ordered_json holdout_json(const diagnosis::Holdout& h) {
-  return {{"before", to_json(h.before)},
-          {"after", to_json(h.after)},
-          {"gain", h.gain},
-          {"not_carried", h.not_carried}};
+  return {{"before", to_json(h.before)}, {"after", to_json(h.after)}, {"gain", h.gain}, {"not_carried", h.not_carried}};
 }
 
 std::string holdout_text(const diagnosis::Holdout& h) {
-  std::string text = fmt::format("held-out recording: log likelihood gains {:.1f} with what was named, nothing fitted anew\n", h.gain);
+  std::string text =
+      fmt::format("held-out recording: log likelihood gains {:.1f} with what was named, nothing fitted anew\n", h.gain);
   for (const diagnosis::HeldOutState* s : {&h.before, &h.after}) {
-    text += fmt::format("  {} NIS {:.3f}, whiteness log10 p {:.1f}, the 24 against the first recording {:.2f} (1 expected)\n",
-                        s == &h.before ? "before:" : "after: ", s->nis, s->log_p_white / std::log(10.0),
-                        s->parameter_disagreement);
+    text += fmt::format(
+        "  {} NIS {:.3f}, whiteness log10 p {:.1f}, the 24 against the first recording {:.2f} (1 expected)\n",
+        s == &h.before ? "before:" : "after: ", s->nis, s->log_p_white / std::log(10.0), s->parameter_disagreement);
   }
   if (!h.not_carried.empty()) {
     text += fmt::format("  not carried over: {}\n", fmt::join(h.not_carried, ", "));
@@ -229,8 +230,8 @@ std::string empirical_text(const diagnosis::EmpiricalDescription& d) {
 ordered_json splits_json(const std::vector<diagnosis::Split>& splits) {
   ordered_json all = ordered_json::array();
   for (const diagnosis::Split& s : splits) {
-    ordered_json j = {{"effect", s.effect}, {"rivals", s.rivals}, {"contained_in", s.contain},
-                      {"separation_now", s.separation_now}};
+    ordered_json j = {
+        {"effect", s.effect}, {"rivals", s.rivals}, {"contained_in", s.contain}, {"separation_now", s.separation_now}};
     j["experiments"] = ordered_json::array();
     for (const diagnosis::Experiment& e : s.experiments) {
       j["experiments"].push_back({{"id", e.id},
@@ -247,10 +248,12 @@ ordered_json splits_json(const std::vector<diagnosis::Split>& splits) {
 std::string splits_text(const std::vector<diagnosis::Split>& splits) {
   std::string text;
   for (const diagnosis::Split& s : splits) {
-    text += fmt::format("{} against {}: {:.1f} sigma apart now\n", s.effect, fmt::join(s.rivals, ", "), s.separation_now);
+    text +=
+        fmt::format("{} against {}: {:.1f} sigma apart now\n", s.effect, fmt::join(s.rivals, ", "), s.separation_now);
     if (!s.contain.empty()) {
-      text += fmt::format("  nothing splits it from {}, of which it is a special case: the fewer parameters are preferred\n",
-                          fmt::join(s.contain, ", "));
+      text += fmt::format(
+          "  nothing splits it from {}, of which it is a special case: the fewer parameters are preferred\n",
+          fmt::join(s.contain, ", "));
     }
     for (const diagnosis::Experiment& e : s.experiments) {
       text += fmt::format("  {:6.1f} sigma with this recording and one more, {:.0f} min: {} (closest rival {})\n",

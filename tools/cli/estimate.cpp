@@ -43,8 +43,7 @@ Expected<CalibrationOptions> options_from(const EstimateArguments& arguments) {
 
 std::string progress_text(const CalibrationProgress& progress) {
   return fmt::format("pass {} {}: {:3.0f} %", progress.pass,
-                     progress.direction == PassDirection::forward ? "forward" : "reverse",
-                     100.0 * progress.fraction);
+                     progress.direction == PassDirection::forward ? "forward" : "reverse", 100.0 * progress.fraction);
 }
 
 Expected<int> estimate(const EstimateArguments& arguments) {

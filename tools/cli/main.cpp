@@ -21,10 +21,11 @@ int report(const std::string& command, const Error& error) {
 }
 
 int parse_and_run(int argc, char** argv) {
-  CLI::App app("Calibrates an inertial navigation system on its own gimbal.\n"
-               "Exit status: 0 done; 1 done, but the answer is no; 2 usage; 3 bad input; 4 INS, bus or daemon; "
-               "5 internal.",
-               "selfcal");
+  CLI::App app(
+      "Calibrates an inertial navigation system on its own gimbal.\n"
+      "Exit status: 0 done; 1 done, but the answer is no; 2 usage; 3 bad input; 4 INS, bus or daemon; "
+      "5 internal.",
+      "selfcal");
   app.require_subcommand(1);
   app.set_version_flag("--version", "selfcal " SELFCAL_VERSION);
   std::map<const CLI::App*, cli::CommandRun> runs;
@@ -34,12 +35,12 @@ int parse_and_run(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::Success& success) {   // --help
+  } catch (const CLI::Success& success) {  // --help
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     const auto chosen = app.get_subcommands();
-    fmt::print(stderr, "selfcal{}{}: {}\n", chosen.empty() ? "" : " ",
-               chosen.empty() ? "" : chosen.front()->get_name(), error.what());
+    fmt::print(stderr, "selfcal{}{}: {}\n", chosen.empty() ? "" : " ", chosen.empty() ? "" : chosen.front()->get_name(),
+               error.what());
     return usage_status;
   }
   const CLI::App* chosen = app.get_subcommands().front();

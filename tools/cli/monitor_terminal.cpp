@@ -22,7 +22,7 @@ int attribute(ScreenLine::Style style) {
 }  // namespace
 
 MonitorTerminal::MonitorTerminal() {
-  initscr();   // ends the program with a message where TERM is unknown
+  initscr();  // ends the program with a message where TERM is unknown
   cbreak();
   noecho();
   curs_set(0);
@@ -31,7 +31,7 @@ MonitorTerminal::MonitorTerminal() {
   if (has_colors() && std::getenv("NO_COLOR") == nullptr) {
     start_color();
     use_default_colors();
-    init_pair(1, COLOR_BLUE, -1);      // told from each other by bold and reverse too
+    init_pair(1, COLOR_BLUE, -1);  // told from each other by bold and reverse too
     init_pair(2, COLOR_YELLOW, -1);
   }
 }

@@ -12,7 +12,7 @@ using Style = ScreenLine::Style;
 
 constexpr std::size_t most_events = 50;
 constexpr int bar_cells = 5;
-constexpr double widest_ratio = 100.0;   // sigma/tolerance at which a bar is empty
+constexpr double widest_ratio = 100.0;  // sigma/tolerance at which a bar is empty
 
 std::string bar(double share, int cells) {
   const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * cells));
@@ -50,9 +50,9 @@ std::string parameter_cell(const selfcal_lcm::estimate& e, std::size_t k) {
 }
 
 std::string estimate_words(const selfcal_lcm::estimate& e) {
-  std::string words = e.running != 0
-                          ? fmt::format("on {:.0f} s of data", e.data_s)
-                          : fmt::format("pass {} [{}] {:.0f} %", e.pass_number, bar(e.pass_fraction, 10), 100.0 * e.pass_fraction);
+  std::string words = e.running != 0 ? fmt::format("on {:.0f} s of data", e.data_s)
+                                     : fmt::format("pass {} [{}] {:.0f} %", e.pass_number, bar(e.pass_fraction, 10),
+                                                   100.0 * e.pass_fraction);
   words += fmt::format(", {} of {} within tolerance", e.tolerances_met, e.count);
   if (e.running != 0 && e.met_at_s >= 0.0) {
     words += fmt::format(", all at {:.0f} s", e.met_at_s);
@@ -74,10 +74,11 @@ void add_ins(const std::string& name, const MonitorState::Ins& ins, std::vector<
   const bool link = s.link_up != 0;
   lines.push_back({link ? Style::title : Style::bad,
                    fmt::format("{} {}: {}, run {}{}", s.ins, s.serial, s.state, s.run, link ? "" : "   LINK LOST")});
-  lines.push_back({Style::plain, fmt::format("schedule  [{}] position {} of {}, {} left",
-                                             bar(share(s.position, s.positions), 20), s.position, s.positions,
-                                             minutes_and_seconds(s.time_left_s))});
-  lines.push_back({Style::plain, fmt::format("gimbal    outer {:8.2f} deg   inner {:8.2f} deg", s.outer_deg, s.inner_deg)});
+  lines.push_back(
+      {Style::plain, fmt::format("schedule  [{}] position {} of {}, {} left", bar(share(s.position, s.positions), 20),
+                                 s.position, s.positions, minutes_and_seconds(s.time_left_s))});
+  lines.push_back(
+      {Style::plain, fmt::format("gimbal    outer {:8.2f} deg   inner {:8.2f} deg", s.outer_deg, s.inner_deg)});
   lines.push_back({s.lost_frames > 0 ? Style::bad : Style::plain,
                    fmt::format("transfer  [{}] page {} of {}, {} written, {} frames lost",
                                bar(share(s.pages_pulled, s.pages_expected), 20), s.pages_pulled, s.pages_expected,
@@ -91,8 +92,8 @@ void add_estimate(const MonitorState::Ins& ins, std::vector<ScreenLine>& lines) 
   }
   const selfcal_lcm::estimate& e = *ins.estimate;
   lines.push_back({e.tolerances_met == e.count ? Style::good : Style::plain, "estimate  " + estimate_words(e)});
-  lines.push_back({Style::faint, fmt::format("{:<15}{:>8} {:<6} {:<8}  {:<15}{:>8} {:<6} {}", "parameter", "sigma", "unit",
-                                             "target", "parameter", "sigma", "unit", "target")});
+  lines.push_back({Style::faint, fmt::format("{:<15}{:>8} {:<6} {:<8}  {:<15}{:>8} {:<6} {}", "parameter", "sigma",
+                                             "unit", "target", "parameter", "sigma", "unit", "target")});
   const std::size_t half = (e.name.size() + 1) / 2;
   for (std::size_t k = 0; k < half; ++k) {
     std::string text = parameter_cell(e, k);
@@ -182,16 +183,18 @@ std::string message_line(const selfcal_lcm::service_status& message) {
 }
 
 std::string message_line(const selfcal_lcm::ins_status& message) {
-  return fmt::format("{} {}: {}, run {}, position {}/{}, outer {:.2f} deg, inner {:.2f} deg, {:.0f} s left, pages {}/{}{}",
-                     message.ins, message.serial, message.state, message.run, message.position, message.positions,
-                     message.outer_deg, message.inner_deg, message.time_left_s, message.pages_pulled,
-                     message.pages_expected, message.link_up != 0 ? "" : ", LINK LOST");
+  return fmt::format(
+      "{} {}: {}, run {}, position {}/{}, outer {:.2f} deg, inner {:.2f} deg, {:.0f} s left, pages {}/{}{}",
+      message.ins, message.serial, message.state, message.run, message.position, message.positions, message.outer_deg,
+      message.inner_deg, message.time_left_s, message.pages_pulled, message.pages_expected,
+      message.link_up != 0 ? "" : ", LINK LOST");
 }
 
 std::string message_line(const selfcal_lcm::estimate& message) {
   std::string text = message.ins + ": " + estimate_words(message);
   for (std::size_t i = 0; i < message.name.size(); ++i) {
-    text += fmt::format("; {} {:.5g} +- {:.3g} {}", message.name[i], message.value[i], message.sigma[i], message.unit[i]);
+    text +=
+        fmt::format("; {} {:.5g} +- {:.3g} {}", message.name[i], message.value[i], message.sigma[i], message.unit[i]);
   }
   return text;
 }

@@ -20,16 +20,16 @@ struct MonitorState {
     std::optional<selfcal_lcm::estimate> estimate;
   };
   std::optional<selfcal_lcm::service_status> service;
-  std::map<std::string, Ins> instruments;          // by name
-  std::map<std::string, std::string> standing;     // alarms that stand, by INS and words
-  std::deque<std::string> events;                  // alarms that were events, newest last
+  std::map<std::string, Ins> instruments;       // by name
+  std::map<std::string, std::string> standing;  // alarms that stand, by INS and words
+  std::deque<std::string> events;               // alarms that were events, newest last
 
   void take(const selfcal_lcm::alarm& message);
 };
 
 struct ScreenLine {
   enum class Style { plain, title, good, bad, faint } style = Style::plain;
-  std::string text;                                // ASCII, at most `columns` long
+  std::string text;  // ASCII, at most `columns` long
 };
 
 // Exactly `rows` lines: the service, one INS in full (the `selected`th), the others in a line each, the 24 sigma closing

@@ -1,9 +1,9 @@
 #include "tools/cli/online_client.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <operator_api/ins1_proxy.hpp>
 #include <operator_api/manager1_proxy.hpp>
-#include <poll.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -17,7 +17,9 @@ namespace {
 Error from_bus(const sdbus::Error& error) {
   const bool declined = error.getName() == operator_api::error_unknown;
   std::string message = error.getMessage();
-  if (error.getName() == "org.freedesktop.DBus.Error.ServiceUnknown") message = "selfcald is not running on this bus";
+  if (error.getName() == "org.freedesktop.DBus.Error.ServiceUnknown") {
+    message = "selfcald is not running on this bus";
+  }
   if (error.getName() == "org.freedesktop.DBus.Error.AccessDenied") {
     message = "not allowed: only root and members of group selfcal may do this";
   }
@@ -108,16 +110,24 @@ class InsWatch::Proxy : public sdbus::ProxyInterfaces<org::selfcal::Ins1_proxy> 
 
  private:
   void onProgressChanged(const std::uint64_t& run, const Entries& progress) override {
-    if (owner_.on_progress) owner_.on_progress(run, progress);
+    if (owner_.on_progress) {
+      owner_.on_progress(run, progress);
+    }
   }
   void onStateChanged(const std::uint64_t& run, const std::string&, const std::string& words) override {
-    if (owner_.on_state) owner_.on_state(run, words);
+    if (owner_.on_state) {
+      owner_.on_state(run, words);
+    }
   }
   void onWarning(const std::uint64_t& run, const std::string& text) override {
-    if (owner_.on_warning) owner_.on_warning(run, text);
+    if (owner_.on_warning) {
+      owner_.on_warning(run, text);
+    }
   }
   void onFinished(const std::uint64_t& run, const std::int32_t& exit_status, const std::string& reason) override {
-    if (owner_.on_finished) owner_.on_finished(run, exit_status, reason);
+    if (owner_.on_finished) {
+      owner_.on_finished(run, exit_status, reason);
+    }
   }
 
   InsWatch& owner_;
@@ -147,8 +157,12 @@ Expected<InsSnapshot> InsWatch::snapshot() {
 Expected<void> wait_for_news(sdbus::IConnection& connection, int timeout_ms) {
   try {
     bool any = false;
-    while (connection.processPendingRequest()) any = true;
-    if (any) return {};
+    while (connection.processPendingRequest()) {
+      any = true;
+    }
+    if (any) {
+      return {};
+    }
     const auto data = connection.getEventLoopPollData();
     pollfd descriptor{data.fd, data.events, 0};
     const int bus_timeout = data.getPollTimeout();
@@ -163,12 +177,18 @@ Expected<void> wait_for_news(sdbus::IConnection& connection, int timeout_ms) {
 
 Expected<std::string> choose_ins(ManagerClient& manager, const std::string& given) {
   const auto instruments = manager.instruments();
-  if (!instruments) return tl::unexpected(instruments.error());
-  if (given.empty() && instruments->size() == 1) return instruments->front();
-  if (std::find(instruments->begin(), instruments->end(), given) != instruments->end()) return given;
-  return fail(ErrorKind::usage, fmt::format("{}; configured: {}",
-                                            given.empty() ? "which INS?" : fmt::format("no INS \"{}\"", given),
-                                            fmt::join(*instruments, ", ")));
+  if (!instruments) {
+    return tl::unexpected(instruments.error());
+  }
+  if (given.empty() && instruments->size() == 1) {
+    return instruments->front();
+  }
+  if (std::find(instruments->begin(), instruments->end(), given) != instruments->end()) {
+    return given;
+  }
+  return fail(ErrorKind::usage,
+              fmt::format("{}; configured: {}", given.empty() ? "which INS?" : fmt::format("no INS \"{}\"", given),
+                          fmt::join(*instruments, ", ")));
 }
 
 }  // namespace selfcal::cli

@@ -21,7 +21,7 @@ namespace {
 volatile sig_atomic_t ended = 0;
 
 constexpr int frame_ms = 100;
-constexpr int most_per_frame = 1000;   // messages
+constexpr int most_per_frame = 1000;  // messages
 
 struct Options {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
@@ -77,7 +77,7 @@ Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Options& opti
     terminal.emplace();
   }
   std::size_t selected = 0;
-  bool over = false;   // a log has an end; what it left stays on the screen
+  bool over = false;  // a log has an end; what it left stays on the screen
   while (ended == 0 && !(options.once && listener.heard() > 0) && !(over && !terminal)) {
     if (!over && lcm.handleTimeout(frame_ms) < 0 && errno != EINTR) {
       if (!log) {
@@ -110,7 +110,8 @@ Expected<int> monitor(const Options& options) {
   lcm::LCM lcm(options.url);
   if (!lcm.good()) {
     return fail(ErrorKind::device, fmt::format("LCM: {} cannot be opened (no multicast route? "
-                                               "ip route add 239.255.76.67/32 dev lo)", options.url));
+                                               "ip route add 239.255.76.67/32 dev lo)",
+                                               options.url));
   }
   struct sigaction action {};
   action.sa_handler = [](int) { ended = 1; };

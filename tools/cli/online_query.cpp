@@ -29,7 +29,9 @@ using Body = Expected<int> (*)(ManagerClient&, const Options&);
 CommandRun online(const std::shared_ptr<Options>& options, Body body) {
   return [options, body]() -> Expected<int> {
     auto manager = ManagerClient::connect();
-    if (!manager) return tl::unexpected(manager.error());
+    if (!manager) {
+      return tl::unexpected(manager.error());
+    }
     return body(**manager, *options);
   };
 }
@@ -59,12 +61,18 @@ nlohmann::ordered_json estimate_of(const Entries& progress) {
 
 Expected<int> status(ManagerClient& manager, const Options& options) {
   const auto instruments = manager.instruments();
-  if (!instruments) return tl::unexpected(instruments.error());
+  if (!instruments) {
+    return tl::unexpected(instruments.error());
+  }
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const std::string& ins : *instruments) {
-    if (!options.ins.empty() && options.ins != ins) continue;
+    if (!options.ins.empty() && options.ins != ins) {
+      continue;
+    }
     const auto snapshot = InsWatch(manager.connection(), ins).snapshot();
-    if (!snapshot) return tl::unexpected(snapshot.error());
+    if (!snapshot) {
+      return tl::unexpected(snapshot.error());
+    }
     const Entries& progress = snapshot->progress;
     all.push_back({{"ins", ins},
                    {"serial", snapshot->serial},
@@ -84,7 +92,9 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                    {"link_up", entry(progress, "link_up", true)},
                    {"estimate", estimate_of(progress)}});
   }
-  if (all.empty()) return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
+  if (all.empty()) {
+    return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
+  }
   if (options.json) {
     fmt::print("{}\n", nlohmann::ordered_json{{"instruments", all}}.dump());
     return 0;
@@ -94,8 +104,12 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                ins["state"].get<std::string>());
     if (ins["state"] != "idle") {
       const auto& estimate = ins["estimate"];
-      if (!estimate.is_null()) fmt::print(", {} of 24 to tolerance", estimate["tolerances_met"].get<int>());
-      if (ins["finish_in_s"].get<double>() >= 0) fmt::print(", rotation ends in {:.0f} s", ins["finish_in_s"].get<double>());
+      if (!estimate.is_null()) {
+        fmt::print(", {} of 24 to tolerance", estimate["tolerances_met"].get<int>());
+      }
+      if (ins["finish_in_s"].get<double>() >= 0) {
+        fmt::print(", rotation ends in {:.0f} s", ins["finish_in_s"].get<double>());
+      }
       fmt::print(", run {} by {} since {}, position {} of {}, pages {}/{}", ins["run"].get<std::uint64_t>(),
                  ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
                  ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());
@@ -114,9 +128,15 @@ CommandRun configure_status(CLI::App& app) {
 
 Expected<int> abort_run(ManagerClient& manager, const Options& options) {
   const auto ins = choose_ins(manager, options.ins);
-  if (!ins) return tl::unexpected(ins.error());
-  if (auto asked = manager.abort(*ins, options.reason); !asked) return tl::unexpected(asked.error());
-  if (options.json) fmt::print("{}\n", nlohmann::json{{"ins", *ins}, {"stopping", true}}.dump());
+  if (!ins) {
+    return tl::unexpected(ins.error());
+  }
+  if (auto asked = manager.abort(*ins, options.reason); !asked) {
+    return tl::unexpected(asked.error());
+  }
+  if (options.json) {
+    fmt::print("{}\n", nlohmann::json{{"ins", *ins}, {"stopping", true}}.dump());
+  }
   return 0;
 }
 
@@ -130,7 +150,9 @@ CommandRun configure_abort(CLI::App& app) {
 
 Expected<int> show(ManagerClient& manager, const Options& options) {
   const auto document = manager.show(options.run);
-  if (!document) return tl::unexpected(document.error());
+  if (!document) {
+    return tl::unexpected(document.error());
+  }
   fmt::print("{}", options.json ? *document + "\n" : run_text(*document, use_colour(stdout), true));
   return 0;
 }
@@ -144,10 +166,10 @@ CommandRun configure_show(CLI::App& app) {
 
 Expected<int> history(ManagerClient& manager, const Options& options) {
   const auto document = manager.history(options.serial);
-  if (!document) return tl::unexpected(document.error());
-  fmt::print("{}", options.json  ? *document + "\n"
-                   : options.csv ? history_csv(*document)
-                                 : history_text(*document));
+  if (!document) {
+    return tl::unexpected(document.error());
+  }
+  fmt::print("{}", options.json ? *document + "\n" : options.csv ? history_csv(*document) : history_text(*document));
   return 0;
 }
 
@@ -162,7 +184,9 @@ CommandRun configure_history(CLI::App& app) {
 // Sound, or what is wrong with it (status 1).
 Expected<int> check_database(ManagerClient& manager, const Options& options) {
   const auto complaint = manager.check_database();
-  if (!complaint) return tl::unexpected(complaint.error());
+  if (!complaint) {
+    return tl::unexpected(complaint.error());
+  }
   if (options.json) {
     fmt::print("{}\n", nlohmann::json{{"sound", complaint->empty()}, {"complaint", *complaint}}.dump());
   } else {
@@ -173,13 +197,15 @@ Expected<int> check_database(ManagerClient& manager, const Options& options) {
 
 Expected<int> backup_database(ManagerClient& manager, const Options& options) {
   const auto path = manager.backup_database(options.name);
-  if (!path) return tl::unexpected(path.error());
+  if (!path) {
+    return tl::unexpected(path.error());
+  }
   fmt::print("{}\n", options.json ? nlohmann::json{{"path", *path}}.dump() : *path);
   return 0;
 }
 
 Expected<int> say_restored(const std::string& kept, const Options& options) {
-  fmt::print("{}\n", options.json ? nlohmann::json{{"kept", kept}}.dump()
+  fmt::print("{}\n", options.json   ? nlohmann::json{{"kept", kept}}.dump()
                      : kept.empty() ? std::string("restored")
                                     : "restored; the former database is " + kept);
   return 0;
@@ -187,15 +213,21 @@ Expected<int> say_restored(const std::string& kept, const Options& options) {
 
 Expected<int> restore_online(ManagerClient& manager, const Options& options) {
   const auto kept = manager.restore_database(options.name);
-  if (!kept) return tl::unexpected(kept.error());
+  if (!kept) {
+    return tl::unexpected(kept.error());
+  }
   return say_restored(*kept, options);
 }
 
 Expected<int> restore_offline(const Options& options) {
   const auto lock = StateLock::take(options.state_directory);
-  if (!lock) return tl::unexpected(lock.error());
+  if (!lock) {
+    return tl::unexpected(lock.error());
+  }
   const auto kept = restore_database(options.state_directory, options.name);
-  if (!kept) return tl::unexpected(kept.error());
+  if (!kept) {
+    return tl::unexpected(kept.error());
+  }
   return say_restored(kept->string(), options);
 }
 
@@ -214,7 +246,9 @@ CommandRun configure_database(CLI::App& app) {
   const CommandRun run_check = online(options, check_database);
   const CommandRun run_backup = online(options, backup_database);
   return [=] {
-    if (restore->parsed()) return options->offline ? restore_offline(*options) : run_restore();
+    if (restore->parsed()) {
+      return options->offline ? restore_offline(*options) : run_restore();
+    }
     return check->parsed() ? run_check() : run_backup();
   };
 }

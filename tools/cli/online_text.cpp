@@ -22,19 +22,23 @@ std::string parameter_lines(const json& result, bool colour) {
   std::string text = fmt::format("{:<26}{:>14}{:>12}  {}\n", "parameter", "value", "sigma", "unit");
   for (const json& parameter : result.at("parameters")) {
     const bool determined = parameter.at("determined").get<bool>();
-    text += fmt::format("{:<26}{:>14.5g}{:>12.3g}  {}{}\n", parameter.at("name").get<std::string>(),
-                        parameter.at("value").is_number() ? parameter.at("value").get<double>() : 0.0,
-                        parameter.at("sigma").is_number() ? parameter.at("sigma").get<double>() : 0.0,
-                        parameter.at("unit").get<std::string>(),
-                        determined ? "" : paint("  not determined", "33", colour));
+    text +=
+        fmt::format("{:<26}{:>14.5g}{:>12.3g}  {}{}\n", parameter.at("name").get<std::string>(),
+                    parameter.at("value").is_number() ? parameter.at("value").get<double>() : 0.0,
+                    parameter.at("sigma").is_number() ? parameter.at("sigma").get<double>() : 0.0,
+                    parameter.at("unit").get<std::string>(), determined ? "" : paint("  not determined", "33", colour));
   }
   return text;
 }
 
 std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  if (text.find_first_of(",\"\n") == std::string::npos) {
+    return text;
+  }
   std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  for (const char c : text) {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
   return quoted + "\"";
 }
 
@@ -46,20 +50,27 @@ std::string run_text(const std::string& document, bool colour, bool story) {
   const bool well = ended && run.at("exit_status") == 0;
   std::string text = fmt::format("run {}: {} of INS {} ({}), by {}\n", run.at("run").get<int>(), text_of(run, "kind"),
                                  text_of(run, "serial"), text_of(run, "ins"), text_of(run, "user"));
-  text += fmt::format("  {} to {}, schedule {}{}\n", text_of(run, "started_utc"),
-                      ended ? text_of(run, "ended_utc") : "now", text_of(run, "schedule"),
-                      run.at("dry_run").get<bool>() ? ", dry run" : "");
+  text +=
+      fmt::format("  {} to {}, schedule {}{}\n", text_of(run, "started_utc"), ended ? text_of(run, "ended_utc") : "now",
+                  text_of(run, "schedule"), run.at("dry_run").get<bool>() ? ", dry run" : "");
   if (run.at("early_end_s").is_number()) {
-    text += fmt::format("  rotation ended early, after {:.0f} s: every tolerance was met\n", run.at("early_end_s").get<double>());
+    text += fmt::format("  rotation ended early, after {:.0f} s: every tolerance was met\n",
+                        run.at("early_end_s").get<double>());
   }
   text += "  " + paint(text_of(run, "state"), well ? "32" : ended ? "31" : "36", colour);
-  if (!text_of(run, "reason").empty()) text += ": " + text_of(run, "reason");
+  if (!text_of(run, "reason").empty()) {
+    text += ": " + text_of(run, "reason");
+  }
   text += '\n';
-  if (!text_of(run, "force_reason").empty()) text += fmt::format("  forced: {}\n", text_of(run, "force_reason"));
-  if (!text_of(run, "recording").empty()) text += fmt::format("  recording {}\n", text_of(run, "recording"));
+  if (!text_of(run, "force_reason").empty()) {
+    text += fmt::format("  forced: {}\n", text_of(run, "force_reason"));
+  }
+  if (!text_of(run, "recording").empty()) {
+    text += fmt::format("  recording {}\n", text_of(run, "recording"));
+  }
   if (run.at("drift_before_m").is_number() && run.at("drift_after_m").is_number()) {
-    text += fmt::format("  free-inertial drift: {:.1f} m before, {:.1f} m after\n", run.at("drift_before_m").get<double>(),
-                        run.at("drift_after_m").get<double>());
+    text += fmt::format("  free-inertial drift: {:.1f} m before, {:.1f} m after\n",
+                        run.at("drift_before_m").get<double>(), run.at("drift_after_m").get<double>());
   }
   const json& pushed = run.at("coefficients").at("pushed");
   if (pushed.is_object()) {
@@ -71,7 +82,9 @@ std::string run_text(const std::string& document, bool colour, bool story) {
       text += fmt::format("  {}  {:<9} {}\n", text_of(event, "utc"), text_of(event, "kind"), text_of(event, "text"));
     }
   }
-  if (run.at("result").is_object()) text += parameter_lines(run.at("result"), colour);
+  if (run.at("result").is_object()) {
+    text += parameter_lines(run.at("result"), colour);
+  }
   return text;
 }
 
@@ -79,13 +92,15 @@ std::string history_text(const std::string& document) {
   const json history = json::parse(document);
   std::string text;
   for (const json& run : history.at("runs")) {
-    text += fmt::format("run {:<5} {}  {:<10} {:<10} {:<10} {}{}\n", run.at("run").get<int>(),
-                        text_of(run, "started_utc"), text_of(run, "serial"), text_of(run, "state"),
-                        text_of(run, "user"), text_of(run, "kind"),
-                        text_of(run, "reason").empty() ? "" : ": " + text_of(run, "reason"));
+    text +=
+        fmt::format("run {:<5} {}  {:<10} {:<10} {:<10} {}{}\n", run.at("run").get<int>(), text_of(run, "started_utc"),
+                    text_of(run, "serial"), text_of(run, "state"), text_of(run, "user"), text_of(run, "kind"),
+                    text_of(run, "reason").empty() ? "" : ": " + text_of(run, "reason"));
   }
   for (const json& parameter : history.at("parameters")) {
-    if (parameter.at("values").empty()) continue;
+    if (parameter.at("values").empty()) {
+      continue;
+    }
     text += fmt::format("\n{} [{}]", text_of(parameter, "name"), text_of(parameter, "unit"));
     if (parameter.contains("change_per_year")) {
       text += fmt::format(", {:+.3g} +- {:.2g} a year", parameter.at("change_per_year").get<double>(),
@@ -97,7 +112,9 @@ std::string history_text(const std::string& document) {
                           value.at("value").get<double>(), value.at("sigma").get<double>(),
                           value.at("determined").get<bool>() ? "" : "  not determined");
     }
-    for (const json& warning : parameter.at("warnings")) text += fmt::format("  warning: {}\n", warning.get<std::string>());
+    for (const json& warning : parameter.at("warnings")) {
+      text += fmt::format("  warning: {}\n", warning.get<std::string>());
+    }
   }
   return text.empty() ? "no runs\n" : text;
 }

@@ -23,7 +23,7 @@ struct PlanArguments {
   std::string schedule = "table2";
   std::optional<double> dwell_s;
   std::optional<double> rotation_s;
-  std::vector<double> attitude_deg = {0.0, 0.0, 0.0};   // roll, pitch, heading
+  std::vector<double> attitude_deg = {0.0, 0.0, 0.0};  // roll, pitch, heading
   double latitude_deg = 40.0;
   double height_m = 0.0;
   double arw_deg_per_sqrt_h = 0.001;
@@ -34,7 +34,7 @@ struct PlanArguments {
   bool optimize = false;
   double longest_s = SearchOptions{}.longest_s;
   std::string output;
-  std::string compared;        // a second schedule for the page
+  std::string compared;  // a second schedule for the page
   bool json = false;
 };
 
@@ -97,8 +97,12 @@ nlohmann::json plan_json(const Plan& plan, const Schedule& schedule, const Insta
     }
     history.push_back({{"end_s", forecast.end_s}, {"sigma", sigma}});
   }
-  return {{"duration_s", plan.duration_s}, {"parameters", parameters}, {"schedule", schedule_json(schedule)},
-          {"meets_tolerances", plan.meets_tolerances()}, {"warnings", warnings}, {"history", history}};
+  return {{"duration_s", plan.duration_s},
+          {"parameters", parameters},
+          {"schedule", schedule_json(schedule)},
+          {"meets_tolerances", plan.meets_tolerances()},
+          {"warnings", warnings},
+          {"history", history}};
 }
 
 void print_table(const Plan& plan, const Schedule& schedule, const Installation& installation) {
@@ -123,8 +127,7 @@ std::vector<std::string> warnings_for(const Plan& plan, const Schedule& schedule
     if (!plan.determined[k]) {
       const SensorParameter& p = sensor_parameters[k];
       warnings.push_back(fmt::format("{}: sigma {:.3g} {} does not meet the tolerance of {:.3g}", p.name,
-                                     plan.sigma(i) / p.si_per_unit, p.unit,
-                                     installation.tolerance(i) / p.si_per_unit));
+                                     plan.sigma(i) / p.si_per_unit, p.unit, installation.tolerance(i) / p.si_per_unit));
     }
   }
   if (warnings.empty()) {

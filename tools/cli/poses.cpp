@@ -45,14 +45,15 @@ Expected<diagnosis::PoseInput> read_poses(const std::string& path) {
     for (std::size_t k = 0; k < row.size(); ++k) {
       const auto [stop, error] = std::from_chars(line.data(), line.data() + line.size(), row[k]);
       if (error != std::errc{} || !std::isfinite(row[k])) {
-        return fail(ErrorKind::bad_input, fmt::format("{}: line {}, column {}: {} is no number", path, line_number, k + 1,
-                                                      line.substr(0, 20)));
+        return fail(ErrorKind::bad_input, fmt::format("{}: line {}, column {}: {} is no number", path, line_number,
+                                                      k + 1, line.substr(0, 20)));
       }
       line.remove_prefix(static_cast<std::size_t>(stop - line.data()));
       line.remove_prefix(line.starts_with(',') ? 1 : 0);
     }
     if (!input.time_s.empty() && row[0] <= input.time_s.back()) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: line {}: time {} does not increase", path, line_number, row[0]));
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: line {}: time {} does not increase", path, line_number, row[0]));
     }
     input.time_s.push_back(row[0]);
     input.gyro.push_back({row[1], row[2], row[3]});
@@ -64,7 +65,8 @@ Expected<diagnosis::PoseInput> read_poses(const std::string& path) {
 nlohmann::ordered_json to_json(const std::vector<diagnosis::PoseEffect>& effects) {
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const diagnosis::PoseEffect& e : effects) {
-    nlohmann::ordered_json j = {{"effect", e.effect}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
+    nlohmann::ordered_json j = {
+        {"effect", e.effect}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
     j["parameters"] = nlohmann::ordered_json::array();
     for (std::size_t k = 0; k < e.value.size(); ++k) {
       j["parameters"].push_back({{"name", e.parameters[k]}, {"value", e.value[k]}, {"sigma", e.sigma[k]}});
@@ -98,8 +100,8 @@ nlohmann::ordered_json answer_json(const diagnosis::PoseDiagnosis& d) {
 
 std::string answer_text(const diagnosis::PoseDiagnosis& d) {
   std::string text = fmt::format("{} static poses, {:.0f} s in all\n", d.poses, d.static_seconds);
-  text += fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms, held out {:.3f} mg", d.accel_adequate ? "adequate" : "misfit",
-                      1e3 * d.accel_rms_g, 1e3 * d.accel_held_out_rms_g);
+  text += fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms, held out {:.3f} mg",
+                      d.accel_adequate ? "adequate" : "misfit", 1e3 * d.accel_rms_g, 1e3 * d.accel_held_out_rms_g);
   if (!d.accel_tried.empty()) {
     text += fmt::format("; nearest to an effect: {} (log10 p {:.1f})", d.accel_tried.front().effect,
                         d.accel_tried.front().log_p / std::log(10.0));
@@ -117,9 +119,10 @@ std::string answer_text(const diagnosis::PoseDiagnosis& d) {
       text += fmt::format("    {:4} {:8.2f} +- {:.2f}\n", e.parameters[k], e.value[k], e.sigma[k]);
     }
   }
-  text += fmt::format("direction of gravity carried from pose to pose: {:.2f} deg rms -> {:.2f}; held out {:.2f} -> {:.2f}\n",
-                      d.direction_before / units::degree, d.direction_after / units::degree,
-                      d.direction_before_held_out / units::degree, d.direction_after_held_out / units::degree);
+  text += fmt::format(
+      "direction of gravity carried from pose to pose: {:.2f} deg rms -> {:.2f}; held out {:.2f} -> {:.2f}\n",
+      d.direction_before / units::degree, d.direction_after / units::degree,
+      d.direction_before_held_out / units::degree, d.direction_after_held_out / units::degree);
   for (const std::string& words : d.invisible) {
     text += fmt::format("invisible: {}\n", words);
   }
@@ -146,7 +149,8 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
 
 CommandRun configure(CLI::App& app) {
   auto arguments = std::make_shared<PosesArguments>();
-  app.add_option("FILE", arguments->file, "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw")->required();
+  app.add_option("FILE", arguments->file, "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw")
+      ->required();
   app.add_option("--gyro-unit", arguments->gyro_unit, "nominal rad/s of one raw unit of the gyros")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -157,7 +161,8 @@ CommandRun configure(CLI::App& app) {
   return [arguments] { return diagnose_by_poses(*arguments); };
 }
 
-const CommandRegistration registration{{"poses", "which physics a hand-turned sensor shows in static poses", configure}};
+const CommandRegistration registration{
+    {"poses", "which physics a hand-turned sensor shows in static poses", configure}};
 
 }  // namespace
 }  // namespace selfcal::cli

@@ -32,7 +32,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t largest_document = 50'000'000;   // bytes of a saved document of the daemon
+constexpr std::size_t largest_document = 50'000'000;  // bytes of a saved document of the daemon
 
 struct ReportArguments {
   std::vector<std::string> subjects;
@@ -108,8 +108,9 @@ Expected<Json> history_of(const std::string& serial) {
 }
 
 Expected<Json> saved_history(const std::string& file) {
-  return read_text_file(file, largest_document).and_then(
-      [&](const std::string& text) { return report::read_history(text, file); });
+  return read_text_file(file, largest_document).and_then([&](const std::string& text) {
+    return report::read_history(text, file);
+  });
 }
 
 bool is_number(const std::string& text) {
@@ -122,13 +123,15 @@ Expected<Json> run_of_daemon(const std::string& number) {
   if (!manager) {
     return tl::unexpected(manager.error());
   }
-  return (*manager)->show(std::stoull(number)).and_then(
-      [&](const std::string& text) { return report::read_run(text, "run " + number); });
+  return (*manager)->show(std::stoull(number)).and_then([&](const std::string& text) {
+    return report::read_run(text, "run " + number);
+  });
 }
 
 Expected<Json> saved_run(const std::string& file) {
-  return read_text_file(file, largest_document).and_then(
-      [&](const std::string& text) { return report::read_run(text, file); });
+  return read_text_file(file, largest_document).and_then([&](const std::string& text) {
+    return report::read_run(text, file);
+  });
 }
 
 // A recording that is gone or may not be read costs the curves, not the page.
@@ -235,7 +238,7 @@ Expected<int> write_report(ReportArguments arguments) {
   }
   try {
     return page_written(arguments);
-  } catch (const Json::exception& error) {   // a value of another type than `show` and `history` write
+  } catch (const Json::exception& error) {  // a value of another type than `show` and `history` write
     std::vector<std::string> files = arguments.subjects;
     if (!arguments.past.empty()) {
       files.push_back(arguments.past);
@@ -253,10 +256,11 @@ Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& sched
 CommandRun configure(CLI::App& app) {
   plan_page_writer() = write_plan_page;
   auto arguments = std::make_shared<ReportArguments>();
-  app.add_option("RUN", arguments->subjects,
-                 "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
-                 "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
-                 "of the daemon");
+  app.add_option(
+      "RUN", arguments->subjects,
+      "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
+      "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
+      "of the daemon");
   app.add_option("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)")->required();
   app.add_flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
   app.add_option("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
@@ -273,7 +277,8 @@ CommandRun configure(CLI::App& app) {
   return [arguments] { return write_report(*arguments); };
 }
 
-const CommandRegistration registration{{"report", "a calibration, or all units, as an HTML page with plots", configure}};
+const CommandRegistration registration{
+    {"report", "a calibration, or all units, as an HTML page with plots", configure}};
 
 }  // namespace
 }  // namespace selfcal::cli

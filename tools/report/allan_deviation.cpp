@@ -9,7 +9,7 @@ namespace {
 using Six = std::array<double, 6>;
 
 constexpr double clusters_per_decade = 10.0;
-constexpr std::size_t settling_s = 1;   // after a turn; the gimbal comes to rest
+constexpr std::size_t settling_s = 1;  // after a turn; the gimbal comes to rest
 
 // Running integrals of one dwell; integral[k] covers its first k samples.
 std::vector<Six> integrate(const Recording& recording, std::size_t first, std::size_t last) {

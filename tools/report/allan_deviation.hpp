@@ -11,8 +11,8 @@ namespace selfcal::report {
 
 struct AllanPoint {
   double tau_s = 0.0;
-  std::array<double, 6> deviation{};   // gyro x y z in rad/s, accelerometer x y z in m/s^2
-  std::size_t differences = 0;         // averaged: how well the point is known
+  std::array<double, 6> deviation{};  // gyro x y z in rad/s, accelerometer x y z in m/s^2
+  std::size_t differences = 0;        // averaged: how well the point is known
 };
 
 // Overlapping estimator (IEEE Std 952-1997, annex C) on the integrals of each dwell, pooled over the dwells: every

@@ -17,8 +17,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double innovation_scale = 1000.0;   // plotted to a thousandth of a sigma
-constexpr std::size_t gimbal_points = 1500;   // a point a pixel on a wide screen
+constexpr double innovation_scale = 1000.0;  // plotted to a thousandth of a sigma
+constexpr std::size_t gimbal_points = 1500;  // a point a pixel on a wide screen
 
 // Curves only: the numbers of the tables stay as they are in the JSON.
 void round_curves(Json& document) {

@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double days_per_year = 365.2425;
-constexpr double drift_sigma = 3.0;        // a slope beyond this is a drift
+constexpr double drift_sigma = 3.0;  // a slope beyond this is a drift
 constexpr int look_ahead_weeks = 20 * 52;
 
 std::string utc_of_year(double year) {
@@ -50,8 +50,11 @@ Json parameter_entry(const Json& past, double now) {
     entry["year"] = 1970.0 + year_of(record.utc);
     values.push_back(std::move(entry));
   }
-  Json parameter = {{"name", past.at("name")}, {"unit", past.at("unit")}, {"values", std::move(values)},
-                    {"limit", past.value("limit", Json())}, {"warnings", past.value("warnings", Json::array())},
+  Json parameter = {{"name", past.at("name")},
+                    {"unit", past.at("unit")},
+                    {"values", std::move(values)},
+                    {"limit", past.value("limit", Json())},
+                    {"warnings", past.value("warnings", Json::array())},
                     {"drifts", false}};
   const auto trend = parameter_trend(records);
   if (!trend) {
@@ -97,8 +100,11 @@ Expected<Json> fleet_document(const std::vector<Json>& histories, const FleetOpt
   if (now <= 0.0) {
     return fail(ErrorKind::usage, fmt::format("--as-of {}: not a time like 2026-11-21T00:00:00Z", options.as_of_utc));
   }
-  Json document = {{"kind", "fleet"}, {"as_of_utc", options.as_of_utc}, {"as_of_year", 1970.0 + now},
-                   {"interval_days", options.interval_days}, {"units", Json::array()}};
+  Json document = {{"kind", "fleet"},
+                   {"as_of_utc", options.as_of_utc},
+                   {"as_of_year", 1970.0 + now},
+                   {"interval_days", options.interval_days},
+                   {"units", Json::array()}};
   for (const Json& history : histories) {
     Json unit = {{"serial", history.at("serial")}, {"runs", history.at("runs")}, {"parameters", Json::array()}};
     add_last(unit, history.at("runs"), options, now);

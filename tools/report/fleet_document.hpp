@@ -10,8 +10,8 @@
 namespace selfcal::report {
 
 struct FleetOptions {
-  double interval_days = 365.0;   // between calibrations
-  std::string as_of_utc;          // the day that the page is of, ISO 8601
+  double interval_days = 365.0;  // between calibrations
+  std::string as_of_utc;         // the day that the page is of, ISO 8601
 };
 
 // `histories`: documents of the daemon, one per serial number. The straight lines are those of parameter_trend().

@@ -20,7 +20,7 @@ using diagnosis::LocatedColumn;
 using Json = nlohmann::ordered_json;
 
 constexpr std::array<int, 6> edges_s = {0, 5, 15, 30, 60, 120};
-constexpr double visible = 1e-6;   // information below which a bias in the cell would not be seen
+constexpr double visible = 1e-6;  // information below which a bias in the cell would not be seen
 
 // A bias of each axis from `constant` (since the start of the recording) for Length seconds.
 template <int Length>
@@ -38,8 +38,8 @@ Effect cell_effect() {
   effect.id = "bias_in_cell";
   effect.sensor = bias_in_cell<Length>;
   for (int axis = 0; axis < 6; ++axis) {
-    effect.parameters.push_back({"", axis < 3 ? "deg/h" : "ug",
-                                 axis < 3 ? units::degree_per_hour : units::micro_g, 1.0});
+    effect.parameters.push_back(
+        {"", axis < 3 ? "deg/h" : "ug", axis < 3 ? units::degree_per_hour : units::micro_g, 1.0});
   }
   return effect;
 }
@@ -54,12 +54,12 @@ struct Cell {
   int position = 0, axis = 0, bin = 0;
   double middle_s = 0.0;
   Eigen::Index column = 0;
-  double unit = 1.0;           // of the column, in deg/h or ug
+  double unit = 1.0;  // of the column, in deg/h or ug
 };
 
 struct Layout {
-  std::vector<Candidate> candidates;   // the model's equations, then the cells
-  Eigen::VectorXd model_size;          // of the first columns
+  std::vector<Candidate> candidates;  // the model's equations, then the cells
+  Eigen::VectorXd model_size;         // of the first columns
   std::vector<Cell> cells;
 };
 
@@ -89,8 +89,8 @@ Layout lay_out(const diagnosis::RecordingContext& context, const std::vector<dia
       }
       const double from = segment.start_s - start + edges_s[bin];
       for (int axis = 0; axis < 6; ++axis) {
-        layout.cells.push_back({position, axis, static_cast<int>(bin),
-                                from + 0.5 * (edges_s[bin + 1] - edges_s[bin]), column + axis, 1.0});
+        layout.cells.push_back({position, axis, static_cast<int>(bin), from + 0.5 * (edges_s[bin + 1] - edges_s[bin]),
+                                column + axis, 1.0});
       }
       add(cell_effects()[bin], from);
     }
@@ -104,7 +104,8 @@ void add_turns(const diagnosis::SignaturePass& pass, std::vector<Cell>& cells) {
   for (const LocatedColumn& m : pass.map()) {
     if (m.kind == LocatedColumn::Kind::rotation) {
       const double unit = m.axis < 3 ? units::degree_per_hour : units::micro_g;
-      cells.push_back({m.index + 2, m.axis, -1, 0.5 * (m.start_s + m.end_s), column, diagnosis::map_unit(m.axis) / unit});
+      cells.push_back(
+          {m.index + 2, m.axis, -1, 0.5 * (m.start_s + m.end_s), column, diagnosis::map_unit(m.axis) / unit});
     }
     ++column;
   }
@@ -144,8 +145,13 @@ Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d) {
   }
   return {{"edges_s", edges_s},
           {"cells",
-           {{"position", position}, {"axis", axis}, {"bin", bin}, {"middle_s", middle}, {"bias", bias},
-            {"sigma", sigma}, {"signature", signature}}}};
+           {{"position", position},
+            {"axis", axis},
+            {"bin", bin},
+            {"middle_s", middle},
+            {"bias", bias},
+            {"sigma", sigma},
+            {"signature", signature}}}};
 }
 
 }  // namespace selfcal::report

@@ -50,9 +50,10 @@ void round_numbers(Json& value) {
 }
 
 std::string page(const Json& document) {
-  std::string text = "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-                     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-                     "<link rel=\"icon\" href=\"data:,\">\n<title>selfcal</title>\n<style>\n";
+  std::string text =
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<title>selfcal</title>\n<style>\n";
   for (const std::string_view style : page_styles()) {
     text += style;
   }

@@ -13,7 +13,7 @@ struct PlannedSchedule {
   std::string name;
   Schedule schedule;
   Plan plan;
-  nlohmann::ordered_json prediction;   // what `selfcal plan --json` says of it
+  nlohmann::ordered_json prediction;  // what `selfcal plan --json` says of it
 };
 
 nlohmann::ordered_json plan_document(const std::vector<PlannedSchedule>& schedules, const Installation& installation);

@@ -20,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 4> browsers = {"chromium", "chromium-browser", "google-chrome", "google-chrome-stable"};
+constexpr std::array<const char*, 4> browsers = {"chromium", "chromium-browser", "google-chrome",
+                                                 "google-chrome-stable"};
 
 // A folder of its own, private and empty, that goes with its contents.
 class TemporaryFolder {
@@ -51,7 +52,7 @@ int run(const std::vector<std::string>& words) {
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (const std::string& word : words) {
-    arguments.push_back(const_cast<char*>(word.c_str()));   // posix_spawn does not write to them
+    arguments.push_back(const_cast<char*>(word.c_str()));  // posix_spawn does not write to them
   }
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;
@@ -81,12 +82,16 @@ Expected<void> print_page(const std::string& page, const fs::path& pdf) {
   const fs::path printed = folder.path() / "page.pdf";
   std::ofstream(html) << page;
   for (const char* browser : browsers) {
-    std::vector<std::string> words = {browser, "--headless", "--disable-gpu", "--disable-dev-shm-usage",
-                                      "--no-first-run", "--no-pdf-header-footer",
+    std::vector<std::string> words = {browser,
+                                      "--headless",
+                                      "--disable-gpu",
+                                      "--disable-dev-shm-usage",
+                                      "--no-first-run",
+                                      "--no-pdf-header-footer",
                                       "--user-data-dir=" + (folder.path() / "profile").string(),
                                       "--print-to-pdf=" + printed.string()};
     if (geteuid() == 0) {
-      words.emplace_back("--no-sandbox");   // Chromium refuses root otherwise; the page is ours and asks no network
+      words.emplace_back("--no-sandbox");  // Chromium refuses root otherwise; the page is ours and asks no network
     }
     words.push_back("file://" + html.string());
     if (run(words) == 0 && fs::exists(printed)) {
@@ -95,7 +100,8 @@ Expected<void> print_page(const std::string& page, const fs::path& pdf) {
     }
   }
   return fail(ErrorKind::device, fmt::format("{}: no Chromium in PATH that prints the page: write HTML and print it "
-                                             "from a browser", pdf.string()));
+                                             "from a browser",
+                                             pdf.string()));
 }
 
 }  // namespace selfcal::report

@@ -7,8 +7,8 @@ namespace {
 
 std::vector<EffectParameter> products() {
   std::vector<EffectParameter> all;
-  for (const char* name : {"x_xy", "x_xz", "x_yz", "x_yy", "x_zz", "y_xy", "y_yz", "y_xz", "y_xx", "y_zz", "z_xz", "z_yz",
-                           "z_xy", "z_xx", "z_yy"}) {
+  for (const char* name : {"x_xy", "x_xz", "x_yz", "x_yy", "x_zz", "y_xy", "y_yz", "y_xz", "y_xx", "y_zz", "z_xz",
+                           "z_yz", "z_xy", "z_xx", "z_yy"}) {
     all.push_back({name, "ug/g^2", units::micro_g, 20.0});
   }
   return all;

@@ -7,7 +7,7 @@ namespace selfcal::diagnosis {
 namespace {
 
 void columns(const EffectContext& c, double /*constant*/, Columns /*velocity*/, Columns angle) {
-  const Vector3 n = c.C_nb * c.earth_rate_b;                                    // cos, sin of the latitude, 0
+  const Vector3 n = c.C_nb * c.earth_rate_b;  // cos, sin of the latitude, 0
   const Vector3 by_latitude = earth::rotation_rate * Vector3(-n.y(), n.x(), 0.0);
   angle.col(0) += c.C_nb.transpose() * by_latitude * c.dt;
 }

@@ -1,6 +1,6 @@
 // Every decoder of bytes that a peer wrote. The first byte of the input chooses; what decodes must encode to the same.
-#include <cstdlib>
 #include <algorithm>
+#include <cstdlib>
 #include <sstream>
 #include <string_view>
 
@@ -46,7 +46,8 @@ bool next_frame(Bytes& bytes, can::CanFrame& frame, Time& now) {
   frame = {};
   frame.id = ids[bytes[0] % 8U % ids.size()];
   frame.fd = (bytes[1] & 0x80U) != 0;
-  const std::size_t wanted = std::min<std::size_t>(bytes[1] & 0x7FU, frame.fd ? can::max_fd_bytes : can::max_classic_bytes);
+  const std::size_t wanted =
+      std::min<std::size_t>(bytes[1] & 0x7FU, frame.fd ? can::max_fd_bytes : can::max_classic_bytes);
   frame.size = static_cast<std::uint8_t>(std::min(wanted, bytes.size() - 2));
   std::copy_n(bytes.begin() + 2, frame.size, frame.data.begin());
   bytes = bytes.subspan(2U + frame.size);
@@ -94,8 +95,8 @@ void read_log(Bytes bytes) {
   for (auto entry = reader.next(); entry && *entry; entry = reader.next()) {
     const can::LogEntry& read = **entry;
     std::array<char, can::max_log_line> line{};
-    const auto again = can::parse_log_line(
-        can::format_log_line(read.time, read.interface, read.frame, read.error_frame, line));
+    const auto again =
+        can::parse_log_line(can::format_log_line(read.time, read.interface, read.frame, read.error_frame, line));
     must(again && again->time == read.time && again->interface == read.interface && again->frame == read.frame &&
          again->error_frame == read.error_frame);
   }
@@ -149,7 +150,7 @@ void ask(Bytes bytes) {
     judge(client.sent(client.pending(out, now), now));
     judge(client.on_frame(frame, now));
   }
-  for (int k = 0; client.busy(); ++k) {   // nobody answers any more: P2, P2* and the limit of response-pending pass
+  for (int k = 0; client.busy(); ++k) {  // nobody answers any more: P2, P2* and the limit of response-pending pass
     must(k < 1000);
     now += std::chrono::seconds(1);
     judge(client.on_time(now));

@@ -20,7 +20,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       std::abort();
     }
     if (!read && (read.error().message.empty() || read.error().message.find('\n') != std::string::npos)) {
-      std::abort();   // an error is one line
+      std::abort();  // an error is one line
     }
   }
   return 0;

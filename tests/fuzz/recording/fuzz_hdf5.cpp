@@ -78,7 +78,7 @@ void put_number(hid_t file, const char* name, Bytes& bytes, double usual) {
 void put_dataset(hid_t file, const char* name, Bytes& bytes, hsize_t usual_rows, hsize_t usual_columns) {
   const std::uint8_t kind = bytes.next();
   if (kind == 255) {
-    return;   // missing
+    return;  // missing
   }
   if (kind == 254) {
     H5Gclose(H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
@@ -145,8 +145,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string image = image_of(bytes);
   const auto parsed = selfcal::hdf5::parse_image(image.data(), image.size(), "fuzz.h5");
   if (parsed) {
-    const auto checked = selfcal::check_recording(*parsed, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
-    (void)checked;   // sound or not: it must return
+    const auto checked =
+        selfcal::check_recording(*parsed, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
+    (void)checked;  // sound or not: it must return
   } else if (parsed.error().message.find('\n') != std::string::npos) {
     std::abort();
   }

@@ -22,5 +22,5 @@ int main(int argc, char** argv) {
     ++files;
   }
   std::printf("%d inputs replayed\n", files);
-  return files > 0 ? 0 : 1;   // an empty corpus is a mistake, not a success
+  return files > 0 ? 0 : 1;  // an empty corpus is a mistake, not a success
 }

@@ -31,7 +31,7 @@ class Scene {
       unit_.flash().erase(block);
     }
     now_ = std::chrono::ceil<std::chrono::milliseconds>(std::chrono::duration<double>(unit_.flash().ready_at_s()));
-    unit_.power_on(now_);   // the chip lives on from input to input, and so does its clock
+    unit_.power_on(now_);  // the chip lives on from input to input, and so does its clock
     pass(1500ms);
     before_ = coefficient_blocks();
   }
@@ -65,9 +65,7 @@ class Scene {
       case 2:
         give_message(input.subspan(input.empty() ? 0 : 1, size));
         return input.subspan(input.empty() ? 0 : 1 + size);
-      case 3:
-        pass(input.empty() ? Time{20ms} : Time{20ms} * input[0]);
-        return input.subspan(input.empty() ? 0 : 1);
+      case 3: pass(input.empty() ? Time{20ms} : Time{20ms} * input[0]); return input.subspan(input.empty() ? 0 : 1);
       case 4: open_lock(); return input;
       case 5: restart(); return input;
       case 6:
@@ -112,14 +110,14 @@ class Scene {
         unit_.sent(1, now_);
       }
       now_ += 10ms;
-      tester.on_time(now_);   // gives up where no flow control comes: the INS starts, or sends to somebody else
+      tester.on_time(now_);  // gives up where no flow control comes: the INS starts, or sends to somebody else
     }
   }
 
   // What the INS has to say: the first of its frames, and all of the answer where the tester lets it.
   void answer() {
     can::CanFrame frame;
-    for (int i = 0; i < 700; ++i) {   // 4095 bytes in frames of 7, and some more
+    for (int i = 0; i < 700; ++i) {  // 4095 bytes in frames of 7, and some more
       unit_.step(now_);
       if (unit_.pending({&frame, 1}, now_) == 0) {
         return;
@@ -134,7 +132,7 @@ class Scene {
       unit_.sent(1, now_);
       now_ += 130us;
     }
-    std::abort();   // no answer is as long as that
+    std::abort();  // no answer is as long as that
   }
 
   void pass(Time time) {
@@ -177,13 +175,13 @@ class Scene {
   }
 
   void restart() {
-    unit_.power_on(now_);   // with a supply that holds
+    unit_.power_on(now_);  // with a supply that holds
     pass(100ms);
   }
 
   uds::Bytes coefficient_blocks() {
     uds::Bytes all;
-    for (std::size_t block = 0; block < 3; ++block) {   // factory, A, B
+    for (std::size_t block = 0; block < 3; ++block) {  // factory, A, B
       const auto bytes = unit_.flash().read(block * sim::flash_block_bytes, sim::flash_block_bytes);
       all.insert(all.end(), bytes.begin(), bytes.end());
     }

@@ -75,7 +75,9 @@ TEST_F(CalibrationRunTest, AReasonNamesWhatItOverrulesAndPushesNothingImpossible
   }
   std::vector<std::string> story;
   const auto events = store_->events(run_->record().id);
-  for (const EventRecord& event : *events) story.push_back(event.text);
+  for (const EventRecord& event : *events) {
+    story.push_back(event.text);
+  }
   EXPECT_THAT(story, testing::Contains("never written, the value in force stays: accel_scale_pos_x"));
 }
 
@@ -162,7 +164,10 @@ TEST_F(CalibrationRunTest, APowerLossInRotationGivesItsReason) {
   ASSERT_TRUE(until(State::rotating));
   timers_.run_until([] { return false; }, 20s);
   ins_.dead = true;
-  timers_.after(5s, [this] { ins_.power_cycle(); ins_.dead = false; });
+  timers_.after(5s, [this] {
+    ins_.power_cycle();
+    ins_.dead = false;
+  });
   EXPECT_EQ(end(), State::failed);
   EXPECT_THAT(reason(), HasSubstr("the rotation is lost: the INS is idle when it answers again"));
 }
@@ -170,7 +175,7 @@ TEST_F(CalibrationRunTest, APowerLossInRotationGivesItsReason) {
 TEST_F(CalibrationRunTest, ARestartFasterThanATimeOutIsTakenUp) {
   begin();
   ASSERT_TRUE(until(State::estimating));
-  ins_.power_cycle();   // locked again, and no request went unanswered
+  ins_.power_cycle();  // locked again, and no request went unanswered
   EXPECT_EQ(end(), State::completed) << reason();
 }
 
@@ -184,7 +189,7 @@ TEST_F(CalibrationRunTest, AStuckGimbalEndsTheRun) {
 TEST_F(CalibrationRunTest, AStatusFrameAloneDoesNotEndTheRotation) {
   begin();
   ASSERT_TRUE(until(State::rotating));
-  for (int k = 0; k < 50; ++k) {   // says idle for 50 s of the rotation's 100
+  for (int k = 0; k < 50; ++k) {  // says idle for 50 s of the rotation's 100
     timers_.run_until([] { return false; }, 1s);
     ins_.on_status({.state = ins::State::idle});
   }
@@ -344,8 +349,7 @@ INSTANTIATE_TEST_SUITE_P(Run, EachState,
                          testing::Values(State::connecting, State::unlocking, State::scheduling, State::starting,
                                          State::rotating, State::draining, State::estimating, State::judging,
                                          State::checking_old, State::erasing, State::writing, State::verifying,
-                                         State::committing, State::resetting, State::confirming,
-                                         State::checking_new),
+                                         State::committing, State::resetting, State::confirming, State::checking_new),
                          state_name);
 
 }  // namespace

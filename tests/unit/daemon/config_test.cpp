@@ -81,17 +81,20 @@ TEST(Config, HostileTextIsOneComplaint) {
 }
 
 TEST(Config, NamesInAnyScriptAreKept) {
-  const auto config = parse_config("[daemon]\nstate_directory = '/var/lib/\u6E2C\u91CF'\n[ins.a]\ninterface = 'c'\n", "f");
+  const auto config =
+      parse_config("[daemon]\nstate_directory = '/var/lib/\u6E2C\u91CF'\n[ins.a]\ninterface = 'c'\n", "f");
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->state_directory, "/var/lib/\u6E2C\u91CF");
 }
 
 TEST(Config, TolerancesTakeParametersAndGroups) {
-  const auto config = parse_config(
-      "[ins.a]\ninterface = \"c\"\ntolerance = { gyro_scale = 3, accel_bias_y = 2.5 }\n", "f.toml");
+  const auto config =
+      parse_config("[ins.a]\ninterface = \"c\"\ntolerance = { gyro_scale = 3, accel_bias_y = 2.5 }\n", "f.toml");
   ASSERT_TRUE(config) << config.error().message;
   const auto& tolerance = config->instruments.at(0).tolerance;
-  for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(tolerance[static_cast<std::size_t>(parameter::gyro_scale + axis)], 3.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(tolerance[static_cast<std::size_t>(parameter::gyro_scale + axis)], 3.0);
+  }
   EXPECT_EQ(tolerance[parameter::accel_bias + 1], 2.5);
   EXPECT_FALSE(tolerance[parameter::accel_bias]);
   EXPECT_THAT(complaint("[ins.a]\ninterface = \"c\"\nlimit = { gyro_scal = 3 }\n"),

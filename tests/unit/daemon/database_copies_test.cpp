@@ -20,11 +20,12 @@ using testing::HasSubstr;
 
 class DatabaseCopiesTest : public testing::Test {
  protected:
-
   void add_runs(int count) {
     const auto store = RunStore::open(database_path(folder_));
     ASSERT_TRUE(store);
-    for (int i = 0; i < count; ++i) ASSERT_TRUE((*store)->create_run({}));
+    for (int i = 0; i < count; ++i) {
+      ASSERT_TRUE((*store)->create_run({}));
+    }
   }
   std::size_t runs(const fs::path& database) { return (*RunStore::open(database))->runs_of_serial("")->size(); }
 
@@ -40,7 +41,7 @@ TEST_F(DatabaseCopiesTest, ABackupComesBackAndTheFormerDatabaseStays) {
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ(runs(database_path(folder_)), 3u);
   EXPECT_EQ(runs(*kept), 5u);
-  EXPECT_EQ(runs(folder_ / "backups" / "monday.db"), 3u);   // and can be used again
+  EXPECT_EQ(runs(folder_ / "backups" / "monday.db"), 3u);  // and can be used again
 }
 
 TEST_F(DatabaseCopiesTest, AWriteAheadLogLeftByACrashIsNotPlayedIntoTheBackup) {
@@ -49,7 +50,9 @@ TEST_F(DatabaseCopiesTest, AWriteAheadLogLeftByACrashIsNotPlayedIntoTheBackup) {
   // A process that dies leaves its log: copied aside while open, put back after.
   {
     const auto store = RunStore::open(database_path(folder_));
-    for (int i = 0; i < 50; ++i) ASSERT_TRUE((*store)->create_run({}));
+    for (int i = 0; i < 50; ++i) {
+      ASSERT_TRUE((*store)->create_run({}));
+    }
     for (const char* suffix : {"", "-wal"}) {
       fs::copy_file(database_path(folder_).string() + suffix, folder_.string() + "/crashed" + suffix);
     }
@@ -60,7 +63,7 @@ TEST_F(DatabaseCopiesTest, AWriteAheadLogLeftByACrashIsNotPlayedIntoTheBackup) {
   const auto kept = restore_database(folder_, "a.db");
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ(runs(database_path(folder_)), 1u);
-  EXPECT_EQ(runs(*kept), 51u);   // nothing of the former one is lost either
+  EXPECT_EQ(runs(*kept), 51u);  // nothing of the former one is lost either
 }
 
 TEST_F(DatabaseCopiesTest, ADamagedDatabaseIsReplaced) {
@@ -105,7 +108,7 @@ TEST_F(DatabaseCopiesTest, OneAtATime) {
   const auto second = StateLock::take(folder_);
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("in use by another"));
-  first = StateLock::take("/nonexistent");   // an error takes the lock's place and so gives it back
+  first = StateLock::take("/nonexistent");  // an error takes the lock's place and so gives it back
   EXPECT_TRUE(StateLock::take(folder_));
 }
 

@@ -35,22 +35,29 @@ void FakeIns::send_status(double schedule_s) {
   status_timer_ = timers_.after(100ms, [this] { send_status(schedule_s_); });
 }
 
-double FakeIns::check_elapsed() const {
-  return std::chrono::duration<double>(timers_.now() - *check_started_).count();
-}
+double FakeIns::check_elapsed() const { return std::chrono::duration<double>(timers_.now() - *check_started_).count(); }
 
 double FakeIns::since_start() const { return std::chrono::duration<double>(timers_.now() - started_).count(); }
 
 ins::State FakeIns::state() {
-  if (check_started_ && check_elapsed() < check_s) return ins::State::checking;
-  if (!turning_) return resting_;
-  if (gimbal_sticks && since_start() > rotation_s / 2) return ins::State::failed;
+  if (check_started_ && check_elapsed() < check_s) {
+    return ins::State::checking;
+  }
+  if (!turning_) {
+    return resting_;
+  }
+  if (gimbal_sticks && since_start() > rotation_s / 2) {
+    return ins::State::failed;
+  }
   return since_start() < rotation_s ? ins::State::rotating : ins::State::complete;
 }
 
 std::uint32_t FakeIns::pages_written() {
-  if (rotation_ == 0) return 0;
-  return std::min(pages, static_cast<std::uint32_t>((stopped_s_ < 0 ? since_start() : stopped_s_) / rotation_s * pages));
+  if (rotation_ == 0) {
+    return 0;
+  }
+  return std::min(pages,
+                  static_cast<std::uint32_t>((stopped_s_ < 0 ? since_start() : stopped_s_) / rotation_s * pages));
 }
 
 void FakeIns::power_cycle() {
@@ -87,7 +94,9 @@ Bytes FakeIns::page(std::uint32_t number) {
   page.samples.resize(flash::samples_per_page);
   flash::PageBytes bytes;
   flash::encode_page(page, bytes);
-  if (bad_pages[number]-- > 0) bytes[100] = static_cast<std::uint8_t>(bytes[100] ^ 1);
+  if (bad_pages[number]-- > 0) {
+    bytes[100] = static_cast<std::uint8_t>(bytes[100] ^ 1);
+  }
   pages_read.push_back(number);
   return {bytes.begin(), bytes.end()};
 }
@@ -113,51 +122,71 @@ Answer<Bytes> FakeIns::read(std::uint16_t did) {
     case ins::did::coefficients_inactive: return inactive_.empty() ? set(slots_.at(1 - in_force_)) : inactive_;
     case ins::did::site: return ins::encode(ins::SiteRecord{40, 116, 50});
     case ins::did::sample_format:
-      return ins::encode(ins::SampleFormatRecord{sample_rate_hz, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
+      return ins::encode(
+          ins::SampleFormatRecord{sample_rate_hz, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
     case ins::did::raw_data_directory:
-      return ins::encode(ins::DirectoryRecord{rotation_, pages_written() - std::min(pages_written(), ring), pages_written(), pages, std::uint64_t{pages_written()} * flash::samples_per_page,
-                                              state() != ins::State::rotating});
+      return ins::encode(ins::DirectoryRecord{
+          rotation_, pages_written() - std::min(pages_written(), ring), pages_written(), pages,
+          std::uint64_t{pages_written()} * flash::samples_per_page, state() != ins::State::rotating});
     default: return no(0x31);
   }
 }
 
 Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request) {
   const auto call = uds::parse_routine_request(request);
-  if (!call) return no(static_cast<std::uint8_t>(call.error()));
+  if (!call) {
+    return no(static_cast<std::uint8_t>(call.error()));
+  }
   const bool start = call->action == uds::RoutineAction::start;
   Bytes status;
   switch (call->routine) {
     case ins::routine::self_calibration:
       if (start) {
-        if (state() == ins::State::checking) return no(0x22);
+        if (state() == ins::State::checking) {
+          return no(0x22);
+        }
         ++starts;
-        if (state() == ins::State::rotating) ++second_starts;
+        if (state() == ins::State::rotating) {
+          ++second_starts;
+        }
         turning_ = true;
         started_ = timers_.now();
         stopped_s_ = -1.0;
         rotation_ = ByteReader(call->option).get<std::uint32_t>();
       } else {
         ++stops;
-        if (turning_) stopped_s_ = since_start();
+        if (turning_) {
+          stopped_s_ = since_start();
+        }
         turning_ = false;
         resting_ = ins::State::aborted;
       }
       break;
     case ins::routine::erase_inactive:
-      if (state() == ins::State::checking) return no(0x22);
+      if (state() == ins::State::checking) {
+        return no(0x22);
+      }
       inactive_.assign(ins::coefficients_bytes, 0xFF);
       break;
     case ins::routine::commit_coefficients:
-      if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) slots_.at(1 - in_force_) = *set;
+      if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) {
+        slots_.at(1 - in_force_) = *set;
+      }
       break;
     case ins::routine::navigation_check:
-      if (start && state() == ins::State::checking) return no(0x22);
+      if (start && state() == ins::State::checking) {
+        return no(0x22);
+      }
       if (call->action == uds::RoutineAction::stop) {
-        if (refuses_check_stop) return no(*refuses_check_stop);
+        if (refuses_check_stop) {
+          return no(*refuses_check_stop);
+        }
         ++check_stops;
         check_started_.reset();
       }
-      if (start) check_started_ = timers_.now();
+      if (start) {
+        check_started_ = timers_.now();
+      }
       if (call->action == uds::RoutineAction::result) {
         const double elapsed = check_started_ ? check_elapsed() : 0.0;
         const double drift = in_force().version == 0 ? 500.0 : 50.0;
@@ -170,37 +199,53 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
 }
 
 Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
-  if (refuse) return no(*refuse);
+  if (refuse) {
+    return no(*refuse);
+  }
   ByteReader reader(request.subspan(1));
   switch (request[0]) {
     case uds::service::session_control: return uds::session_response(uds::Session::extended, {50ms, 5s});
     case uds::service::security_access: {
-      if (reader.get<std::uint8_t>() == uds::security_seed_level) return uds::seed_response(seed_);
+      if (reader.get<std::uint8_t>() == uds::security_seed_level) {
+        return uds::seed_response(seed_);
+      }
       const auto expected = uds::answer_seed(key, seed_);
-      if (!std::equal(expected->begin(), expected->end(), request.begin() + 2)) return no(0x35);
+      if (!std::equal(expected->begin(), expected->end(), request.begin() + 2)) {
+        return no(0x35);
+      }
       unlocked_ = true;
       return Bytes{0x67, uds::security_key_level};
     }
     case uds::service::read_data: {
       const auto did = reader.get<std::uint16_t>();
       const auto record = read(did);
-      if (!record) return tl::unexpected(record.error());
+      if (!record) {
+        return tl::unexpected(record.error());
+      }
       return uds::read_response(did, *record);
     }
     case uds::service::write_data: {
       const auto did = reader.get<std::uint16_t>();
-      if (!unlocked_) return no(0x33);
+      if (!unlocked_) {
+        return no(0x33);
+      }
       if (did == ins::did::coefficients_inactive) {
         inactive_.assign(request.begin() + 3, request.end());
-        if (loses_writes) inactive_[60] = static_cast<std::uint8_t>(inactive_[60] ^ 4);
+        if (loses_writes) {
+          inactive_[60] = static_cast<std::uint8_t>(inactive_[60] ^ 4);
+        }
       }
       return uds::write_response(did);
     }
     case uds::service::routine_control: return unlocked_ ? respond_to_routine(request) : no(0x33);
     case uds::service::request_upload: {
       const auto range = uds::parse_upload_request(request);
-      if (!unlocked_) return no(0x33);
-      if (!range) return no(0x31);
+      if (!unlocked_) {
+        return no(0x33);
+      }
+      if (!range) {
+        return no(0x31);
+      }
       upload_page_ = range->first_page;
       return uds::upload_response(flash::page_bytes + uds::transfer_overhead);
     }

@@ -27,22 +27,22 @@ class FakeIns : public InsPort {
   std::uint64_t lost_frames() const override { return 0; }
   std::string_view interface() const override { return "fake0"; }
 
-  void power_cycle();   // RAM is lost; the newest valid slot comes into force
+  void power_cycle();  // RAM is lost; the newest valid slot comes into force
   ins::State state();
   std::uint32_t pages_written();
   const ins::Coefficients& in_force() const { return slots_.at(in_force_); }
 
   // Faults
-  bool dead = false;                    // no answer to anything
-  std::optional<std::uint8_t> refuse;   // every request with this NRC
-  std::map<std::uint32_t, int> bad_pages;   // page: so many readings with a wrong CRC
-  bool loses_writes = false;            // what is written is not what is read back
+  bool dead = false;                       // no answer to anything
+  std::optional<std::uint8_t> refuse;      // every request with this NRC
+  std::map<std::uint32_t, int> bad_pages;  // page: so many readings with a wrong CRC
+  bool loses_writes = false;               // what is written is not what is read back
   bool ignores_commit = false;
-  std::uint32_t ring = pages;           // so many of the newest pages are kept
-  bool gimbal_sticks = false;           // the rotation fails half-way
-  std::optional<std::uint8_t> refuses_check_stop;   // with this NRC
+  std::uint32_t ring = pages;                      // so many of the newest pages are kept
+  bool gimbal_sticks = false;                      // the rotation fails half-way
+  std::optional<std::uint8_t> refuses_check_stop;  // with this NRC
 
-  void begin_check() { check_started_ = timers_.now(); }   // as another tester would
+  void begin_check() { check_started_ = timers_.now(); }  // as another tester would
 
   // Sends status frames, whose clock runs `schedule_s` in a rotation; standing but for `moving` of each second.
   void send_status(double schedule_s);
@@ -53,10 +53,10 @@ class FakeIns : public InsPort {
   static constexpr std::uint32_t pages = 20;
   static constexpr double rotation_s = 100.0;
   static constexpr double check_s = 30.0;
-  double sample_rate_hz = 1.0;          // so that the pages hold about as many seconds as a schedule
+  double sample_rate_hz = 1.0;  // so that the pages hold about as many seconds as a schedule
 
-  int starts = 0;                       // rotations commanded
-  int second_starts = 0;                // of them, on top of one that was not over
+  int starts = 0;         // rotations commanded
+  int second_starts = 0;  // of them, on top of one that was not over
   int stops = 0;
   int check_stops = 0;
   std::vector<std::uint32_t> pages_read;
@@ -81,12 +81,12 @@ class FakeIns : public InsPort {
   std::uint32_t power_cycles_ = 1;
   std::array<ins::Coefficients, 2> slots_;
   std::size_t in_force_ = 0;
-  Bytes inactive_;                      // as written, not committed yet
+  Bytes inactive_;  // as written, not committed yet
   std::optional<SteadyTime> check_started_;
   std::uint32_t upload_page_ = 0;
   Timers::Id status_timer_ = 0;
   double schedule_s_ = 0.0;
-  double stopped_s_ = -1.0;             // into the rotation
+  double stopped_s_ = -1.0;  // into the rotation
 };
 
 }  // namespace selfcal::testing_support

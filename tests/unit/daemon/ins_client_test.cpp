@@ -15,7 +15,8 @@ namespace {
 class TersePort : public InsPort {
  public:
   void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) override {
-    answer_ = Bytes{static_cast<std::uint8_t>(payload[0] + uds::positive_offset), payload.size() > 1 ? payload[1] : std::uint8_t{0}};
+    answer_ = Bytes{static_cast<std::uint8_t>(payload[0] + uds::positive_offset),
+                    payload.size() > 1 ? payload[1] : std::uint8_t{0}};
     done_ = std::move(done);
   }
   void cancel() override { done_ = nullptr; }
@@ -24,7 +25,9 @@ class TersePort : public InsPort {
   std::string_view interface() const override { return "can7"; }
 
   void run() {
-    while (done_) std::exchange(done_, nullptr)(answer_);
+    while (done_) {
+      std::exchange(done_, nullptr)(answer_);
+    }
   }
 
  private:
@@ -49,8 +52,10 @@ TEST(InsClient, SenselessAnswersNameTheInterface) {
   TersePort port;
   InsClient client(port);
   const std::string lines[] = {
-      complaint(port, client.identify()),        complaint(port, client.read_state()),
-      complaint(port, client.read_directory()),  complaint(port, client.read_site()),
+      complaint(port, client.identify()),
+      complaint(port, client.read_state()),
+      complaint(port, client.read_directory()),
+      complaint(port, client.read_site()),
       complaint(port, client.read_sample_format()),
       complaint(port, client.write_record(0xF190, {1, 2, 3})),
       complaint(port, client.routine(uds::RoutineAction::start, 0x0200, {})),

@@ -56,7 +56,7 @@ TEST_P(EitherCheck, ADaemonKilledWhileEndingItEndsItAfterItsRestart) {
   wait(5s);
   run_->abort("test");
   ASSERT_TRUE(until(State::ending_check));
-  ASSERT_EQ(ins_.state(), ins::State::checking);   // killed before it could say so
+  ASSERT_EQ(ins_.state(), ins::State::checking);  // killed before it could say so
   restart_daemon();
   EXPECT_EQ(end(), expected()) << reason();
   EXPECT_EQ(ins_.check_stops, 1);

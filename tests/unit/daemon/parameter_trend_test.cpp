@@ -25,7 +25,8 @@ TEST(ParameterTrend, ALineIsFoundExactly) {
 
 TEST(ParameterTrend, ScatterBeyondSigmaIsTakenAsAgeing) {
   // +-10 about a level, sigma 0.1: ageing must be of the size of the scatter.
-  const auto trend = parameter_trend({value(2020, 10, 0.1), value(2021, -10, 0.1), value(2022, 10, 0.1), value(2023, -10, 0.1)});
+  const auto trend =
+      parameter_trend({value(2020, 10, 0.1), value(2021, -10, 0.1), value(2022, 10, 0.1), value(2023, -10, 0.1)});
   ASSERT_TRUE(trend);
   EXPECT_GT(trend->ageing, 8.0);
   EXPECT_LT(trend->ageing, 20.0);

@@ -21,9 +21,7 @@ using testing::IsEmpty;
 
 class RecordingStoreTest : public testing::Test {
  protected:
-  RecordingStoreTest() {
-    store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
-  }
+  RecordingStoreTest() { store_ = std::move(*RunStore::open(folder_ / "selfcal.db")); }
 
   RunId recorded(double mib, std::chrono::hours age, State state = State::completed) {
     RunRecord run;
@@ -31,7 +29,7 @@ class RecordingStoreTest : public testing::Test {
     run.state = state;
     run.recording = (folder_ / (std::to_string(run.id) + ".h5")).string();
     std::ofstream(run.recording).put('x');
-    fs::resize_file(run.recording, static_cast<std::uintmax_t>(mib * 1048576));   // sparse: no room is taken
+    fs::resize_file(run.recording, static_cast<std::uintmax_t>(mib * 1048576));  // sparse: no room is taken
     fs::last_write_time(run.recording, now_ - age);
     EXPECT_TRUE(store_->update_run(run));
     return run.id;
@@ -55,9 +53,11 @@ class RecordingStoreTest : public testing::Test {
 };
 
 TEST_F(RecordingStoreTest, TheOldestGoUntilTheQuotaIsKept) {
-  for (int i = 0; i < 4; ++i) recorded(10, 1h);
+  for (int i = 0; i < 4; ++i) {
+    recorded(10, 1h);
+  }
   EXPECT_THAT(prune(40, 0), IsEmpty());
-  EXPECT_THAT(prune(25, 0), ElementsAre(1, 2));   // 40 to 20
+  EXPECT_THAT(prune(25, 0), ElementsAre(1, 2));  // 40 to 20
   EXPECT_THAT(prune(25, 0), IsEmpty());
 }
 
@@ -78,7 +78,7 @@ TEST_F(RecordingStoreTest, ARecordingThatIsGoneAlreadyIsForgottenWhenItsTurnCome
   const RunId run = recorded(10, 1h);
   fs::remove(store_->run(run).value()->recording);
   recorded(10, 1h);
-  EXPECT_THAT(prune(15, 0), IsEmpty());   // it takes no room
+  EXPECT_THAT(prune(15, 0), IsEmpty());  // it takes no room
 }
 
 TEST_F(RecordingStoreTest, SpaceIsToldWithItsFigures) {

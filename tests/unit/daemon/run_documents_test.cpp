@@ -20,9 +20,7 @@ using testing::HasSubstr;
 
 class RunDocumentsTest : public testing::Test {
  protected:
-  RunDocumentsTest() {
-    store_ = std::move(*RunStore::open(folder_ / "selfcal.db"));
-  }
+  RunDocumentsTest() { store_ = std::move(*RunStore::open(folder_ / "selfcal.db")); }
 
   RunRecord completed(const std::string& ended_utc, double bias_x_ug) {
     RunRecord run;
@@ -43,7 +41,7 @@ class RunDocumentsTest : public testing::Test {
   void keep_set(RunId run, SetRole role, double bias_x_ug) {
     ins::Coefficients set;
     set.version = 7;
-    set.date_s = 1767225600;   // 2026-01-01T00:00:00Z
+    set.date_s = 1767225600;  // 2026-01-01T00:00:00Z
     set.value[0] = bias_x_ug * units::micro_g;
     const auto bytes = ins::encode(set);
     ASSERT_TRUE(store_->store_set(run, role, {bytes.begin(), bytes.end()}));
@@ -67,7 +65,7 @@ TEST_F(RunDocumentsTest, TheSetsAreShownInTheUnitsOfTheParameters) {
   const json& first = sets.at("previous").at("parameters").at(0);
   EXPECT_EQ(first.at("name"), "accel_bias_x");
   EXPECT_EQ(first.at("unit"), "ug");
-  EXPECT_NEAR(first.at("value").get<double>(), 30, 1e-12);   // a rounding of 30 ug
+  EXPECT_NEAR(first.at("value").get<double>(), 30, 1e-12);  // a rounding of 30 ug
   EXPECT_NEAR(sets.at("pushed").at("parameters").at(0).at("value").get<double>(), 12, 1e-12);
   EXPECT_EQ(sets.at("pushed"), sets.at("read_back"));
   EXPECT_EQ(sets.at("in_force"), true);

@@ -16,7 +16,6 @@ using testing::HasSubstr;
 
 class RunStoreTest : public testing::Test {
  protected:
-
   std::unique_ptr<RunStore> open() {
     auto store = RunStore::open(file_);
     EXPECT_TRUE(store) << store.error().message;
@@ -44,7 +43,7 @@ TEST_F(RunStoreTest, ARunIsFoundAgainAfterReopening) {
     auto store = open();
     run.id = *store->create_run(run);
     run.state = State::rotating;
-    run.serial = std::string("SN'1");   // a quote, so that binding is seen to work
+    run.serial = std::string("SN'1");  // a quote, so that binding is seen to work
     run.rotation = 4000000000u;
     ASSERT_TRUE(store->update_run(run));
     ASSERT_TRUE(store->add_event(run.id, {"2026-01-01T00:00:01Z", "state", "rotating"}));
@@ -104,7 +103,8 @@ TEST_F(RunStoreTest, HistoryHoldsCompletedRunsThatWrote) {
   parameters.value.fill(3.5);
   parameters.sigma.fill(0.5);
   parameters.determined.fill(true);
-  for (const auto& [state, dry] : {std::pair{State::completed, false}, {State::refused, false}, {State::completed, true}}) {
+  for (const auto& [state, dry] :
+       {std::pair{State::completed, false}, {State::refused, false}, {State::completed, true}}) {
     RunRecord run = begun();
     run.dry_run = dry;
     run.id = *store->create_run(run);
@@ -143,12 +143,14 @@ TEST_F(RunStoreTest, AFileThatCannotBeOpenedIsNamedWithTheCause) {
 TEST_F(RunStoreTest, ADamagedDatabaseIsRefusedAndABackupTakesItsPlace) {
   {
     auto store = open();
-    for (int i = 0; i < 200; ++i) ASSERT_TRUE(store->create_run(begun()));
+    for (int i = 0; i < 200; ++i) {
+      ASSERT_TRUE(store->create_run(begun()));
+    }
     ASSERT_TRUE(RunStore::copy(file_, folder_ / "backup.db"));
   }
   {
     std::fstream file(file_, std::ios::in | std::ios::out | std::ios::binary);
-    file.seekp(3 * 4096);   // a page of the runs table (SQLite's default page size)
+    file.seekp(3 * 4096);  // a page of the runs table (SQLite's default page size)
     const std::string rubbish(4096, '\x5a');
     file.write(rubbish.data(), 4096);
   }

@@ -26,7 +26,9 @@ class RunSurroundingsTest : public CalibrationRunTest {
     std::vector<std::string> found;
     const std::vector<EventRecord> events = store_->events(run_->record().id).value();
     for (const EventRecord& event : events) {
-      if (event.kind == kind) found.push_back(event.text);
+      if (event.kind == kind) {
+        found.push_back(event.text);
+      }
     }
     return found;
   }
@@ -46,7 +48,9 @@ TEST_F(RunSurroundingsTest, GraveErrorFramesAreWarnedOf) {
 TEST_F(RunSurroundingsTest, ManyErrorFramesAreFewLinesAndASum) {
   begin();
   ASSERT_TRUE(until(State::rotating));
-  for (int i = 0; i < 500; ++i) ins_.on_bus_event(can::BusEvent::protocol_error);
+  for (int i = 0; i < 500; ++i) {
+    ins_.on_bus_event(can::BusEvent::protocol_error);
+  }
   EXPECT_EQ(texts("bus").size(), 1u);
   timers_.run_until([] { return false; }, 11s);
   ins_.on_bus_event(can::BusEvent::protocol_error);
@@ -72,8 +76,10 @@ TEST_F(RunSurroundingsTest, SpaceIsSetAsideBeforeThePagesCome) {
   struct stat info {};
   ASSERT_EQ(stat((folder_ / "pages").c_str(), &info), 0);
   const auto allocated = static_cast<std::uint64_t>(info.st_blocks) * 512;
-  EXPECT_LE(static_cast<std::uint64_t>(info.st_size), 2u * 4096);   // the file itself holds what has come
-  if (allocated <= 2u * 4096) GTEST_SKIP() << "this file system sets nothing aside";
+  EXPECT_LE(static_cast<std::uint64_t>(info.st_size), 2u * 4096);  // the file itself holds what has come
+  if (allocated <= 2u * 4096) {
+    GTEST_SKIP() << "this file system sets nothing aside";
+  }
   EXPECT_GE(allocated, FakeIns::pages * 4096u);
 }
 
@@ -84,7 +90,7 @@ TEST_F(RunSurroundingsTest, NoSecretInJournalOrStory) {
   testing::internal::CaptureStderr();
   begin();
   const State ended = end();
-  key_[3] = 0xEE;   // and where unlocking fails
+  key_[3] = 0xEE;  // and where unlocking fails
   observer_.finished = 0;
   begin();
   const State refused = end();
@@ -93,10 +99,13 @@ TEST_F(RunSurroundingsTest, NoSecretInJournalOrStory) {
   EXPECT_EQ(refused, State::failed);
   for (const RunId run : {1, 2}) {
     const std::vector<EventRecord> events = store_->events(run).value();
-    for (const EventRecord& event : events) said += event.text;
+    for (const EventRecord& event : events) {
+      said += event.text;
+    }
   }
-  EXPECT_THAT(said, HasSubstr("invalidKey"));   // it is this text that is looked at
-  std::transform(said.begin(), said.end(), said.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  EXPECT_THAT(said, HasSubstr("invalidKey"));  // it is this text that is looked at
+  std::transform(said.begin(), said.end(), said.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   for (const char* secret : {"deadbe", "de ad be", "de, ad", "0xde", "10325476", "09090900"}) {
     EXPECT_THAT(said, Not(HasSubstr(secret)));
   }
@@ -115,7 +124,7 @@ TEST(Journal, FieldsAreStructured) {
 TEST_F(RunSurroundingsTest, AStuckInsCostsTheOthersNothing) {
   begin();
   ASSERT_EQ(end(), State::completed);
-  const SteadyTime alone = timers_.now();   // time began at 0
+  const SteadyTime alone = timers_.now();  // time began at 0
 
   struct Bench {
     explicit Bench(Timers& timers) : ins(timers), estimators(timers) {}
@@ -136,8 +145,9 @@ TEST_F(RunSurroundingsTest, AStuckInsCostsTheOthersNothing) {
     record.id = *store_->create_run(record);
     const std::filesystem::path folder = folder_ / record.ins;
     std::filesystem::create_directory(folder);
-    bench.run = std::make_unique<CalibrationRun>(
-        RunContext{timers_, *store_, bench.ins, bench.estimators, bench.observer}, config_, schedule_, key_, record, folder);
+    bench.run =
+        std::make_unique<CalibrationRun>(RunContext{timers_, *store_, bench.ins, bench.estimators, bench.observer},
+                                         config_, schedule_, key_, record, folder);
     bench.run->begin();
   }
   ASSERT_TRUE(timers_.run_until([&] { return benches[3]->run->record().state == State::rotating; }, 100s));
@@ -146,7 +156,9 @@ TEST_F(RunSurroundingsTest, AStuckInsCostsTheOthersNothing) {
     bool all = true;
     for (auto& bench : benches) {
       const bool over = bench->observer.finished > 0;
-      if (over && bench->ended == SteadyTime{}) bench->ended = timers_.now();
+      if (over && bench->ended == SteadyTime{}) {
+        bench->ended = timers_.now();
+      }
       all = all && over;
     }
     return all;

@@ -43,8 +43,10 @@ std::uint32_t write_pages(const Recording& recording, const std::filesystem::pat
     for (std::size_t i = first; i < std::min(recording.size(), first + flash::samples_per_page); ++i) {
       flash::SampleCounts& sample = page.samples.emplace_back();
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        sample.delta_theta[axis] = static_cast<std::int32_t>(std::lround(recording.delta_theta_rad[i][axis] / f.delta_theta_lsb_rad));
-        sample.delta_v[axis] = static_cast<std::int32_t>(std::lround(recording.delta_v_mps[i][axis] / f.delta_v_lsb_mps));
+        sample.delta_theta[axis] =
+            static_cast<std::int32_t>(std::lround(recording.delta_theta_rad[i][axis] / f.delta_theta_lsb_rad));
+        sample.delta_v[axis] =
+            static_cast<std::int32_t>(std::lround(recording.delta_v_mps[i][axis] / f.delta_v_lsb_mps));
       }
       sample.outer = gimbal_counts(recording.gimbal_outer_rad[i]);
       sample.inner = gimbal_counts(recording.gimbal_inner_rad[i]);
@@ -100,7 +102,7 @@ TEST_F(RunningEstimateTest, SigmaShrinksAsPagesArriveAndTheLastOneIsTheFinalAnsw
   }
   const auto whole = estimate_job(request_)([](const CalibrationProgress&) {}, {});
   ASSERT_TRUE(whole) << whole.error().message;
-  EXPECT_EQ(estimate.value, whole->result.value);   // the same data through the same code
+  EXPECT_EQ(estimate.value, whole->result.value);  // the same data through the same code
   EXPECT_EQ(estimate.sigma, whole->result.sigma);
   EXPECT_NEAR(estimate.data_s, schedule_.duration_s(), 1.0 / rate_hz);
 }
@@ -111,7 +113,8 @@ TEST_F(RunningEstimateTest, TheForecastIsKept) {
   const auto whole = estimate_job(request_)([](const CalibrationProgress&) {}, {});
   ASSERT_TRUE(whole) << whole.error().message;
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    request_.config.tolerance[i] = 1.6 * whole->result.sigma(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
+    request_.config.tolerance[i] =
+        1.6 * whole->result.sigma(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
   }
   RunningEstimator estimator(request_);
   const auto half = estimator.estimate(pages_at(0.5 * schedule_.duration_s()), {});
@@ -129,7 +132,7 @@ TEST_F(RunningEstimateTest, TheForecastIsKept) {
 
 TEST_F(RunningEstimateTest, WhatTheScheduleCannotGiveIsNamed) {
   const auto gyro_scale_y = static_cast<std::size_t>(parameter::gyro_scale + 1);
-  request_.config.tolerance[gyro_scale_y] = 1e-3;   // ppm: a thousandth of what such gyros allow in this time
+  request_.config.tolerance[gyro_scale_y] = 1e-3;  // ppm: a thousandth of what such gyros allow in this time
   const auto answer = RunningEstimator(request_).estimate(pages_at(400), {});
   ASSERT_TRUE(answer) << answer.error().message;
   EXPECT_EQ(answer->forecast.met_at_s, -1.0);
@@ -149,11 +152,11 @@ TEST_F(RunningEstimateTest, TooLittleDataAreAnErrorAndADamagedPageIs) {
 
 TEST(ScheduleUntil, CutsTheLastDwellAndLeavesOutWhatWasNotReached) {
   const Schedule schedule{{{0, 0}, {90, 0}, {180, 0}}, {10, 20, 30}, 5};
-  const Schedule part = schedule_until(schedule, 27);   // 10 + 5 + 12
+  const Schedule part = schedule_until(schedule, 27);  // 10 + 5 + 12
   ASSERT_EQ(part.positions.size(), 2u);
   EXPECT_EQ(part.dwell_s, (std::vector<double>{10, 12}));
   EXPECT_EQ(part.duration_s(), 27.0);
-  EXPECT_EQ(schedule_until(schedule, 12).positions.size(), 1u);   // on its way to the second
+  EXPECT_EQ(schedule_until(schedule, 12).positions.size(), 1u);  // on its way to the second
   EXPECT_EQ(schedule_until(schedule, 1000).duration_s(), schedule.duration_s());
 }
 

@@ -18,13 +18,15 @@ TEST_F(CalibrationRunTest, SigmaIsShownAndShrinksWhileTheGimbalTurns) {
   ASSERT_TRUE(timers_.run_until(
       [&] {
         const RunProgress& progress = run_->progress();
-        if (progress.running && (sigma.empty() || progress.sigma[0] != sigma.back())) sigma.push_back(progress.sigma[0]);
+        if (progress.running && (sigma.empty() || progress.sigma[0] != sigma.back())) {
+          sigma.push_back(progress.sigma[0]);
+        }
         return run_->record().state == State::draining;
       },
       1000s));
   ASSERT_GE(sigma.size(), 5u);
   EXPECT_TRUE(std::is_sorted(sigma.rbegin(), sigma.rend()));
-  EXPECT_EQ(run_->progress().tolerances_met, 24);   // the fifth: sigma is half the tolerance
+  EXPECT_EQ(run_->progress().tolerances_met, 24);  // the fifth: sigma is half the tolerance
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(estimators_.jobs, 1);
   EXPECT_FALSE(run_->record().early_end_s >= 0);
@@ -78,7 +80,7 @@ TEST_F(StopWhenMetTest, TheRotationEndsEarlyAndAllElseFollows) {
   EXPECT_EQ(ins_.starts, 1);
   EXPECT_EQ(ins_.stops, 1);
   EXPECT_LT(ins_.pages_read.size(), FakeIns::pages);
-  EXPECT_EQ(ins_.pages_read.size(), ins_.pages_written());   // every page of it, none twice
+  EXPECT_EQ(ins_.pages_read.size(), ins_.pages_written());  // every page of it, none twice
   EXPECT_EQ(run_->record().early_end_s, static_cast<double>(ins_.pages_written() * flash::samples_per_page));
   EXPECT_EQ(ins_.in_force().version, 1u);
   EXPECT_EQ(estimators_.jobs, 1);
@@ -116,7 +118,7 @@ TEST_F(StopWhenMetTest, TheStopLeavesADwellsEndAlone) {
   const double elapsed = schedule_.duration_s() - run_->progress().ins.time_left_s;
   const double period = schedule_.dwell_s[0] + schedule_.rotation_s;
   const double into_position = std::fmod(elapsed, period);
-  EXPECT_LT(into_position, schedule_.dwell_s[0] - 1.0);   // a status frame may be a second old
+  EXPECT_LT(into_position, schedule_.dwell_s[0] - 1.0);  // a status frame may be a second old
 }
 
 TEST_F(StopWhenMetTest, AKilledDaemonGoesOnEndingIt) {

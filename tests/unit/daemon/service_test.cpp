@@ -27,7 +27,9 @@ class PrivateBus {
  public:
   PrivateBus() {
     std::array<int, 2> ends{};
-    if (pipe(ends.data()) != 0) return;
+    if (pipe(ends.data()) != 0) {
+      return;
+    }
     pid_ = fork();
     if (pid_ == 0) {
       dup2(ends[1], STDOUT_FILENO);
@@ -36,11 +38,15 @@ class PrivateBus {
     }
     close(ends[1]);
     char c = 0;
-    while (read(ends[0], &c, 1) == 1 && c != '\n') address_ += c;
+    while (read(ends[0], &c, 1) == 1 && c != '\n') {
+      address_ += c;
+    }
     close(ends[0]);
   }
   ~PrivateBus() {
-    if (pid_ <= 0) return;
+    if (pid_ <= 0) {
+      return;
+    }
     kill(pid_, SIGTERM);
     waitpid(pid_, nullptr, 0);
   }
@@ -61,9 +67,9 @@ class ServiceTest : public testing::Test {
   }
 
   void configure(const std::string& daemon_keys, const std::string& sections) {
-    std::ofstream(folder_ / "selfcald.toml")
-        << "[daemon]\nstate_directory = \"" << (folder_ / "state").string() << "\"\nbus = \"" << bus_.address()
-        << "\"\nlcm_url = \"\"\n" << daemon_keys << sections;
+    std::ofstream(folder_ / "selfcald.toml") << "[daemon]\nstate_directory = \"" << (folder_ / "state").string()
+                                             << "\"\nbus = \"" << bus_.address() << "\"\nlcm_url = \"\"\n"
+                                             << daemon_keys << sections;
   }
   std::string section(const std::string& name, const std::string& keys = "") const {
     return "[ins." + name + "]\ninterface = \"absent-" + name + "\"\nkey_file = \"" + (folder_ / "key").string() +
@@ -169,7 +175,7 @@ TEST_F(ServiceTest, WithTooLittleDiskNoRunBegins) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().name, operator_api::error_unavailable);
   EXPECT_THAT(refused.error().message, HasSubstr("MiB free, a run (free_space_mib) needs"));
-  EXPECT_FALSE(operations().show(1));   // not even a record of one
+  EXPECT_FALSE(operations().show(1));  // not even a record of one
 }
 
 TEST_F(ServiceTest, ARestoreWaitsForRunsAndThenBringsBackTheirPast) {
@@ -182,15 +188,17 @@ TEST_F(ServiceTest, ARestoreWaitsForRunsAndThenBringsBackTheirPast) {
   EXPECT_EQ(busy.error().name, operator_api::error_busy);
   ASSERT_TRUE(operations().abort("a", "test"));
   // An abort is taken up in the next turns of the loop; a hang would be ended by the test's time limit.
-  while (!is_final(operations().record("a")->state)) loop_.turn(std::chrono::seconds(1));
+  while (!is_final(operations().record("a")->state)) {
+    loop_.turn(std::chrono::seconds(1));
+  }
   EXPECT_FALSE(operations().restore_database("absent.db"));
-  EXPECT_TRUE(operations().show(1));   // the database is as it was
+  EXPECT_TRUE(operations().show(1));  // the database is as it was
   const auto kept = operations().restore_database("before.db");
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_TRUE(fs::exists(*kept));
   EXPECT_FALSE(operations().show(1));
   EXPECT_EQ(*operations().check_database(), "");
-  EXPECT_EQ(*run("a"), 1);   // the daemon goes on with it
+  EXPECT_EQ(*run("a"), 1);  // the daemon goes on with it
 }
 
 TEST_F(ServiceTest, TwoServicesDoNotShareAStateDirectory) {

@@ -23,7 +23,9 @@ class SimulatedTimers : public Timers {
   bool run_until(const std::function<bool()>& done, std::chrono::nanoseconds limit) {
     const SteadyTime end = now_ + limit;
     while (!done()) {
-      if (queue_.empty() || queue_.begin()->first.first > end) return false;
+      if (queue_.empty() || queue_.begin()->first.first > end) {
+        return false;
+      }
       auto node = queue_.extract(queue_.begin());
       now_ = node.key().first;
       node.mapped()();

@@ -18,7 +18,9 @@ bool has_row(State state, Event event) {
 TEST(TransitionTable, EveryStateThatRunsCanEndAndCanGoOnAfterARestart) {
   for (int i = 0; i < state_count; ++i) {
     const State state = static_cast<State>(i);
-    if (is_final(state)) continue;
+    if (is_final(state)) {
+      continue;
+    }
     EXPECT_TRUE(has_row(state, Event::step_failed)) << name(state);
     EXPECT_TRUE(has_row(state, Event::abort_requested)) << name(state);
     EXPECT_TRUE(has_row(state, Event::recovered)) << name(state);
@@ -30,7 +32,9 @@ TEST(TransitionTable, EveryStateThatRunsCanEndAndCanGoOnAfterARestart) {
 }
 
 TEST(TransitionTable, NothingLeavesAFinalState) {
-  for (const Transition& row : transition_table()) EXPECT_FALSE(is_final(row.state)) << name(row.state);
+  for (const Transition& row : transition_table()) {
+    EXPECT_FALSE(is_final(row.state)) << name(row.state);
+  }
 }
 
 TEST(TransitionTable, AFinalStateIsEnteredByConcludingAndOnlyThen) {
@@ -43,7 +47,9 @@ TEST(TransitionTable, AFinalStateIsEnteredByConcludingAndOnlyThen) {
 // for good, and a stop that cannot be done, end without.
 TEST(TransitionTable, TheGimbalIsStoppedBeforeARunEnds) {
   for (const Transition& row : transition_table()) {
-    if (!gimbal_may_turn(row.state) || row.state == State::stopping || !is_final(row.next)) continue;
+    if (!gimbal_may_turn(row.state) || row.state == State::stopping || !is_final(row.next)) {
+      continue;
+    }
     EXPECT_EQ(row.event, Event::link_gone) << name(row.state) << " " << name(row.event);
   }
 }
@@ -51,7 +57,9 @@ TEST(TransitionTable, TheGimbalIsStoppedBeforeARunEnds) {
 // Likewise for a navigation check, which the INS would go on with for minutes, and refuse the next run meanwhile.
 TEST(TransitionTable, ANavigationCheckIsEndedBeforeARunEnds) {
   for (const Transition& row : transition_table()) {
-    if (row.state != State::checking_old && row.state != State::checking_new) continue;
+    if (row.state != State::checking_old && row.state != State::checking_new) {
+      continue;
+    }
     const bool over = row.event == Event::drift_measured;
     EXPECT_EQ(is_final(row.next) && !over, row.event == Event::link_gone) << name(row.state) << " " << name(row.event);
   }
@@ -61,7 +69,9 @@ TEST(TransitionTable, ANavigationCheckIsEndedBeforeARunEnds) {
 TEST(TransitionTable, NoSecondRotationOnTopOfAFirst) {
   int starts = 0;
   for (const Transition& row : transition_table()) {
-    if (row.action != Action::start_rotation) continue;
+    if (row.action != Action::start_rotation) {
+      continue;
+    }
     ++starts;
     EXPECT_EQ(row.state, State::scheduling);
     EXPECT_EQ(row.event, Event::schedule_accepted);
@@ -81,7 +91,9 @@ TEST(TransitionTable, EveryStateIsReachable) {
   std::set<State> reached{State::connecting};
   for (int i = 0; i < state_count; ++i) {
     for (const Transition& row : transition_table()) {
-      if (reached.contains(row.state)) reached.insert(row.next);
+      if (reached.contains(row.state)) {
+        reached.insert(row.next);
+      }
     }
   }
   EXPECT_EQ(static_cast<int>(reached.size()), state_count);

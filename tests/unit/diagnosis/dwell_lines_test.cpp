@@ -10,7 +10,7 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double rate_hz = 64.0, length_s = 60.0;
-constexpr double integral_noise = 2e-4;   // m/s, white: a quantum of 0.7 mm/s
+constexpr double integral_noise = 2e-4;  // m/s, white: a quantum of 0.7 mm/s
 constexpr double bias = 1e-3, frequency_hz = 0.4;
 
 // One dwell of accelerometer z: a bias, white noise of velocity and a line of force.

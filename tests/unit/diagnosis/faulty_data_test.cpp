@@ -15,7 +15,7 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double rate_hz = 50.0;
-constexpr std::size_t middle = 7000;   // 140 s: in the third dwell
+constexpr std::size_t middle = 7000;  // 140 s: in the third dwell
 
 struct Samples {
   earth::Position site{0.7, 2.0, 50.0};
@@ -27,8 +27,8 @@ struct Samples {
 struct Case {
   const char* name;
   std::function<void(Samples&)> spoil;
-  const char* id;                        // expected; empty: no fault
-  const char* words;                     // that the fault's own hold
+  const char* id;     // expected; empty: no fault
+  const char* words;  // that the fault's own hold
   std::size_t first_sample;
 };
 
@@ -102,13 +102,15 @@ const Case cases[] = {
     {"clock", [](Samples& s) { std::for_each(s.time_s.begin(), s.time_s.end(), [](double& t) { t *= 1.01; }); },
      "time_base", "49.505 Hz", 0},
     // The Earth turns this axis by tens of the noise's counts in 4 s.
-    {"frozen_gyro", [](Samples& s) {
+    {"frozen_gyro",
+     [](Samples& s) {
        for (std::size_t i = middle; i < middle + 200; ++i) {
          s.theta[i][0] = 0.0;
        }
      },
      "frozen_axis", "gyro x gives one value for 4.0 s", middle},
-    {"frozen_accelerometer", [](Samples& s) {
+    {"frozen_accelerometer",
+     [](Samples& s) {
        for (std::size_t i = middle; i < middle + 150; ++i) {
          s.v[i][2] = s.v[middle][2];
        }
@@ -118,18 +120,27 @@ const Case cases[] = {
     {"gyro_sign", [](Samples& s) { scale_axis(s.theta, 1, -1.0); }, "wrong_sign", "gyros: y gives -y", 0},
     {"gyro_axes", [](Samples& s) { swap_axes(s.theta, 1, 2); }, "wrong_axes", "gyros: y gives z, z gives y", 0},
     {"gyro_scale", [](Samples& s) { scale_axis(s.theta, 1, 1.1); }, "wrong_scale", "1.000, 1.100, 1.000", 0},
-    {"both_axes", [](Samples& s) { swap_axes(s.theta, 0, 1); swap_axes(s.v, 0, 1); }, "wrong_axes",
-     "gyros: x gives y, y gives x", 0},
+    {"both_axes",
+     [](Samples& s) {
+       swap_axes(s.theta, 0, 1);
+       swap_axes(s.v, 0, 1);
+     },
+     "wrong_axes", "gyros: x gives y, y gives x", 0},
     {"accelerometer_sign", [](Samples& s) { scale_axis(s.v, 2, -1.0); }, "wrong_sign", "accelerometers: z gives -z", 0},
     {"accelerometer_axes", [](Samples& s) { swap_axes(s.v, 0, 1); }, "wrong_axes",
      "accelerometers: x gives y, y gives x", 0},
-    {"accelerometer_axes_without_a_gimbal", [](Samples& s) { swap_axes(s.v, 0, 1); s.gimbal = false; }, "wrong_axes",
-     "accelerometers: x gives y, y gives x", 0},
+    {"accelerometer_axes_without_a_gimbal",
+     [](Samples& s) {
+       swap_axes(s.v, 0, 1);
+       s.gimbal = false;
+     },
+     "wrong_axes", "accelerometers: x gives y, y gives x", 0},
     {"accelerometers_upside_down", [](Samples& s) { scale_all(s.v, -1.0); }, "wrong_sign", "upside down", 0},
-    {"accelerometer_scale", [](Samples& s) { scale_all(s.v, 1.03); }, "wrong_scale", "specific force at rest is 10.09", 0},
+    {"accelerometer_scale", [](Samples& s) { scale_all(s.v, 1.03); }, "wrong_scale", "specific force at rest is 10.09",
+     0},
     // 0.7 rad is 40.107 deg.
-    {"latitude", [](Samples& s) { s.site.latitude += 1.0 * units::degree; }, "wrong_site",
-     "as at latitude 40.11 deg", 0},
+    {"latitude", [](Samples& s) { s.site.latitude += 1.0 * units::degree; }, "wrong_site", "as at latitude 40.11 deg",
+     0},
     {"hemisphere", [](Samples& s) { s.site.latitude *= -1.0; }, "wrong_site", "the site's is -40.11 deg", 0},
     // Longitude is nothing that an INS at rest can sense.
     {"longitude", [](Samples& s) { s.site.longitude += 1.0; }, "", "", 0},

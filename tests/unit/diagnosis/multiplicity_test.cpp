@@ -12,7 +12,8 @@ constexpr double alpha = 0.01;
 double worth(int count, bool alike) {
   SignatureRows rows;
   rows.residual = Eigen::VectorXd::Zero(count);
-  rows.columns = alike ? Eigen::MatrixXd::Constant(count, count, 1.0) : Eigen::MatrixXd(Eigen::MatrixXd::Identity(count, count));
+  rows.columns =
+      alike ? Eigen::MatrixXd::Constant(count, count, 1.0) : Eigen::MatrixXd(Eigen::MatrixXd::Identity(count, count));
   std::vector<Candidate> candidates;
   for (int k = 0; k < count; ++k) {
     candidates.push_back({nullptr, 0.0, k, 1});
@@ -23,7 +24,7 @@ double worth(int count, bool alike) {
 // 10000 draws leave 100 beyond the quantile: 10 % of scatter; 35 % are three of it and a little.
 TEST(Multiplicity, IndependentTestsCountEach) {
   for (const int count : {1, 10, 60}) {
-    EXPECT_NEAR(worth(count, false) / count, 1.0, 0.35) << count;   // 1 - (1 - p)^n = alpha: n p to 0.5 %
+    EXPECT_NEAR(worth(count, false) / count, 1.0, 0.35) << count;  // 1 - (1 - p)^n = alpha: n p to 0.5 %
   }
 }
 

@@ -41,7 +41,8 @@ PoseInput hand_turned(const Matrix3& G, std::uint32_t seed) {
     const Vector3 accel = u / accel_unit + Vector3(33100, 33300, 32400);
     input.time_s.push_back(t);
     input.gyro.push_back({gyro.x() + 4 * normal(random), gyro.y() + 4 * normal(random), gyro.z() + 4 * normal(random)});
-    input.accel.push_back({accel.x() + 4 * normal(random), accel.y() + 4 * normal(random), accel.z() + 4 * normal(random)});
+    input.accel.push_back(
+        {accel.x() + 4 * normal(random), accel.y() + 4 * normal(random), accel.z() + 4 * normal(random)});
   };
   for (int pose = 0; pose < 24; ++pose) {
     for (int k = 0; k < 400; ++k) {
@@ -57,7 +58,7 @@ PoseInput hand_turned(const Matrix3& G, std::uint32_t seed) {
 
 TEST(Poses, NamesAGSensitivity) {
   Matrix3 G;
-  G << 3.0, -8.0, 0.0, 5.0, 0.0, 2.0, 0.0, 6.0, -4.0;   // counts per g
+  G << 3.0, -8.0, 0.0, 5.0, 0.0, 2.0, 0.0, 6.0, -4.0;  // counts per g
   const PoseDiagnosis d = diagnose_poses(hand_turned(G, 1), 0.01);
   ASSERT_TRUE(d.failure.empty()) << d.failure;
   EXPECT_EQ(d.poses, 24);
@@ -65,7 +66,7 @@ TEST(Poses, NamesAGSensitivity) {
   ASSERT_EQ(d.gyro_named.size(), 1u);
   EXPECT_EQ(d.gyro_named[0].effect, "gyro_g_sensitivity");
   ASSERT_EQ(d.gyro_named[0].value.size(), 9u);
-  for (int k = 0; k < 9; ++k) {   // nine draws beyond 5 sigma (of 20 degrees): one seed in 2000, and the seed is fixed
+  for (int k = 0; k < 9; ++k) {  // nine draws beyond 5 sigma (of 20 degrees): one seed in 2000, and the seed is fixed
     EXPECT_LT(std::abs(d.gyro_named[0].value[static_cast<std::size_t>(k)] - G(k / 3, k % 3)),
               5.0 * d.gyro_named[0].sigma[static_cast<std::size_t>(k)]);
   }

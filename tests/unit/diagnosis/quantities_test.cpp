@@ -17,7 +17,7 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double rate_hz = 50.0;
-constexpr double start_c = 20.0, end_c = 25.0;   // the temperature rises evenly: its mean is 22.5
+constexpr double start_c = 20.0, end_c = 25.0;  // the temperature rises evenly: its mean is 22.5
 
 using Sample = std::array<double, 3>;
 
@@ -42,7 +42,8 @@ class Quantities : public testing::Test {
   }
 
   // Of quantity `id`, where `axis` (0..2 gyro, 3..5 accelerometer) has a bias (SI) in the samples that `inside` picks.
-  Located located(const std::string& id, std::size_t axis, double bias, const std::function<bool(std::size_t)>& inside) {
+  Located located(const std::string& id, std::size_t axis, double bias,
+                  const std::function<bool(std::size_t)>& inside) {
     for (std::size_t i = 0; i < theta_.size(); ++i) {
       if (inside(i)) {
         (axis < 3 ? theta_ : v_)[i][axis % 3] += bias / rate_hz;
@@ -93,24 +94,23 @@ TEST_F(Quantities, BiasAtAnOuterAngle) {
 }
 
 TEST_F(Quantities, BiasWhileAnAxisPointsUp) {
-  const Located l = located("gravity", 1, -0.5 * units::degree_per_hour,
-                            [&](std::size_t i) { return face(data().delta_v[i]) == 3; });
+  const Located l =
+      located("gravity", 1, -0.5 * units::degree_per_hour, [&](std::size_t i) { return face(data().delta_v[i]) == 3; });
   EXPECT_EQ(l.words, "gyro y, while -x is nearest to up");
   EXPECT_NEAR(l.size, -0.5, 0.5 * edges);
 }
 
 // In dwells the increments of perfect gyros are the Earth's rate; the turns between, a twelfth of the time, have no bias.
 TEST_F(Quantities, BiasWhileAnAxisPointsAlongTheEarthsRate) {
-  const Located l = located("earth_rate", 3, 500.0 * units::micro_g, [&](std::size_t i) {
-    return dwells(i) && face(data().delta_theta[i]) == 1;
-  });
+  const Located l = located("earth_rate", 3, 500.0 * units::micro_g,
+                            [&](std::size_t i) { return dwells(i) && face(data().delta_theta[i]) == 1; });
   EXPECT_EQ(l.words, "accelerometer x, while +y is nearest to the Earth's axis");
   EXPECT_NEAR(l.size, 500.0, 500.0 * (edges + 1.0 / 12.0));
 }
 
 TEST_F(Quantities, BiasBetweenTwoTemperatures) {
   const Located l = located("temperature", 5, 500.0 * units::micro_g, [&](std::size_t i) {
-    const double share = static_cast<double>(i) / static_cast<double>(data().size());   // 22.5 to 23.5 degC
+    const double share = static_cast<double>(i) / static_cast<double>(data().size());  // 22.5 to 23.5 degC
     return share >= 0.5 && share < 0.7;
   });
   EXPECT_EQ(l.words, "accelerometer z, between 22.5 and 23.5 degC");

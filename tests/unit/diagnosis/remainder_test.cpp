@@ -65,7 +65,7 @@ TEST(SquareWithin, IsTheSharePythagorasGives) {
   SignatureRows rows;
   rows.residual = Eigen::VectorXd::Zero(3);
   rows.columns = Eigen::MatrixXd::Zero(3, 5);
-  rows.columns.leftCols<2>() << 1.0, 1.0, 0.0, 1.0, 0.0, 0.0;   // not at right angles: what they span counts
+  rows.columns.leftCols<2>() << 1.0, 1.0, 0.0, 1.0, 0.0, 0.0;  // not at right angles: what they span counts
   rows.columns.col(2) << 3.0, 4.0, 0.0;
   rows.columns.col(3) << 0.0, 0.0, 5.0;
   rows.columns.col(4) << 0.0, 3.0, 4.0;

@@ -34,7 +34,7 @@ TEST(FitColumns, LeavesOutWhatCannotBeSeen) {
   EXPECT_NEAR(fit.value(0), 2.0, 1e-12);
   EXPECT_NEAR(fit.gain, 100.0, 1e-9);
   const Fit seen = fit_columns(Eigen::Matrix2d::Identity(), Eigen::Vector2d(50.0, 1.0));
-  EXPECT_EQ(seen.rank, 2);   // the negative control
+  EXPECT_EQ(seen.rank, 2);  // the negative control
 }
 
 TEST(SigmaAbout, IsThatOfASingleNormal) {

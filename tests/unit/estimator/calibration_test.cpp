@@ -72,8 +72,8 @@ INSTANTIATE_TEST_SUITE_P(Places, AnyStart,
 void shake(Recording& recording, const sim::SimConfig& config, double sigma, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> normal(0.0, sigma);
-  const Matrix3 C_nv = attitude_matrix({config.roll_deg * units::degree, config.pitch_deg * units::degree,
-                                        config.heading_deg * units::degree});
+  const Matrix3 C_nv = attitude_matrix(
+      {config.roll_deg * units::degree, config.pitch_deg * units::degree, config.heading_deg * units::degree});
   const auto draw = [&] { return Vector3(normal(engine), normal(engine), normal(engine)); };
   Vector3 from = Vector3::Zero(), to = draw(), before = Vector3::Zero();
   const auto second = static_cast<std::size_t>(recording.sample_rate_hz);
@@ -157,7 +157,7 @@ TEST_F(Consistent, SaysWhereTheNoiseGivenIsTooLarge) {
 TEST_F(Consistent, NotBeforeThePassesStandStill) {
   CalibrationOptions options;
   options.max_passes = 3;
-  options.convergence_sigma = 1e-12;   // below rounding: never met
+  options.convergence_sigma = 1e-12;  // below rounding: never met
   const CalibrationResult result = calibrated(*recording, options);
   EXPECT_EQ(result.consistency.verdict, Verdict::not_converged);
   EXPECT_FALSE(acceptable(result));
@@ -167,7 +167,7 @@ TEST_F(Consistent, NotBeforeThePassesStandStill) {
 // of a dwell's mean.
 TEST(Consistency, SeesWhatTheModelLeavesOut) {
   sim::ConcealedPhysics physics;
-  physics.effects.push_back({"accel_relaxation", {0.0, 0.0, 500.0 * units::micro_g, 60.0}});   // x y z, tau
+  physics.effects.push_back({"accel_relaxation", {0.0, 0.0, 500.0 * units::micro_g, 60.0}});  // x y z, tau
   const CalibrationResult result = calibrated(record({}, 31, physics));
   EXPECT_EQ(result.consistency.verdict, Verdict::inconsistent) << result.consistency.words;
   EXPECT_FALSE(acceptable(result));

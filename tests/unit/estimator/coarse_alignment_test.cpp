@@ -50,7 +50,7 @@ std::pair<double, double> response(double w) {
 }
 
 struct Bound {
-  double level, heading;   // rad
+  double level, heading;  // rad
 };
 
 Bound bound_for(const sim::SimConfig& config, const sim::MotionState& start) {
@@ -93,7 +93,7 @@ TEST_P(Alignment, IsWithinWhatTheErrorsAllow) {
     config.base_motion = test::rough_mooring();
   }
   const Schedule dwell{{{0, 0}}, {span_s}, 5.0};
-  const auto recording = sim::simulate(config, dwell, 1, {});   // seed 1
+  const auto recording = sim::simulate(config, dwell, 1, {});  // seed 1
   ASSERT_TRUE(recording) << recording.error().message;
   const ImuData data = test::view_of(*recording);
   const CoarseAlignment found = coarse_alignment(data, span_s);
@@ -106,7 +106,7 @@ TEST_P(Alignment, IsWithinWhatTheErrorsAllow) {
   const Bound bound = bound_for(config, start);
   const Vector3 phi = -rotation_vector_from_matrix(found.C_nb * start.C_nb.transpose());
   const double level = std::hypot(phi.x(), phi.z());
-  EXPECT_LT(level, bound.level + 1e-4);   // 1e-4: four sigma of a read-out of the gimbal, 5 arcsec
+  EXPECT_LT(level, bound.level + 1e-4);  // 1e-4: four sigma of a read-out of the gimbal, 5 arcsec
   EXPECT_LT(std::abs(phi.y()), bound.heading + 1e-4);
   constexpr double linear_range = 0.2;
   EXPECT_LT(std::max(bound.level, bound.heading), linear_range);
@@ -143,7 +143,7 @@ TEST(Alignment, AveragedGyrosWouldFail) {
     }
     worst = std::max(worst, std::abs(sum.x() / 60.0) / units::degree_per_hour);
   }
-  EXPECT_GT(worst, 45.0);   // deg/h; 15 of them would be the Earth's
+  EXPECT_GT(worst, 45.0);  // deg/h; 15 of them would be the Earth's
 }
 
 }  // namespace

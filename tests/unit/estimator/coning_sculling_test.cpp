@@ -25,7 +25,7 @@ const earth::Position site{40.0 * units::degree, 0.0, 0.0};
 
 struct Vibration {
   double frequency_hz;
-  double bound;   // stated: of the residual, deg/h or ug
+  double bound;  // stated: of the residual, deg/h or ug
 
   friend std::ostream& operator<<(std::ostream& out, const Vibration& v) { return out << v.frequency_hz << " Hz"; }
 };
@@ -38,7 +38,7 @@ double residual_per_sample(double b) {
 
 struct Navigated {
   Matrix3 C_nb;
-  Vector3 velocity = Vector3::Zero();   // sum of the drifts over the intervals, m/s
+  Vector3 velocity = Vector3::Zero();  // sum of the drifts over the intervals, m/s
 };
 
 Navigated navigate(double rate_hz, const test::MotionData::Integral& angle, const test::MotionData::Integral& velocity,
@@ -63,7 +63,7 @@ class Coning : public ::testing::TestWithParam<Vibration> {};
 TEST_P(Coning, ResidualDriftIsTheAlgorithms) {
   const double w = 2.0 * std::numbers::pi * GetParam().frequency_hz;
   const double rim = std::sin(amplitude), along = -2.0 * w * std::pow(std::sin(0.5 * amplitude), 2);
-  const auto angle = [&](double a, double b) -> Vector3 {   // exact integrals of coning rates
+  const auto angle = [&](double a, double b) -> Vector3 {  // exact integrals of coning rates
     return {along * (b - a), rim * (std::cos(w * b) - std::cos(w * a)), rim * (std::sin(w * b) - std::sin(w * a))};
   };
   const double g = earth::normal_gravity(site.latitude, 0.0);
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Frequencies, Coning,
 class Sculling : public ::testing::TestWithParam<Vibration> {};
 
 TEST_P(Sculling, ResidualAccelerationIsTheAlgorithms) {
-  constexpr double force = 1.0;   // m/s^2
+  constexpr double force = 1.0;  // m/s^2
   const double w = 2.0 * std::numbers::pi * GetParam().frequency_hz;
   const double g = earth::normal_gravity(site.latitude, 0.0);
   // x up: the rotation leaves gravity alone; y north; the rectified acceleration shows along z, west.

@@ -22,9 +22,9 @@ using test::MotionData;
 using test::Perturbation;
 using test::TurningGimbal;
 
-constexpr double T = 1.0;   // s, the interval
+constexpr double T = 1.0;  // s, the interval
 constexpr double R = earth::semi_major_axis;
-constexpr double attitude_rounding = 3.5e-13;   // rad
+constexpr double attitude_rounding = 3.5e-13;  // rad
 
 // Of the states of one row, for a step h.
 double rounding(int row, double h) {
@@ -46,14 +46,17 @@ class ErrorModel : public ::testing::TestWithParam<Case> {
   TurningGimbal motion() const {
     return {{GetParam().latitude_deg * units::degree, 2.0, 50.0},
             {-20.0 * units::degree, 10.0 * units::degree, 30.0 * units::degree},
-            40.0 * units::degree, GetParam().rate_deg_per_s * units::degree, 25.0 * units::degree};
+            40.0 * units::degree,
+            GetParam().rate_deg_per_s * units::degree,
+            25.0 * units::degree};
   }
   double begin() const { return GetParam().sign > 0.0 ? 0.0 : T; }
   double end() const { return T - begin(); }
 
   Vector9 central_difference(const Perturbation& plus, const Perturbation& minus, double step) const {
     return (test::navigation_error(motion(), plus, begin(), end()) -
-            test::navigation_error(motion(), minus, begin(), end())) / (2.0 * step);
+            test::navigation_error(motion(), minus, begin(), end())) /
+           (2.0 * step);
   }
 
   Interval interval() const {
@@ -81,7 +84,7 @@ TEST_P(ErrorModel, TransitionOfTheNavigationErrors) {
   F.block<3, 3>(StateLayout::velocity, StateLayout::attitude) = skew(-site.gravity_n);
   const Matrix9 size = T * F.cwiseAbs();
   const Matrix9 rest = size * size * size * size / 24.0 * (Matrix9::Identity() + size);
-  const double steps[3] = {1000.0, 1.0, 1e-4};   // m, m/s, rad
+  const double steps[3] = {1000.0, 1.0, 1e-4};  // m, m/s, rad
   for (int column = 0; column < 9; ++column) {
     Perturbation plus, minus;
     const double h = steps[column / 3];
@@ -106,7 +109,7 @@ TEST_P(ErrorModel, SensitivityToThe24) {
   const Interval model = interval();
   for (int k = 0; k < sensor_parameter_count; ++k) {
     const bool accel = k < parameter::gyro_drift || (k >= parameter::accel_scale_pos && k < parameter::gyro_scale);
-    const double step = k < parameter::gyro_drift ? 1e-3 : k < parameter::accel_scale_pos ? 1e-5 : 1e-4;   // SI
+    const double step = k < parameter::gyro_drift ? 1e-3 : k < parameter::accel_scale_pos ? 1e-5 : 1e-4;  // SI
     Perturbation plus, minus;
     plus.errors[static_cast<std::size_t>(k)] = step;
     minus.errors[static_cast<std::size_t>(k)] = -step;
@@ -143,9 +146,9 @@ TEST(Measurement, IsPositionPlusMotion) {
     std::array<VectorX, 3> rows;
   } seen;
   const TurningGimbal still{{0.7, 2.0, 50.0}, {}, 0.0, 0.0, 0.0};
-  const MotionData data(still.site, 50.0, 5.0,
-                        [&](double a, double b) -> Vector3 { return (b - a) * still.omega_ib_b(a); },
-                        [&](double a, double b) -> Vector3 { return (b - a) * still.f_ib_b(a); });
+  const MotionData data(
+      still.site, 50.0, 5.0, [&](double a, double b) -> Vector3 { return (b - a) * still.omega_ib_b(a); },
+      [&](double a, double b) -> Vector3 { return (b - a) * still.f_ib_b(a); });
   PassInput input;
   input.data = &data.view();
   input.C_nb = still.C_nb(0.0);

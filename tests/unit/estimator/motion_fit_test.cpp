@@ -14,7 +14,7 @@ namespace selfcal {
 namespace {
 
 constexpr int epochs = 2900;
-constexpr double swell_s = 8.9, surge_s = 14.8;   // periods
+constexpr double swell_s = 8.9, surge_s = 14.8;  // periods
 const DriftNoise sensors{5.0 * units::micro_g_per_sqrt_hz, 0.001 * units::degree_per_sqrt_hour, 3e-6};
 
 // Of the base at the epochs 0 ... epochs, m and m/s.
@@ -22,7 +22,7 @@ struct Axis {
   std::vector<double> position = std::vector<double>(epochs + 1, 0.0);
   std::vector<double> velocity = position;
 };
-using Displacement = std::array<Axis, 3>;   // north, up, east
+using Displacement = std::array<Axis, 3>;  // north, up, east
 
 // The drift that (M1) gives for a base displaced so. Position and velocity are put back to the site every epoch, so the
 // drive is minus what they drifted: with velocity v at the beginning, position by d' - d - v, velocity by v' - v.
@@ -32,7 +32,7 @@ DriftSeries drift_of(const Displacement& d, std::uint64_t seed) {
   const double accel = sensors.accel_vrw;
   const double tilt = 9.8 * sensors.gyro_arw;
   DriftSeries series;
-  Vector3 acceleration(2e-3, -1e-3, 1e-3);   // a tilt of 0.2 mrad and the like
+  Vector3 acceleration(2e-3, -1e-3, 1e-3);  // a tilt of 0.2 mrad and the like
   for (std::size_t k = 0; k < epochs; ++k) {
     Vector3 position, velocity;
     for (int axis = 0; axis < 3; ++axis) {
@@ -40,8 +40,7 @@ DriftSeries drift_of(const Displacement& d, std::uint64_t seed) {
       const double a = normal(engine), b = normal(engine);
       const auto& [x, v] = d[static_cast<std::size_t>(axis)];
       velocity(axis) = acceleration(axis) + accel * a - (v[k + 1] - v[k]);
-      position(axis) =
-          0.5 * acceleration(axis) + accel * (0.5 * a + b / std::sqrt(12.0)) - (x[k + 1] - x[k] - v[k]);
+      position(axis) = 0.5 * acceleration(axis) + accel * (0.5 * a + b / std::sqrt(12.0)) - (x[k + 1] - x[k] - v[k]);
       acceleration(axis) += tilt * normal(engine);
     }
     series.position.push_back(position);
@@ -98,7 +97,7 @@ Oscillation strongest(const MotionModel& motion) {
 TEST(MotionFit, TakesLinesOutAlsoWhereTheyAreWeak) {
   Displacement d;
   add_line(d[0], 0.05, swell_s, 0.0);
-  add_line(d[0], 0.001, surge_s, 1.0);   // the host heads nearly east
+  add_line(d[0], 0.001, surge_s, 1.0);  // the host heads nearly east
   add_line(d[1], 0.04, swell_s, 0.7);
   add_line(d[2], 0.08, surge_s, 1.0);
   const DriftSeries series = drift_of(d, 7);

@@ -81,7 +81,7 @@ TEST(NoiseEstimation, ScattersAsTheCramerRaoBoundAllows) {
   const Scatter accel = cramer_rao(vrw, accel_angle, accel_group_s, length_s - 2.0);
   constexpr int seeds = 32;
   Score gyro_white, gyro_q, accel_white, accel_q, wrong;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {   // seeds 1 to 32
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {  // seeds 1 to 32
     const SensorNoise found = estimate_synthetic(seed, gyro_angle, accel_angle);
     EXPECT_FALSE(found.base_moves);
     EXPECT_EQ(found.gyro.quantum, 0.0);
@@ -94,12 +94,12 @@ TEST(NoiseEstimation, ScattersAsTheCramerRaoBoundAllows) {
   // Four sigma of the mean and of the root mean square of `seeds` standard normals; detrending takes a few per cent off
   // the lowest bins, a tenth of a sigma.
   const double mean_bound = 4.0 / std::sqrt(seeds) + 0.1, rms_bound = 4.0 / std::sqrt(2.0 * seeds);
-  for (const auto& [name, score] : {std::pair{"gyro N", gyro_white}, {"gyro Q", gyro_q}, {"accel N", accel_white},
-                                    {"accel Q", accel_q}}) {
+  for (const auto& [name, score] :
+       {std::pair{"gyro N", gyro_white}, {"gyro Q", gyro_q}, {"accel N", accel_white}, {"accel Q", accel_q}}) {
     EXPECT_LT(std::abs(score.mean()), mean_bound) << name;
     EXPECT_NEAR(score.rms(), 1.0, rms_bound) << name;
   }
-  EXPECT_GT(std::abs(wrong.mean()), mean_bound);   // negative control: ten per cent more noise is another noise
+  EXPECT_GT(std::abs(wrong.mean()), mean_bound);  // negative control: ten per cent more noise is another noise
 }
 
 // The virtual INS quantises and carries the remainder: the quantum is found exactly, the white part within four sigma.
@@ -108,7 +108,7 @@ TEST(NoiseEstimation, FindsNoiseAndQuantumOfTheVirtualIns) {
     sim::SimConfig config;
     config.gyro_arw_deg_per_sqrt_h *= factor;
     config.accel_vrw_ug_per_sqrt_hz *= factor;
-    const auto recording = sim::simulate(config, *named_schedule("horizontal", 60.0), 4, {});   // seed 4
+    const auto recording = sim::simulate(config, *named_schedule("horizontal", 60.0), 4, {});  // seed 4
     ASSERT_TRUE(recording);
     const ImuData data = test::view_of(*recording);
     const std::vector<Segment> segments = find_segments(data);
@@ -130,7 +130,7 @@ TEST(NoiseEstimation, FindsNoiseAndQuantumOfTheVirtualIns) {
 TEST(NoiseEstimation, KnowsAMooredBase) {
   sim::SimConfig config;
   config.base_motion = sim::moored_base_motion();
-  const auto recording = sim::simulate(config, *named_schedule("horizontal", 30.0), 5, {});   // seed 5
+  const auto recording = sim::simulate(config, *named_schedule("horizontal", 30.0), 5, {});  // seed 5
   ASSERT_TRUE(recording);
   const ImuData data = test::view_of(*recording);
   EXPECT_TRUE(estimate_sensor_noise(data, find_segments(data)).base_moves);

@@ -7,7 +7,7 @@
 namespace selfcal::test {
 namespace {
 
-constexpr int steps = 400;   // 2.5 ms: 0.3 rad/s leaves (7.5e-4)^5/120 = 2e-18 rad a step
+constexpr int steps = 400;  // 2.5 ms: 0.3 rad/s leaves (7.5e-4)^5/120 = 2e-18 rad a step
 
 // Departures from the site are integrated, not latitude itself: rounding is then of the departure.
 struct State {
@@ -39,8 +39,8 @@ State rate_of(const TurningGimbal& motion, const sim::SensorErrors& errors, cons
   rate.d_latitude = s.v_n.x() / (earth::meridian_radius(p.latitude) + p.height);
   rate.d_longitude = s.v_n.z() / ((earth::prime_vertical_radius(p.latitude) + p.height) * std::cos(p.latitude));
   rate.d_height = s.v_n.y();
-  rate.v_n = s.q_nb * f_b - Vector3(0, earth::normal_gravity(p.latitude, p.height), 0) -
-             (2.0 * w_ie + w_en).cross(s.v_n);
+  rate.v_n =
+      s.q_nb * f_b - Vector3(0, earth::normal_gravity(p.latitude, p.height), 0) - (2.0 * w_ie + w_en).cross(s.v_n);
   const Vector3 w_nb_b = w_b - s.q_nb.conjugate() * (w_ie + w_en);
   rate.q_nb = s.q_nb * Eigen::Quaterniond(0, 0.5 * w_nb_b.x(), 0.5 * w_nb_b.y(), 0.5 * w_nb_b.z());
   return rate;

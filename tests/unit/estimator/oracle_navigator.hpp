@@ -13,7 +13,7 @@ namespace selfcal::test {
 struct TurningGimbal {
   earth::Position site;
   Attitude vehicle;
-  double outer_start = 0.0, outer_rate = 0.0, inner = 0.0;   // rad, rad/s
+  double outer_start = 0.0, outer_rate = 0.0, inner = 0.0;  // rad, rad/s
 
   Matrix3 C_nb(double t) const;
   Vector3 omega_ib_b(double t) const;

@@ -9,8 +9,8 @@
 namespace selfcal {
 namespace {
 
-constexpr double rate_hz = 50.0, quantum = 4.85e-7;   // 0.1 arcsec
-constexpr int dwells = 18, samples = 3500;            // 70 s each
+constexpr double rate_hz = 50.0, quantum = 4.85e-7;  // 0.1 arcsec
+constexpr int dwells = 18, samples = 3500;           // 70 s each
 
 struct Recorded {
   std::vector<std::array<double, 3>> increments;
@@ -67,8 +67,9 @@ TEST(QuantumDensity, WhiteWhereTheNoiseIsLarge) {
   const double asd = 2.0 * quantum * std::sqrt(rate_hz);
   for (const double f : {0.1, 1.0, 20.0}) {
     const double sine = std::sin(3.14159265358979 * f / rate_hz);
-    EXPECT_NEAR(quantum_density(f, 3e-5, quantum, asd, rate_hz) / (quantum * quantum / 12.0 * 4.0 * sine * sine * rate_hz), 1.0,
-                1e-9);
+    EXPECT_NEAR(
+        quantum_density(f, 3e-5, quantum, asd, rate_hz) / (quantum * quantum / 12.0 * 4.0 * sine * sine * rate_hz), 1.0,
+        1e-9);
   }
 }
 
@@ -81,7 +82,8 @@ TEST(QuantumDensity, HoldsAllOfTheVariance) {
   for (int k = 0; k < steps; ++k) {
     const double f = rate_hz * ((k + 0.5) / steps - 0.5);
     const double sine = std::sin(3.14159265358979 * f / rate_hz);
-    variance += quantum_density(f, 3e-5, quantum, asd, rate_hz) / (4.0 * sine * sine * rate_hz * rate_hz) * rate_hz / steps;
+    variance +=
+        quantum_density(f, 3e-5, quantum, asd, rate_hz) / (4.0 * sine * sine * rate_hz * rate_hz) * rate_hz / steps;
   }
   EXPECT_NEAR(variance / (quantum * quantum / 12.0), 1.0, 1e-3);
 }

@@ -12,22 +12,23 @@
 namespace selfcal {
 namespace {
 
-constexpr double length_s = 300.4;   // not a whole number of intervals
+constexpr double length_s = 300.4;  // not a whole number of intervals
 constexpr double rate_hz = 200.0;
 
 // Turns of up to 30 deg/s, forces of up to 12 m/s^2, noise on every sample: nothing is special about the motion.
 struct AnyMotion {
   test::MotionData data;
   explicit AnyMotion(std::mt19937_64& random)
-      : data({0.6, 1.0, 20.0}, rate_hz, length_s,
-             [&random](double a, double b) -> Vector3 {
-               std::normal_distribution<double> noise(0.0, 1e-6);
-               return (b - a) * Vector3(0.4 * std::sin(0.21 * a), 0.3 * std::cos(0.13 * a), 0.2 * std::sin(0.34 * a)) +
-                      Vector3(noise(random), noise(random), noise(random));
-             },
-             [](double a, double b) -> Vector3 {
-               return (b - a) * Vector3(9.0 * std::sin(0.3 * a), 5.0, 6.0 * std::cos(0.17 * a));
-             }) {}
+      : data(
+            {0.6, 1.0, 20.0}, rate_hz, length_s,
+            [&random](double a, double b) -> Vector3 {
+              std::normal_distribution<double> noise(0.0, 1e-6);
+              return (b - a) * Vector3(0.4 * std::sin(0.21 * a), 0.3 * std::cos(0.13 * a), 0.2 * std::sin(0.34 * a)) +
+                     Vector3(noise(random), noise(random), noise(random));
+            },
+            [](double a, double b) -> Vector3 {
+              return (b - a) * Vector3(9.0 * std::sin(0.3 * a), 5.0, 6.0 * std::cos(0.17 * a));
+            }) {}
 };
 
 ParameterVector some_parameters() {
@@ -42,7 +43,7 @@ ParameterVector some_parameters() {
 // left and right products commute, so in exact arithmetic the attitude is the same. A product and the normalisation
 // round by at most 8 of 1.1e-16, in angle twice that: 2 x 60,000 samples add up to 2.2e-10 rad at worst.
 TEST(ReverseNavigation, ComesBackToTheStart) {
-  std::mt19937_64 random(11);   // seed 11
+  std::mt19937_64 random(11);  // seed 11
   const AnyMotion motion(random);
   const Matrix3 start = matrix_from_rotation_vector({0.3, -1.2, 0.7});
   const ParameterVector parameters = some_parameters();
@@ -70,7 +71,7 @@ TEST(ReverseNavigation, VelocityAndPositionComeBackToo) {
   const earth::Position site{0.6, 1.0, 20.0};
   const Matrix3 C = matrix_from_rotation_vector({0.3, -1.2, 0.7});
   const double g = earth::normal_gravity(site.latitude, site.height);
-  const Vector3 residual(0.01, -0.02, 0.015);   // m/s^2: accelerometer errors of milli-g
+  const Vector3 residual(0.01, -0.02, 0.015);  // m/s^2: accelerometer errors of milli-g
   const test::MotionData data(
       site, rate_hz, 1.0,
       [&](double a, double b) -> Vector3 { return (b - a) * (C.transpose() * earth::omega_ie_n(site.latitude)); },

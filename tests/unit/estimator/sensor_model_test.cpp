@@ -17,7 +17,7 @@ constexpr double dt = 0.005;
 ParameterVector large_errors(std::mt19937_64& random) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   ParameterVector p;
-  const double sizes[] = {2300, 0.06, 1000, 1000, 950, 66, 770};   // ug, deg/h, ppm, ppm, arcsec, ppm, arcsec
+  const double sizes[] = {2300, 0.06, 1000, 1000, 950, 66, 770};  // ug, deg/h, ppm, ppm, arcsec, ppm, arcsec
   for (int k = 0; k < sensor_parameter_count; ++k) {
     p(k) = uniform(random) * sizes[std::min(k / 3, 6)] * sensor_parameters[static_cast<std::size_t>(k)].si_per_unit;
   }
@@ -31,7 +31,7 @@ Vector3 random_vector(std::mt19937_64& random, double size) {
 
 // Division and a triangular solution of condition 1: some ten roundings of the increment.
 TEST(SensorCompensation, TakesOutWhatTheVirtualInsPutsIn) {
-  std::mt19937_64 random(5);   // seed 5
+  std::mt19937_64 random(5);  // seed 5
   for (int trial = 0; trial < 200; ++trial) {
     const ParameterVector p = large_errors(random);
     sim::SensorErrors errors{};
@@ -47,7 +47,7 @@ TEST(SensorCompensation, TakesOutWhatTheVirtualInsPutsIn) {
 // d(compensated)/d(parameter) = -d(error)/d(parameter) at zero errors. With h = 1e-4 the central difference errs by h^2
 // of the sensitivity (1/(1+K) to third order, products of angles), and rounds by 1e-16/h.
 TEST(SensorCompensation, PartialsAreCentralDifferences) {
-  std::mt19937_64 random(6);   // seed 6
+  std::mt19937_64 random(6);  // seed 6
   constexpr double h = 1e-4;
   for (int trial = 0; trial < 50; ++trial) {
     const Vector3 f = random_vector(random, 12.0), w = random_vector(random, 0.5);

@@ -44,8 +44,8 @@ INSTANTIATE_TEST_SUITE_P(Rates, SensorNoiseAtRate, testing::Values(50.0, 90.0, 1
 
 struct Moored {
   double rate_hz, gyro_asd;
-  double quantum;          // rad, carried on; 0: none
-  double gyro_tolerance;   // of the amplitude
+  double quantum;         // rad, carried on; 0: none
+  double gyro_tolerance;  // of the amplitude
 };
 
 class SensorNoiseOnAMooredBase : public testing::TestWithParam<Moored> {};

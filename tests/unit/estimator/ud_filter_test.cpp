@@ -13,9 +13,11 @@ using VectorL = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
 
 TEST(UdFilter, AgreesWithADenseFilter) {
   constexpr int d = 5, c = 4, n = d + c;
-  std::mt19937_64 engine(3);   // seed 3
+  std::mt19937_64 engine(3);  // seed 3
   std::normal_distribution<double> normal;
-  const auto random = [&](int rows, int cols) { return MatrixX::NullaryExpr(rows, cols, [&] { return normal(engine); }).eval(); };
+  const auto random = [&](int rows, int cols) {
+    return MatrixX::NullaryExpr(rows, cols, [&] { return normal(engine); }).eval();
+  };
   const VectorX mean = random(n, 1), sigma = random(n, 1).cwiseAbs().array() + 0.5;
   UdFilter filter(mean, sigma, c);
   VectorL x = mean.cast<long double>();

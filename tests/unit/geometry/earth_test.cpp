@@ -24,7 +24,7 @@ std::vector<double> latitudes_deg() {
 
 // Columns are north, up, east at the place, in ECEF.
 Matrix3 frame_en(double latitude_deg, double longitude_deg, double height, Vector3* position = nullptr) {
-  std::vector<double> M(9);   // row-major, columns east, north, up
+  std::vector<double> M(9);  // row-major, columns east, north, up
   double x = 0.0, y = 0.0, z = 0.0;
   GeographicLib::Geocentric::WGS84().Forward(latitude_deg, longitude_deg, height, x, y, z, M);
   if (position != nullptr) {
@@ -73,12 +73,13 @@ TEST(NormalGravity, AboveAndBelowTheEllipsoid) {
 // The derivative of the bound above, 2 g/a = 3.1e-6 1/s^2 being the gradient. Central difference over 2 d: third
 // derivative 24 g/a^3 times d^2/6 = 2e-15, rounding 2e-15/d.
 TEST(NormalGravity, Gradient) {
-  constexpr double d = 100.0;   // m
+  constexpr double d = 100.0;  // m
   for (const double latitude : latitudes_deg()) {
     for (const double height : {0.0, 1000.0}) {
       const double exact = (exact_gravity(latitude, height + d) - exact_gravity(latitude, height - d)) / (2.0 * d);
       const double x = height / semi_major_axis;
-      const double bound = 9.9 / semi_major_axis * (6.3 * flattening * flattening + 24.0 * flattening * x + 12.0 * x * x);
+      const double bound =
+          9.9 / semi_major_axis * (6.3 * flattening * flattening + 24.0 * flattening * x + 12.0 * x * x);
       EXPECT_NEAR(gravity_gradient(latitude * units::degree, height), exact, bound + 1e-14) << latitude;
     }
   }
@@ -96,7 +97,7 @@ TEST(Radii, OfCurvature) {
 // A small step in latitude moves by (R_M + h) dL, one in longitude by (R_N + h) cos L dlambda. Central differences of
 // ECEF positions: relative error s^2/6 = 2e-9 for s = 1e-4 rad, rounding 1e-9 m / 1e-4 = 1e-5 m of 6e6 m.
 TEST(Radii, MovePositionsInEcef) {
-  constexpr double s = 1e-4;   // rad
+  constexpr double s = 1e-4;  // rad
   for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {
     constexpr double longitude = 116.0, height = 800.0;
     const double L = latitude * units::degree;
@@ -107,7 +108,7 @@ TEST(Radii, MovePositionsInEcef) {
       frame_en(latitude - d_latitude / units::degree, longitude - d_longitude / units::degree, height, &behind);
       return C_en.transpose() * (ahead - behind) / (2.0 * s);
     };
-    constexpr double bound = 3e-9 * 6.4e6 + 1e-4;   // m per rad
+    constexpr double bound = 3e-9 * 6.4e6 + 1e-4;  // m per rad
     const Vector3 north(meridian_radius(L) + height, 0.0, 0.0);
     const Vector3 east(0.0, 0.0, (prime_vertical_radius(L) + height) * std::cos(L));
     // The meridian's radius changes along it by 3 e^2 R sin 2L / 2 per rad: in a central difference only as s^2.
@@ -127,7 +128,7 @@ TEST(EarthRate, IsTheAxisOfEcef) {
 // n carried over the Earth: its rotation between two places, from ECEF frames. Over s = 1e-4 rad both ways the second
 // order cancels; the third leaves s^2 (1 + tan^2 L) of the rate, rounding 1e-16/s.
 TEST(TransportRate, IsTheTurnOfEcefFrames) {
-  constexpr double s = 1e-4;      // s of time at a speed of about one Earth radius a second
+  constexpr double s = 1e-4;  // s of time at a speed of about one Earth radius a second
   constexpr double speed = 6.4e6;
   for (double latitude = -80.0; latitude <= 80.0; latitude += 20.0) {
     constexpr double longitude = 10.0, height = 3000.0;

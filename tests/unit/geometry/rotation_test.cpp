@@ -16,8 +16,8 @@ constexpr double quarter = 90.0 * units::degree;
 
 std::vector<Vector3> rotation_vectors() {
   std::vector<Vector3> vectors = {Vector3::Zero(), {1e-8, 0, 0}, {0, -1e-8, 1e-8}, {0.02, 0, 0}, {0, 0.0201, 0}};
-  std::mt19937_64 random(1);   // seed 1
-  std::uniform_real_distribution<double> uniform(-1.7, 1.7);   // |phi| < 1.7 sqrt 3 = 2.95 < pi
+  std::mt19937_64 random(1);                                  // seed 1
+  std::uniform_real_distribution<double> uniform(-1.7, 1.7);  // |phi| < 1.7 sqrt 3 = 2.95 < pi
   for (int i = 0; i < 100; ++i) {
     vectors.emplace_back(uniform(random), uniform(random), uniform(random));
   }
@@ -34,7 +34,7 @@ TEST(Rotation, GroupLaws) {
     EXPECT_LT((matrix_from_rotation_vector(2.0 * phi) - C * C).norm(), rounding);
     // Near pi the angle is ill-conditioned by 1/cos(|phi|/2) < 11 in atan2's argument.
     EXPECT_LT((rotation_vector_from_matrix(C) - phi).norm(), 11.0 * rounding);
-    if (phi.norm() < 1e-7) {   // first order: the rest is |phi|^2/2 < 2e-16
+    if (phi.norm() < 1e-7) {  // first order: the rest is |phi|^2/2 < 2e-16
       EXPECT_LT((C - Matrix3::Identity() - skew(phi)).norm(), 1e-15);
     }
   }
@@ -64,7 +64,7 @@ TEST(Gimbal, OuterCarriesInner) {
 }
 
 TEST(Attitude, MatrixAndBack) {
-  std::mt19937_64 random(2);   // seed 2
+  std::mt19937_64 random(2);  // seed 2
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (int i = 0; i < 100; ++i) {
     const Attitude a{3.1 * uniform(random), 1.5 * uniform(random), 3.1 * uniform(random)};

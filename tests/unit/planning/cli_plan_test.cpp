@@ -49,8 +49,8 @@ TEST(Plan, IsContentWithHorizontalOnALevelBaseAndTable2OnAPitchedOne) {
 // A schedule that --optimize writes is one that plan and simulate accept, and it keeps what it promised.
 TEST(Plan, OptimizedScheduleKeepsItsPromise) {
   const test::TemporaryFolder folder;
-  const std::vector<std::string> tolerances = {"--tolerance", "accel_bias=3",    "--tolerance", "gyro_drift=0.02",
-                                               "--tolerance", "gyro_scale=3",    "--tolerance", "accel_scale_pos=3",
+  const std::vector<std::string> tolerances = {"--tolerance", "accel_bias=3",     "--tolerance", "gyro_drift=0.02",
+                                               "--tolerance", "gyro_scale=3",     "--tolerance", "accel_scale_pos=3",
                                                "--tolerance", "accel_scale_neg=3"};
   std::vector<std::string> search = {"plan", "--optimize", "--dwell", "20", "--json", "-o", folder / "best.toml"};
   search.insert(search.end(), tolerances.begin(), tolerances.end());

@@ -47,8 +47,8 @@ ParameterVector column(const json& document, const char* key) {
 }
 
 ParameterVector truth_of(const std::string& name) {
-  const json truth = json::parse(
-      read_text_file(test::shared_recordings() / ("known-" + name + ".truth.json"), 1 << 20).value());
+  const json truth =
+      json::parse(read_text_file(test::shared_recordings() / ("known-" + name + ".truth.json"), 1 << 20).value());
   ParameterVector values;
   int k = 0;
   for (const char* group : {"ba", "bg", "kp", "km", "A", "kg", "G"}) {
@@ -64,12 +64,11 @@ ParameterVector truth_of(const std::string& name) {
 constexpr double allowed = 0.10;
 
 TEST_P(KnownAccuracy, SigmaIsTheLimitForOneCentimetre) {
-  const json document =
-      estimate(GetParam().name, {"--position-noise", "0.01", "--arw", "0.001", "--vrw", "5"});
+  const json document = estimate(GetParam().name, {"--position-noise", "0.01", "--arw", "0.001", "--vrw", "5"});
   const ParameterVector sigma = column(document, "sigma");
   test::expect_limit(test::limit_row(GetParam().row_1_cm), sigma, allowed);
   const ParameterVector z = (column(document, "value") - truth_of(GetParam().name)).cwiseQuotient(sigma);
-  EXPECT_LT(z.cwiseAbs().maxCoeff(), 4.0) << z.transpose();   // one false alarm in 16000 parameters
+  EXPECT_LT(z.cwiseAbs().maxCoeff(), 4.0) << z.transpose();  // one false alarm in 16000 parameters
 }
 
 TEST_P(KnownAccuracy, SigmaIsTheLimitForTheStillBase) {
@@ -77,16 +76,15 @@ TEST_P(KnownAccuracy, SigmaIsTheLimitForTheStillBase) {
   test::expect_limit(test::limit_row(GetParam().row_still), column(document, "sigma"), allowed);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Recordings, KnownAccuracy,
-    ::testing::Values(Known{"table3-horizontal-level", "horizontal_level", "horizontal_10_um"},
-                      Known{"table5-table2-pitch90", "table2_pitch90", "table2_pitch90_10_um"},
-                      Known{"table5-table2-level", "table2_level", "table2_level_10_um"}),
-    [](const auto& parameter) {
-      std::string name = parameter.param.name;
-      std::replace(name.begin(), name.end(), '-', '_');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Recordings, KnownAccuracy,
+                         ::testing::Values(Known{"table3-horizontal-level", "horizontal_level", "horizontal_10_um"},
+                                           Known{"table5-table2-pitch90", "table2_pitch90", "table2_pitch90_10_um"},
+                                           Known{"table5-table2-level", "table2_level", "table2_level_10_um"}),
+                         [](const auto& parameter) {
+                           std::string name = parameter.param.name;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
 
 // Turntable less self-calibration, Table 5 of the source: root mean square of each group. Gyro drift is left out: at
 // the recordings' angle random walk its limit (0.0015 deg/h) lies above the source's differences (0.0008 deg/h).
@@ -99,12 +97,10 @@ TEST(KnownAccuracyOfTable5, ErrorsAreBelowThePublishedOnes) {
   if (test::shared_recordings().empty()) {
     GTEST_SKIP() << "no recordings of another program here (SELFCAL_SHARED)";
   }
-  const std::vector<Group> published = {{parameter::accel_bias, 3, {4, 5, 5}},
-                                        {parameter::accel_scale_pos, 3, {4, 5, 2}},
-                                        {parameter::accel_scale_neg, 3, {2, 3, 1}},
-                                        {parameter::accel_misalignment, 3, {0, 2, 1}},
-                                        {parameter::gyro_scale, 3, {2, 1, 3}},
-                                        {parameter::gyro_misalignment, 6, {1, 2, 3, 2, 1, 2}}};
+  const std::vector<Group> published = {
+      {parameter::accel_bias, 3, {4, 5, 5}},      {parameter::accel_scale_pos, 3, {4, 5, 2}},
+      {parameter::accel_scale_neg, 3, {2, 3, 1}}, {parameter::accel_misalignment, 3, {0, 2, 1}},
+      {parameter::gyro_scale, 3, {2, 1, 3}},      {parameter::gyro_misalignment, 6, {1, 2, 3, 2, 1, 2}}};
   for (const std::string name : {"table5-table2-pitch90", "table5-horizontal-moored"}) {
     const ParameterVector error = column(estimate(name, {}), "value") - truth_of(name);
     for (const Group& group : published) {

@@ -15,7 +15,7 @@ enum class LimitKind { each, rms, range, largest };
 
 // `text` as the table prints it, slashes between parameters, a dash in a range.
 struct LimitEntry {
-  int first, count;       // in the table of the 24
+  int first, count;  // in the table of the 24
   LimitKind kind;
   std::string text;
 };

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double allowed = 0.03;
 
-constexpr double heading_deg = 30.0;   // of the table's level base: the one where 25", 8.5 ppm and 2.6" come out too
+constexpr double heading_deg = 30.0;  // of the table's level base: the one where 25", 8.5 ppm and 2.6" come out too
 
 Plan plan_of(const test::LimitRow& row, double noise_factor, double heading = heading_deg) {
   Installation installation;

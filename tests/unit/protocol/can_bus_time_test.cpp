@@ -62,7 +62,7 @@ TEST(BusTime, TwoRatesAddUp) {
 
 TEST(BusClock, FramesQueueBehindEachOther) {
   BusClock clock({1'000'000, 5'000'000});
-  const CanFrame f = frame(0, {});   // 53 us
+  const CanFrame f = frame(0, {});  // 53 us
   EXPECT_EQ(clock.transmit(f, Time{0}), Time(53'000));
   EXPECT_EQ(clock.transmit(f, Time{10'000}), Time(106'000));
   EXPECT_EQ(clock.transmit(f, Time{200'000}), Time(253'000));

@@ -43,10 +43,10 @@ TEST(BusLog, FieldsMeanWhatTheySay) {
 }
 
 TEST(BusLog, BadLinesAreRefusedWithTheirNumber) {
-  for (const char* line : {"garbage", "(1.2) can0 123#00", "(1.000000) can0", "(1.000000) can0 12#00",
-                           "(1.000000) can0 FFF#00", "(1.000000) can0 123#0", "(1.000000) can0 123#001122334455667788",
-                           "(1.000000) can0 123##", "(1.000000) can0 123##100112233445566778899", "(1.000000) can0 123#R9",
-                           "(1.000000) can0 12G#00"}) {
+  for (const char* line :
+       {"garbage", "(1.2) can0 123#00", "(1.000000) can0", "(1.000000) can0 12#00", "(1.000000) can0 FFF#00",
+        "(1.000000) can0 123#0", "(1.000000) can0 123#001122334455667788", "(1.000000) can0 123##",
+        "(1.000000) can0 123##100112233445566778899", "(1.000000) can0 123#R9", "(1.000000) can0 12G#00"}) {
     EXPECT_FALSE(parse_log_line(line)) << line;
   }
   std::istringstream log("(1.000000) can0 123#00\n\nnonsense\n");

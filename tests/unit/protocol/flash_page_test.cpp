@@ -15,7 +15,7 @@ std::span<const std::uint8_t> bytes_of(std::string_view text) {
 
 TEST(Crc32c, CheckValuesOfTheStandard) {
   EXPECT_EQ(crc32c(bytes_of("123456789")), 0xE3069283U);
-  EXPECT_EQ(crc32c(std::array<std::uint8_t, 32>{}), 0x8A9136AAU);   // RFC 3720, B.4
+  EXPECT_EQ(crc32c(std::array<std::uint8_t, 32>{}), 0x8A9136AAU);  // RFC 3720, B.4
   EXPECT_EQ(crc32c(bytes_of("6789"), crc32c(bytes_of("12345"))), 0xE3069283U);
 }
 
@@ -33,11 +33,12 @@ Page sample_page() {
 TEST(FlashPage, HeaderAndSampleAreLiteral) {
   PageBytes bytes{};
   encode_page(sample_page(), bytes);
-  const std::array<std::uint8_t, 32> header = {'S', 'C', 'R', 'P', 0, 1, 0, 1, 0, 0, 0, 7,    0,    0, 0, 3,
+  const std::array<std::uint8_t, 32> header = {'S', 'C', 'R', 'P', 0, 1, 0, 1,    0,    0,    0, 7, 0, 0, 0, 3,
                                                0,   0,   0,   0,   0, 0, 1, 0xB3, 0xFB, 0x2E, 0, 1, 0, 0, 0, 0};
   EXPECT_TRUE(std::equal(header.begin(), header.end(), bytes.begin()));
-  const std::array<std::uint8_t, 28> sample = {0,    0,    0,    1, 0xFF, 0xFF, 0xFF, 0xFE, 0x7F, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF,
-                                               0xFF, 0xFF, 0,    0, 0,    0,    0,    0,    0,    5,    0x40, 0,    0xFF, 0xFF};
+  const std::array<std::uint8_t, 28> sample = {0,    0,    0,    1,    0xFF, 0xFF, 0xFF, 0xFE, 0x7F, 0xFF,
+                                               0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0,    0,    0,    0,
+                                               0,    0,    0,    5,    0x40, 0,    0xFF, 0xFF};
   EXPECT_TRUE(std::equal(sample.begin(), sample.end(), bytes.begin() + page_header_bytes));
   EXPECT_EQ(bytes[page_bytes - 1], 0xFF);
 }

@@ -21,7 +21,8 @@ inline can::CanFrame frame(std::string_view text) {
 
 inline std::string text(const can::CanFrame& f) {
   std::array<char, can::max_log_line> buffer{};
-  return std::string(can::format_log_line(Time{0}, "t", f, false, buffer).substr(std::string_view("(0.000000) t ").size()));
+  return std::string(
+      can::format_log_line(Time{0}, "t", f, false, buffer).substr(std::string_view("(0.000000) t ").size()));
 }
 
 inline std::vector<std::uint8_t> ramp(std::size_t size) {

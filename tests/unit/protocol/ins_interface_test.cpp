@@ -31,7 +31,7 @@ Coefficients sample_coefficients() {
 
 TEST(Coefficients, RecordIsLiteralAndComesBackExactly) {
   const auto bytes = encode(sample_coefficients());
-  const std::array<std::uint8_t, 24> head = {'S', 'C', 'C', 'O', 0, 1, 0, 0, 0, 0, 0, 4,
+  const std::array<std::uint8_t, 24> head = {'S', 'C', 'C', 'O', 0,    1,    0,    0, 0,   0,   0,   4,
                                              0,   0,   0,   0,   0x65, 0x53, 0xF1, 0, 's', 'e', 'l', 'f'};
   EXPECT_TRUE(std::equal(head.begin(), head.end(), bytes.begin()));
   const auto read = decode_coefficients(bytes);
@@ -87,7 +87,7 @@ RC_GTEST_PROP(StatusFrames, ComeBackToTheirResolution, ()) {
   RC_ASSERT(read.state == status.state && read.moving == status.moving && read.unlocked == status.unlocked);
   RC_ASSERT(read.faults == status.faults && read.position == status.position);
   RC_ASSERT(read.pages_written == status.pages_written);
-  RC_ASSERT(std::abs(read.outer_deg - status.outer_deg) <= 0.005 + 1e-9);       // half of the LSB
+  RC_ASSERT(std::abs(read.outer_deg - status.outer_deg) <= 0.005 + 1e-9);  // half of the LSB
   RC_ASSERT(std::abs(read.time_left_s - status.time_left_s) <= 0.05 + 1e-9);
 }
 
@@ -95,7 +95,7 @@ TEST(StatusFrames, StrangersAreLeftAlone) {
   Status status;
   EXPECT_FALSE(apply_status_frame(test::frame("652#0000000000000000"), status));
   EXPECT_FALSE(apply_status_frame(test::frame("650#00000000000000"), status));
-  EXPECT_FALSE(apply_status_frame(test::frame("650#0F00000000000000"), status));   // no such state
+  EXPECT_FALSE(apply_status_frame(test::frame("650#0F00000000000000"), status));  // no such state
   EXPECT_FALSE(apply_status_frame(test::frame("00000650#0000000000000000"), status));
 }
 
@@ -128,7 +128,7 @@ TEST(Records, ComeBackAsTheyWere) {
   EXPECT_TRUE(directory->complete);
   const auto format = decode_sample_format(encode(SampleFormatRecord{200.0, 1e-9, 1e-7, 1e-4, 4096, 145}));
   ASSERT_TRUE(format);
-  EXPECT_EQ(format->delta_theta_lsb_rad, 1e-9);   // to the bit
+  EXPECT_EQ(format->delta_theta_lsb_rad, 1e-9);  // to the bit
   const auto run = decode_run(encode(RunRecord{State::aborted, 0, 4, 5, 77}));
   ASSERT_TRUE(run);
   EXPECT_EQ(run->pages_written, 77U);

@@ -61,12 +61,12 @@ TEST(IsotpCodec, ConsecutiveAndFlowControl) {
 
 TEST(IsotpCodec, MalformedFramesAreNamed) {
   EXPECT_EQ(error_of({}), CodecError::empty);
-  EXPECT_EQ(error_of({0x00, 1, 2}), CodecError::bad_length);             // single frame of nothing
+  EXPECT_EQ(error_of({0x00, 1, 2}), CodecError::bad_length);  // single frame of nothing
   EXPECT_EQ(error_of({0x05, 1, 2}), CodecError::truncated);
   EXPECT_EQ(error_of({0x08, 1, 2, 3, 4, 5, 6, 7}), CodecError::truncated);
-  EXPECT_EQ(error_of(Bytes(12, 0x07)), CodecError::bad_length);          // long frame without the escape
+  EXPECT_EQ(error_of(Bytes(12, 0x07)), CodecError::bad_length);  // long frame without the escape
   EXPECT_EQ(error_of({0x00, 11, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), CodecError::truncated);
-  EXPECT_EQ(error_of({0x10, 0x07, 1, 2, 3, 4, 5, 6}), CodecError::bad_length);   // would fit a single frame
+  EXPECT_EQ(error_of({0x10, 0x07, 1, 2, 3, 4, 5, 6}), CodecError::bad_length);  // would fit a single frame
   EXPECT_EQ(error_of({0x10, 0x00, 0, 0, 0x0F, 0xFF, 1, 2}), CodecError::bad_length);
   EXPECT_EQ(error_of({0x10, 0x14, 1}), CodecError::truncated);
   EXPECT_EQ(error_of({0x21}), CodecError::truncated);

@@ -35,7 +35,8 @@ class Bus {
     if (fate == Fate::drop) {
       return;
     }
-    queue_.emplace(fate == Fate::late ? arrival + std::chrono::microseconds(350) : arrival, Delivery{to_receiver, frame});
+    queue_.emplace(fate == Fate::late ? arrival + std::chrono::microseconds(350) : arrival,
+                   Delivery{to_receiver, frame});
     if (fate == Fate::twice) {
       queue_.emplace(arrival, Delivery{to_receiver, frame});
     }
@@ -50,7 +51,7 @@ class Bus {
 
 struct Outcome {
   std::vector<std::vector<std::uint8_t>> received;
-  bool sender_reported = false;     // success or failure
+  bool sender_reported = false;  // success or failure
   bool sender_succeeded = false;
   bool receiver_failed = false;
   bool hung = false;
@@ -74,7 +75,7 @@ Outcome run(Transport& sender, Transport& receiver, Bus& bus, std::span<const st
     }
   };
   RC_ASSERT(sender.send(message, now));
-  std::array<can::CanFrame, 1> out;   // frame by frame: as a bus is
+  std::array<can::CanFrame, 1> out;  // frame by frame: as a bus is
   for (int step = 0; step < 20'000; ++step) {
     bool progress = false;
     if (sender.pending(out, now) == 1) {
@@ -95,7 +96,7 @@ Outcome run(Transport& sender, Transport& receiver, Bus& bus, std::span<const st
         next = std::min(next, deadline.value_or(Time::max()));
       }
       if (next == Time::max()) {
-        return outcome;   // at rest
+        return outcome;  // at rest
       }
       now = std::max(now, next);
     }

@@ -21,7 +21,7 @@ std::vector<Result> results(const Events& events) { return {events.begin(), even
 TEST(IsotpSender, SingleFrameIsPaddedOrNot) {
   Transport padded(test::tester_options());
   ASSERT_TRUE(padded.send(Bytes{0x10, 0x03}, ms(0)));
-  EXPECT_FALSE(padded.send(Bytes{0x10, 0x03}, ms(0)));   // one at a time
+  EXPECT_FALSE(padded.send(Bytes{0x10, 0x03}, ms(0)));  // one at a time
   EXPECT_THAT(take_all(padded, ms(0)), ElementsAre("640#021003CCCCCCCCCC"));
   EXPECT_FALSE(padded.sending());
 
@@ -36,14 +36,14 @@ TEST(IsotpSender, BlocksSeparationAndWait) {
   Transport sender(test::tester_options());
   ASSERT_TRUE(sender.send(ramp(30), ms(0)));
   EXPECT_THAT(take_all(sender, ms(0)), ElementsAre("640#101E00070E151C23"));
-  EXPECT_TRUE(sender.on_frame(frame("648#31000000"), ms(900)).empty());   // WAIT starts N_Bs anew
+  EXPECT_TRUE(sender.on_frame(frame("648#31000000"), ms(900)).empty());  // WAIT starts N_Bs anew
   EXPECT_TRUE(sender.on_time(ms(1800)).empty());
-  EXPECT_TRUE(sender.on_frame(frame("648#30020A"), ms(1800)).empty());    // two frames, 10 ms apart
+  EXPECT_TRUE(sender.on_frame(frame("648#30020A"), ms(1800)).empty());  // two frames, 10 ms apart
   EXPECT_THAT(take_all(sender, ms(1800)), ElementsAre("640#212A31383F464D54"));
   EXPECT_EQ(sender.next_deadline(), ms(1810));
   EXPECT_THAT(take_all(sender, ms(1809)), IsEmpty());
   EXPECT_THAT(take_all(sender, ms(1810)), ElementsAre("640#225B626970777E85"));
-  EXPECT_THAT(take_all(sender, ms(1900)), IsEmpty());                     // the block is over
+  EXPECT_THAT(take_all(sender, ms(1900)), IsEmpty());  // the block is over
   sender.on_frame(frame("648#300000"), ms(1900));
   EXPECT_THAT(take_all(sender, ms(1900)), ElementsAre("640#238C939AA1A8AFB6", "640#24BDC4CBCCCCCCCC"));
   EXPECT_FALSE(sender.sending());
@@ -101,7 +101,7 @@ TEST(IsotpReceiver, LossIsReported) {
   };
   start(ms(0));
   EXPECT_THAT(results(receiver.on_frame(frame("640#225B626970777E85"), ms(1))), ElementsAre(Result::wrong_sequence));
-  EXPECT_TRUE(receiver.on_frame(frame("640#238C939AA1A8AFB6"), ms(1)).empty());   // the rest goes by
+  EXPECT_TRUE(receiver.on_frame(frame("640#238C939AA1A8AFB6"), ms(1)).empty());  // the rest goes by
   start(ms(10));
   EXPECT_THAT(results(receiver.on_time(ms(1010))), ElementsAre(Result::timeout_cr));
   start(ms(2000));
@@ -147,7 +147,7 @@ TEST(IsotpTransport, FunctionalSingleFrameBesideATransfer) {
   EXPECT_THAT(take_all(tester, ms(0)), ElementsAre("7DF#023E80CCCCCCCCCC", "640#101E00070E151C23"));
   EXPECT_THAT(results(ins.on_frame(frame("7DF#023E80CCCCCCCCCC"), ms(0))), ElementsAre(Result::received_functional));
   EXPECT_THAT(ins.message(), ElementsAre(0x3E, 0x80));
-  EXPECT_TRUE(ins.on_frame(frame("7DF#101E00070E151C23"), ms(0)).empty());   // single frames only
+  EXPECT_TRUE(ins.on_frame(frame("7DF#101E00070E151C23"), ms(0)).empty());  // single frames only
   EXPECT_FALSE(ins.receiving());
 }
 

@@ -9,7 +9,7 @@
 namespace selfcal::lcm_messages {
 namespace {
 
-constexpr std::size_t text_length_at = 20;   // behind hash (8), schema (4) and utime_us (8), in all messages with a text
+constexpr std::size_t text_length_at = 20;  // behind hash (8), schema (4) and utime_us (8), in all messages with a text
 
 template <typename Message>
 std::vector<std::uint8_t> encoded(const Message& message) {
@@ -78,7 +78,7 @@ TEST(LcmDecode, APartOfAMessageIsNone) {
   for (std::size_t size = 0; size < whole.size(); ++size) {
     EXPECT_FALSE(decode<selfcal_lcm::estimate>({whole.data(), size})) << size;
   }
-  EXPECT_FALSE(decode<selfcal_lcm::alarm>(whole));   // another type: another hash
+  EXPECT_FALSE(decode<selfcal_lcm::alarm>(whole));  // another type: another hash
   EXPECT_FALSE(decode<selfcal_lcm::estimate>(std::vector<std::uint8_t>(longest + 1)));
 }
 

@@ -14,7 +14,8 @@ using ::testing::HasSubstr;
 // Two, three and four bytes, the ends of the first two kinds included; what toml++ gets to see is another text.
 TEST(TomlText, OfAnyScriptComesOutAsItWentIn) {
   const std::string text = "J\u00F6rg \u0080\u07FF\u0800\uFEFF\uFFFF \u6E2C\u91CF \U0001F600";
-  const auto parsed = TomlFile::parse(fmt::format("# \u00C5\nname = \"{}\"\n\"gr\u00F6\u00DFe\" = 1\n", text), "t.toml");
+  const auto parsed =
+      TomlFile::parse(fmt::format("# \u00C5\nname = \"{}\"\n\"gr\u00F6\u00DFe\" = 1\n", text), "t.toml");
   ASSERT_TRUE(parsed) << parsed.error().message;
   EXPECT_EQ(parsed->text("name").value(), text);
   EXPECT_THAT(parsed->only({"name"}).error().message, HasSubstr("t.toml:3: gr\u00F6\u00DFe: no such key"));
@@ -23,7 +24,8 @@ TEST(TomlText, OfAnyScriptComesOutAsItWentIn) {
 
 TEST(TomlText, AtAnyDepthComesOutAsItWentIn) {
   const auto table = parse_toml(
-      "list = [{\"gr\u00F6\u00DFe\" = [\"\u6E2C\", 1]}]\n[a.\"\u00E4\"]\nb = \"\u00FC\"\n[a.\"\u00EB\"]\nb = \"\u00EF\"\n",
+      "list = [{\"gr\u00F6\u00DFe\" = [\"\u6E2C\", 1]}]\n[a.\"\u00E4\"]\nb = \"\u00FC\"\n[a.\"\u00EB\"]\nb = "
+      "\"\u00EF\"\n",
       "t.toml");
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_EQ((*table)["list"][0]["gr\u00F6\u00DFe"][0].value<std::string>(), "\u6E2C");

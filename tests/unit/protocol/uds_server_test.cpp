@@ -41,10 +41,10 @@ TEST_F(UdsServer, AnswersAndKeepsSilentWhenAskedTo) {
   server.on_frame(frame("640#021003"), ms(0));
   EXPECT_THAT(take_all(server, ms(0)), ElementsAre("648#065003003201F4CC"));
   server.on_frame(frame("640#021083"), ms(1));
-  EXPECT_THAT(handler.seen.back(), ElementsAre(0x10, 3));   // without the bit
+  EXPECT_THAT(handler.seen.back(), ElementsAre(0x10, 3));  // without the bit
   EXPECT_THAT(take_all(server, ms(1)), IsEmpty());
   handler.answer = {0x7F, 0x10, 0x22};
-  server.on_frame(frame("640#021083"), ms(2));              // but a "no" is always told
+  server.on_frame(frame("640#021083"), ms(2));  // but a "no" is always told
   EXPECT_THAT(take_all(server, ms(2)), ElementsAre("648#037F1022CCCCCCCC"));
 }
 
@@ -61,11 +61,11 @@ TEST_F(UdsServer, FunctionalRequestGetsNoUselessNo) {
 
 TEST_F(UdsServer, ResponsePendingUntilTheAnswer) {
   handler.mode = RequestHandler::Answer::later;
-  server.on_frame(frame("640#0431810302"), ms(0));   // with "no positive response": after 0x78 it comes all the same
+  server.on_frame(frame("640#0431810302"), ms(0));  // with "no positive response": after 0x78 it comes all the same
   EXPECT_EQ(server.next_deadline(), ms(25));
   server.on_time(ms(25));
   EXPECT_THAT(take_all(server, ms(25)), ElementsAre("648#037F3178CCCCCCCC"));
-  server.on_frame(frame("640#023E00"), ms(30));      // one request at a time
+  server.on_frame(frame("640#023E00"), ms(30));  // one request at a time
   EXPECT_EQ(handler.seen.size(), 1U);
   server.respond(Bytes{0x71, 1, 3, 2}, ms(40));
   EXPECT_THAT(take_all(server, ms(40)), ElementsAre("648#0471010302CCCCCC"));
@@ -93,7 +93,7 @@ TEST(UdsDecode, MessagesByName) {
             "RoutineControl (0x31) start selfCalibration (0x0301): 00 00 00 05");
   EXPECT_EQ(describe_message(Bytes{0x35, 0, 0x44, 0, 0, 0, 7, 0, 0, 0x10, 0}),
             "RequestUpload (0x35) from page 7, 4096 bytes");
-  EXPECT_EQ(describe_message(Bytes{0x27, 2, 0xDE, 0xAD}), "SecurityAccess (0x27) key (2 bytes)");   // never the key
+  EXPECT_EQ(describe_message(Bytes{0x27, 2, 0xDE, 0xAD}), "SecurityAccess (0x27) key (2 bytes)");  // never the key
   EXPECT_EQ(describe_message({}), "empty message");
   EXPECT_EQ(describe_message(Bytes{0x7F, 1}), "malformed negative response: 01");
 }
@@ -107,7 +107,8 @@ TEST(UdsDecode, LogOfFrames) {
   EXPECT_EQ(decoder.on_frame(frame("648#214445CCCCCCCCCC"), ms(4)),
             "(0.004000) INS     positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): 41 42 43 44 45");
   EXPECT_EQ(decoder.on_frame(frame("650#12041303020100AB"), ms(5)),
-            "(0.005000) status   State=2 GimbalMoving=1 Unlocked=0 Faults=4 Position=19 PagesWritten=66051page StateAlive=171");
+            "(0.005000) status   State=2 GimbalMoving=1 Unlocked=0 Faults=4 Position=19 PagesWritten=66051page "
+            "StateAlive=171");
   EXPECT_EQ(decoder.malformed(), 0U);
   EXPECT_EQ(decoder.on_frame(frame("648#2200"), ms(6)),
             "(0.006000) INS     broken: consecutive frame without a first one");

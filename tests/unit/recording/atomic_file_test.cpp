@@ -67,8 +67,7 @@ TEST(AtomicFile, UnwritablePlacesAreNamed) {
   const auto written = write_file_atomically(folder / "absent/f", "x");
   ASSERT_FALSE(written);
   EXPECT_THAT(written.error().message, ::testing::HasSubstr("absent/f: cannot create: No such file"));
-  EXPECT_THAT(write_file_atomically("/dev/null", "x").error().message,
-              ::testing::HasSubstr("not a regular file"));
+  EXPECT_THAT(write_file_atomically("/dev/null", "x").error().message, ::testing::HasSubstr("not a regular file"));
 }
 
 TEST(AtomicFile, ReadLimit) {

@@ -83,11 +83,10 @@ TEST(CheckRecording, RateThatContradictsTime) {
   for (const double rate : {25.0, 49.9, 50.1, 100.0, 200.0}) {
     Recording r = sample_recording();
     r.sample_rate_hz = rate;
-    EXPECT_THAT(error_of(r), AllOf(HasSubstr("sample_rate_hz"), HasSubstr("contradicts"), HasSubstr("50 Hz")))
-        << rate;
+    EXPECT_THAT(error_of(r), AllOf(HasSubstr("sample_rate_hz"), HasSubstr("contradicts"), HasSubstr("50 Hz"))) << rate;
   }
   Recording r = sample_recording();
-  r.sample_rate_hz = 50.01;   // 2e-4: a crystal
+  r.sample_rate_hz = 50.01;  // 2e-4: a crystal
   EXPECT_EQ(error_of(r), "no error");
 }
 
@@ -119,7 +118,9 @@ TEST(CheckRecording, LengthsMustAgree) {
 TEST(CheckRecording, IncrementsInTheWrongUnitAreNotGravity) {
   Recording r = sample_recording();
   for (auto& d : r.delta_v_mps) {
-    for (double& component : d) component /= 9.80665;   // in g s
+    for (double& component : d) {
+      component /= 9.80665;  // in g s
+    }
   }
   EXPECT_THAT(error_of(r), AllOf(HasSubstr("delta_v_mps"), HasSubstr("mean specific force")));
 }
@@ -130,7 +131,9 @@ class GimbalCheck : public ::testing::Test {
 };
 
 TEST_F(GimbalCheck, ReversedAxis) {
-  for (double& angle : r.gimbal_outer_rad) angle = -angle;
+  for (double& angle : r.gimbal_outer_rad) {
+    angle = -angle;
+  }
   EXPECT_THAT(error_of(r), AllOf(HasSubstr("gimbal_outer_rad"), HasSubstr("rows"), HasSubstr("deg")));
 }
 
@@ -140,13 +143,17 @@ TEST_F(GimbalCheck, SwappedAxes) {
 }
 
 TEST_F(GimbalCheck, StandsStillWhileTheGyrosTurn) {
-  for (double& angle : r.gimbal_inner_rad) angle = 0.0;
+  for (double& angle : r.gimbal_inner_rad) {
+    angle = 0.0;
+  }
   EXPECT_THAT(error_of(r), HasSubstr("read-outs turned 0.0 and 0.0 deg"));
 }
 
 // A read-out that goes from 0.0 past zero to 359.4 deg has turned by -0.6.
 TEST_F(GimbalCheck, AReadOutThatPassesZeroHasNotTurnedAllTheWay) {
-  for (double& angle : r.gimbal_inner_rad) angle = 0.0;
+  for (double& angle : r.gimbal_inner_rad) {
+    angle = 0.0;
+  }
   const auto still = find_gimbal_contradiction(r);
   ASSERT_TRUE(still);
   for (std::size_t row = still->first_row + 1; row < r.size(); ++row) {
@@ -160,19 +167,25 @@ TEST_F(GimbalCheck, AReadOutThatPassesZeroHasNotTurnedAllTheWay) {
 }
 
 TEST_F(GimbalCheck, DegreesForRadians) {
-  for (double& angle : r.gimbal_outer_rad) angle *= 180.0 / std::numbers::pi;
+  for (double& angle : r.gimbal_outer_rad) {
+    angle *= 180.0 / std::numbers::pi;
+  }
   EXPECT_THAT(error_of(r), HasSubstr("gimbal"));
 }
 
 TEST_F(GimbalCheck, AWarningWhereThePolicySaysSo) {
-  for (double& angle : r.gimbal_outer_rad) angle = -angle;
+  for (double& angle : r.gimbal_outer_rad) {
+    angle = -angle;
+  }
   const auto checked = check_recording(r, {.gimbal_contradiction_is_error = false});
   ASSERT_TRUE(checked);
   EXPECT_THAT(*checked, ::testing::ElementsAre(HasSubstr("gimbal")));
 }
 
 TEST_F(GimbalCheck, OneDegreeOfReadOutErrorIsAllowed) {
-  for (double& angle : r.gimbal_outer_rad) angle *= 1.0 + 1.0 / 90.0;   // 1 deg over the turn
+  for (double& angle : r.gimbal_outer_rad) {
+    angle *= 1.0 + 1.0 / 90.0;  // 1 deg over the turn
+  }
   EXPECT_EQ(error_of(r), "no error");
 }
 

@@ -33,7 +33,9 @@ class Csv : public ::testing::Test {
   // The start of line `number` (1 is the header).
   std::size_t line(std::size_t number) const {
     std::size_t at = 0;
-    while (--number > 0) at = csv.find('\n', at) + 1;
+    while (--number > 0) {
+      at = csv.find('\n', at) + 1;
+    }
     return at;
   }
 
@@ -84,7 +86,7 @@ TEST_F(Csv, FieldFaultsNameLineAndColumn) {
   csv.replace(line(5), 1, "x");
   EXPECT_THAT(error(), AllOf(HasSubstr("line 5"), HasSubstr("time_s"), HasSubstr("is not a number")));
   csv.replace(line(5), 1, "0");
-  csv.erase(csv.rfind(','));   // the last line loses a field
+  csv.erase(csv.rfind(','));  // the last line loses a field
   EXPECT_THAT(error(), AllOf(HasSubstr("line 1201"), HasSubstr("10 fields where the header has 11")));
   csv += ",1,2,3";
   EXPECT_THAT(error(), HasSubstr("more than the 11 fields"));

@@ -95,7 +95,7 @@ TEST(Hdf5, DamagedBytesNeverCrash) {
       EXPECT_TRUE(check_recording(read->recording));
     }
   }
-  EXPECT_GT(refused, trials / 4);   // the damage reached something that matters
+  EXPECT_GT(refused, trials / 4);  // the damage reached something that matters
 }
 
 }  // namespace

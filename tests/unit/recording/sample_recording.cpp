@@ -17,8 +17,12 @@ constexpr double quarter_turn = std::numbers::pi / 2.0;
 
 // 0 to 1 over a move, with rests at both ends.
 double share(double seconds) {
-  if (seconds <= 0.0) return 0.0;
-  if (seconds >= move_s) return 1.0;
+  if (seconds <= 0.0) {
+    return 0.0;
+  }
+  if (seconds >= move_s) {
+    return 1.0;
+  }
   return 0.5 - 0.5 * std::cos(std::numbers::pi * seconds / move_s);
 }
 
@@ -70,7 +74,8 @@ TemporaryFolder::~TemporaryFolder() {
 
 std::filesystem::path shared_recordings() {
   const char* shared = std::getenv("SELFCAL_SHARED");
-  const std::filesystem::path folder = std::filesystem::path(shared != nullptr ? shared : SELFCAL_SOURCE_DIR "/../shared") / "recordings";
+  const std::filesystem::path folder =
+      std::filesystem::path(shared != nullptr ? shared : SELFCAL_SOURCE_DIR "/../shared") / "recordings";
   return std::filesystem::is_directory(folder) ? folder : std::filesystem::path();
 }
 

@@ -75,7 +75,7 @@ class Trial {
     pull_run();
     install();
     while (cut_.at || off_at_) {
-      pause(10ms);   // the cut comes right after the end
+      pause(10ms);  // the cut comes right after the end
     }
     cut_ = {};
   }
@@ -120,7 +120,7 @@ class Trial {
 
   // One turn of bus and INS; the outcome of the tester's request, if it ended.
   std::optional<uds::Outcome> turn() {
-    if (cut_.at && now_ >= begun_ + *cut_.at) {   // the supply sags: it may die in the next write, else soon
+    if (cut_.at && now_ >= begun_ + *cut_.at) {  // the supply sags: it may die in the next write, else soon
       unit_.flash().lose_power_after(cut_.bytes);
       off_at_ = now_ + 200ms;
       cut_.at.reset();
@@ -129,7 +129,7 @@ class Trial {
       within_write_ = unit_.flash().busy();
       throw PowerLost{};
     }
-    within_write_ = true;   // whatever throws from here on is the FLASH
+    within_write_ = true;  // whatever throws from here on is the FLASH
     std::optional<uds::Outcome> outcome = client_.on_time(now_);
     std::size_t count = client_.pending(frames_, now_);
     for (std::size_t i = 0; i < count; ++i) {
@@ -181,7 +181,7 @@ class Trial {
     return {response.begin() + 3, response.end()};
   }
   ins::Coefficients read_set(std::uint16_t id) {
-    const auto set = ins::decode_coefficients(record(id));   // checks length and CRC
+    const auto set = ins::decode_coefficients(record(id));  // checks length and CRC
     if (!set) {
       throw Failed{set.error().message};
     }
@@ -195,7 +195,7 @@ class Trial {
     ask(uds::routine_request(uds::RoutineAction::start, id, option));
   }
 
-  void wait_until_ready() { pause(1500ms); }   // it starts for a second
+  void wait_until_ready() { pause(1500ms); }  // it starts for a second
 
   void unlock() {
     ask(uds::session_request(uds::Session::extended));
@@ -267,7 +267,7 @@ class Trial {
     enter(writing);
     ask(uds::write_request(did::coefficients_inactive, bytes));
     enter(committing);
-    may_be_in_force_ = true;   // from the moment the last byte of the mark stands, answered or not
+    may_be_in_force_ = true;  // from the moment the last byte of the mark stands, answered or not
     start(routine::commit_coefficients, ins::stored_crc(bytes));
     must_be_in_force_ = true;
     enter(resetting);
@@ -293,7 +293,7 @@ class Trial {
   bool within_write_ = false;
   bool may_be_in_force_ = false, must_be_in_force_ = false;
   ins::Coefficients installed_ = factory(), candidate_;
-  uds::Bytes reference_;   // raw data of the first run
+  uds::Bytes reference_;  // raw data of the first run
 
   static ins::Coefficients factory() {
     ins::Coefficients set;
@@ -320,7 +320,7 @@ Cut draw(int k, Time whole, Random& random) {
 
 int run(int cuts, std::uint64_t seed) {
   Trial trial;
-  trial.calibrate({});   // the reference
+  trial.calibrate({});  // the reference
   const Time whole = trial.elapsed();
   Random random(seed, 1);
   std::array<int, phases.size()> by_phase{};
@@ -340,15 +340,15 @@ int run(int cuts, std::uint64_t seed) {
       trial.calibrate({});
     } catch (const Failed& failed) {
       fmt::print("cut {} of seed {}, in phase {}: {}\n", k, seed, phases[trial.phase()], failed.why);
-      return 1;   // what stands in the FLASH is not known any more
+      return 1;  // what stands in the FLASH is not known any more
     }
   }
   fmt::print("seed {}: {} power cuts, {} while the FLASH was being written;", seed, cuts, within_writes);
   for (std::size_t i = 0; i < phases.size(); ++i) {
     fmt::print(" {} {}{}", phases[i], by_phase[i], i + 1 < phases.size() ? "," : "\n");
   }
-  fmt::print("{} times one complete set in force afterwards ({} old, {} new), {} next calibrations complete\n",
-             cuts, cuts - renewed, renewed, cuts);
+  fmt::print("{} times one complete set in force afterwards ({} old, {} new), {} next calibrations complete\n", cuts,
+             cuts - renewed, renewed, cuts);
   return 0;
 }
 

@@ -163,12 +163,12 @@ TEST_F(DiagnosticsTest, ThreeWrongKeysDelayEvenOverAReset) {
 
 TEST_F(DiagnosticsTest, RotationFillsPagesThatCanBePulledWhileItTurns) {
   unlock();
-  EXPECT_EQ(nrc_of(start(routine::self_calibration, 7)), Nrc::conditions_not_correct);   // no schedule
+  EXPECT_EQ(nrc_of(start(routine::self_calibration, 7)), Nrc::conditions_not_correct);  // no schedule
   ASSERT_EQ(nrc_of(schedule(20000)), Nrc::none);
   ASSERT_EQ(nrc_of(start(routine::self_calibration, 7)), Nrc::none);
-  EXPECT_EQ(nrc_of(start(routine::self_calibration, 8)), Nrc::conditions_not_correct);   // turns already
+  EXPECT_EQ(nrc_of(start(routine::self_calibration, 8)), Nrc::conditions_not_correct);  // turns already
   EXPECT_EQ(nrc_of(schedule(1000)), Nrc::conditions_not_correct);
-  run_for(22.5);   // in the move: 1125 samples, 7 pages of 145
+  run_for(22.5);  // in the move: 1125 samples, 7 pages of 145
   EXPECT_EQ(instrument_->status().state, ins::State::rotating);
   EXPECT_TRUE(instrument_->status().moving);
   EXPECT_EQ(instrument_->raw().pages_written(), 7U);
@@ -179,7 +179,7 @@ TEST_F(DiagnosticsTest, RotationFillsPagesThatCanBePulledWhileItTurns) {
     EXPECT_EQ(nrc_of(uds::transfer_request(static_cast<std::uint8_t>(block + 1))), Nrc::wrong_block_sequence_counter);
     const uds::Bytes answer = ask(uds::transfer_request(block));
     ASSERT_GT(answer.size(), 2U);
-    EXPECT_EQ(ask(uds::transfer_request(block)), answer);   // asked for again: the same bytes
+    EXPECT_EQ(ask(uds::transfer_request(block)), answer);  // asked for again: the same bytes
     data.insert(data.end(), answer.begin() + 2, answer.end());
   }
   ASSERT_EQ(data.size(), 2 * flash::page_bytes);
@@ -208,7 +208,7 @@ TEST_F(DiagnosticsTest, PagesOutliveAPowerCycle) {
   power_cycle();
   const ins::DirectoryRecord directory = instrument_->raw().directory();
   EXPECT_EQ(directory.run_id, 7U);
-  EXPECT_EQ(directory.pages_written, 3U);   // 500 samples: the fourth page was not full
+  EXPECT_EQ(directory.pages_written, 3U);  // 500 samples: the fourth page was not full
   EXPECT_TRUE(directory.complete);
   EXPECT_EQ(instrument_->status().state, ins::State::idle);
 }
@@ -219,18 +219,18 @@ TEST_F(DiagnosticsTest, CoefficientsGoThroughEraseWriteCommitAndPowerCycle) {
   const uds::Bytes write = uds::write_request(did::coefficients_inactive, bytes);
   const uds::Bytes erase = uds::routine_request(uds::RoutineAction::start, routine::erase_inactive);
   ASSERT_EQ(nrc_of(write), Nrc::none);
-  EXPECT_NE(nrc_of(write), Nrc::none);                        // not erased since
+  EXPECT_NE(nrc_of(write), Nrc::none);  // not erased since
   ASSERT_EQ(nrc_of(erase), Nrc::none);
   auto spoilt = bytes;
   spoilt[100] ^= 1;
   EXPECT_EQ(nrc_of(uds::write_request(did::coefficients_inactive, spoilt)), Nrc::request_out_of_range);
   ASSERT_EQ(nrc_of(write), Nrc::none);
   EXPECT_EQ(nrc_of(start(routine::commit_coefficients, 0x12345678)), Nrc::request_out_of_range);
-  power_cycle();                                              // written, not committed
+  power_cycle();  // written, not committed
   EXPECT_EQ(instrument_->state_record().in_force, ins::Slot::factory);
   unlock();
   ASSERT_EQ(nrc_of(start(routine::commit_coefficients, ins::stored_crc(bytes))), Nrc::none);
-  EXPECT_EQ(instrument_->state_record().in_force, ins::Slot::factory);   // until the next power-on
+  EXPECT_EQ(instrument_->state_record().in_force, ins::Slot::factory);  // until the next power-on
   power_cycle();
   EXPECT_EQ(instrument_->state_record().coefficients_version, 3U);
   EXPECT_EQ(instrument_->coefficients().in_force(), set_of(3));
@@ -257,7 +257,7 @@ TEST_F(DiagnosticsTest, WritesTakeTheTimeOfTheChip) {
   };
   const auto bytes = ins::encode(set_of(3));
   unlock();
-  constexpr double step = 0.0001;   // of ask()
+  constexpr double step = 0.0001;  // of ask()
   EXPECT_NEAR(seconds(uds::routine_request(uds::RoutineAction::start, routine::erase_inactive)), 0.045, 1.01 * step);
   EXPECT_NEAR(seconds(uds::write_request(did::coefficients_inactive, bytes)), 0.0016, 1.01 * step);
   EXPECT_NEAR(seconds(start(routine::commit_coefficients, ins::stored_crc(bytes))), 0.0008, 1.01 * step);

@@ -32,13 +32,14 @@ SensorContext at_one_g_along_y() {
   return context;
 }
 
-constexpr double exact = 1e-18;   // rounding of the numbers below, all smaller than 1e-2
+constexpr double exact = 1e-18;  // rounding of the numbers below, all smaller than 1e-2
 
 TEST(Physics, LiteralCases) {
   SensorContext context = at_one_g_along_y();
   const double ug = units::micro_g;
   const double dph = units::degree_per_hour;
-  EXPECT_NEAR(deviation_of("[[effect]]\nid='gyro_g_sensitivity'\nxy=0.01\nxz=5\n", context).domega.x(), 0.01 * dph, exact);
+  EXPECT_NEAR(deviation_of("[[effect]]\nid='gyro_g_sensitivity'\nxy=0.01\nxz=5\n", context).domega.x(), 0.01 * dph,
+              exact);
   EXPECT_NEAR(deviation_of("[[effect]]\nid='gyro_scale_asymmetry'\nz=10\n", context).domega.z(), 2e-6, exact);
   // c w |w|: -0.2 rad/s = -11.459 deg/s, 1 ppm/(deg/s): 11.459e-6 * -0.2.
   EXPECT_NEAR(deviation_of("[[effect]]\nid='gyro_scale_nonlinearity'\nz=1\n", context).domega.z(),
@@ -52,15 +53,15 @@ TEST(Physics, LiteralCases) {
   context.since_turn_s = 60.0;
   EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_relaxation'\nx=50\ntau_s=60\n", context).df.x(),
               50 * ug * 0.36787944117144233, exact);
-  context.since_turn_s = -1.0;   // no turn yet
+  context.since_turn_s = -1.0;  // no turn yet
   EXPECT_EQ(deviation_of("[[effect]]\nid='accel_relaxation'\nx=50\n", context).df.x(), 0.0);
 }
 
 TEST(Physics, LeverArmIsCentripetalAndTangential) {
   SensorContext context = at_one_g_along_y();
   context.angular_acceleration = Vector3(0.0, 0.0, 0.3);
-  const Vector3 df = deviation_of("[[effect]]\nid='imu_lever_arm'\nx=2\n", context).df;   // 2 cm along x
-  EXPECT_NEAR(df.x(), -0.2 * 0.2 * 0.02, exact);   // towards the axis
+  const Vector3 df = deviation_of("[[effect]]\nid='imu_lever_arm'\nx=2\n", context).df;  // 2 cm along x
+  EXPECT_NEAR(df.x(), -0.2 * 0.2 * 0.02, exact);                                         // towards the axis
   EXPECT_NEAR(df.y(), 0.3 * 0.02, exact);
 }
 
@@ -111,7 +112,8 @@ TEST(Physics, FilesNameWhatIsWrong) {
     const auto read = parse_physics(text, "p.toml");
     return read ? std::string("accepted") : read.error().message;
   };
-  EXPECT_THAT(message("[[effect]]\nid = 'gremlins'\n"), HasSubstr("p.toml:2: effect[0].id: no effect is called gremlins"));
+  EXPECT_THAT(message("[[effect]]\nid = 'gremlins'\n"),
+              HasSubstr("p.toml:2: effect[0].id: no effect is called gremlins"));
   EXPECT_THAT(message("[[effect]]\nid = 'accel_cubic'\nw = 1\n"), HasSubstr("p.toml:3: effect[0].w: no such key"));
   EXPECT_THAT(message("[[effect]]\nid = 'accel_relaxation'\ntau_s = 0\n"), HasSubstr("p.toml:3: effect[0].tau_s"));
   EXPECT_THAT(message("[[effect]]\nx = 1\n"), HasSubstr("effect[0].id: missing"));
@@ -119,7 +121,8 @@ TEST(Physics, FilesNameWhatIsWrong) {
   // These two toml++ by itself does not survive.
   EXPECT_THAT(message("[[effect]]\nw = 6='\u00C5\n"), HasSubstr("p.toml:2: "));
   EXPECT_THAT(message("[a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a.a]\n"), HasSubstr("p.toml:1: a key of more than"));
-  EXPECT_THAT(message("[[effect]]\nid = 'accel_cubic'\n\"w\\nw\" = 1\n"), HasSubstr("p.toml:3: effect[0].w w: no such key"));
+  EXPECT_THAT(message("[[effect]]\nid = 'accel_cubic'\n\"w\\nw\" = 1\n"),
+              HasSubstr("p.toml:3: effect[0].w w: no such key"));
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST(PowerCut, AThousandRandomInstantsLeaveOneCompleteSet) {
   store.write_factory_if_blank(set_of(0));
   store.power_on();
   Random random(2026, 1);
-  std::uint32_t version = 0;   // of the set that must be in force
+  std::uint32_t version = 0;  // of the set that must be in force
   int cuts = 0;
   int installed = 0;
   for (int k = 0; k < 1000; ++k) {
@@ -197,12 +197,12 @@ TEST(PowerCut, TheClockSaysHowFarAWriteCame) {
   ASSERT_TRUE(flash);
   const std::vector<std::uint8_t> zeros(flash_block_bytes, 0);
   flash->program(0, zeros);
-  flash->advance(1.0);   // 16 writes of 0.8 ms are over
+  flash->advance(1.0);  // 16 writes of 0.8 ms are over
   EXPECT_FALSE(flash->busy());
   flash->erase(0);
   flash->program(0, std::array<std::uint8_t, 2>{0x12, 0x34});
   EXPECT_DOUBLE_EQ(flash->ready_at_s(), 1.0 + 0.045 + 0.0008);
-  EXPECT_EQ(flash->read(0, 1)[0], 0x12);   // what the INS has in RAM
+  EXPECT_EQ(flash->read(0, 1)[0], 0x12);  // what the INS has in RAM
   flash->cut_power(1.0 + 0.045 / 4.0);
   EXPECT_EQ(flash->read(0, 1)[0], 0xFF);
   EXPECT_EQ(flash->read(1023, 1)[0], 0xFF);
@@ -223,7 +223,7 @@ TEST(PowerCut, TheFileHoldsWhatTheChipHadDone) {
     flash->erase(7);
     flash->advance(1.0);
     flash->erase(5);
-    flash->advance(1.0 + 0.045 / 4096.0 * 1.5);   // one byte of it
+    flash->advance(1.0 + 0.045 / 4096.0 * 1.5);  // one byte of it
   }
   auto again = FlashMemory::open(path, bytes);
   ASSERT_TRUE(again);
@@ -245,7 +245,7 @@ TEST(PowerCut, ATornPageIsNotOneOfTheRun) {
   RawStore raw(*flash);
   raw.begin(42, 100);
   raw.append(page_of(42, 0));
-  flash->lose_power_after(flash_block_bytes + 2000);   // within the second page's bytes
+  flash->lose_power_after(flash_block_bytes + 2000);  // within the second page's bytes
   EXPECT_THROW(raw.append(page_of(42, 1)), PowerLost);
   flash->lose_power_after(std::nullopt);
   raw.power_on();

@@ -21,10 +21,10 @@ using testing::IsEmpty;
 // next of the two; and how long a session outlives the last request.
 constexpr Time p2 = 50ms, p2_star = 5s, s3 = 5s;
 
-constexpr const char* erase = "640#0431010302";                    // RoutineControl, start, eraseInactiveSlot
+constexpr const char* erase = "640#0431010302";  // RoutineControl, start, eraseInactiveSlot
 constexpr const char* erased = "648#0471010302CCCCCC";
 constexpr const char* pending = "648#037F3178CCCCCCCC";
-constexpr const char* keep_alive = "7DF#023E80";                   // TesterPresent, no answer wanted, to all
+constexpr const char* keep_alive = "7DF#023E80";  // TesterPresent, no answer wanted, to all
 constexpr const char* not_in_this_session = "648#037F317FCCCCCCCC";
 
 struct Seen {
@@ -67,7 +67,7 @@ class ResponsePending : public testing::Test {
     }
   }
   void tell(std::string_view text) {
-    unit_.step(now_);   // its clock is the bus's
+    unit_.step(now_);  // its clock is the bus's
     unit_.on_frame(frame(text), now_);
   }
   // All that is seen within `time` after a request.
@@ -87,9 +87,9 @@ class ResponsePending : public testing::Test {
   }
 
   struct Segmented {
-    Time asked{0};                  // the request's last frame
-    std::vector<Seen> answers;      // frames of the INS, flow control left out
-    uds::Bytes message;             // the answer, put together
+    Time asked{0};              // the request's last frame
+    std::vector<Seen> answers;  // frames of the INS, flow control left out
+    uds::Bytes message;         // the answer, put together
   };
   // A request of several frames, one a millisecond, and its answer; `between` is on the bus after each frame.
   Segmented ask_in_frames(const uds::Bytes& request, const char* between = nullptr) {
@@ -99,7 +99,7 @@ class ResponsePending : public testing::Test {
     for (const Time end = now_ + 500ms; now_ < end; now_ += 1ms) {
       unit_.step(now_);
       if (can::CanFrame out; tester.pending({&out, 1}, now_) == 1) {
-        result.asked = tester.sending() ? now_ : result.asked;   // not the flow control for the answer
+        result.asked = tester.sending() ? now_ : result.asked;  // not the flow control for the answer
         unit_.on_frame(out, now_);
         tester.sent(1, now_);
       }
@@ -154,7 +154,7 @@ TEST_F(ResponsePending, ErasureIsAnnouncedWithinP2AndAnsweredWhenDone) {
   ASSERT_THAT(frames(seen), ElementsAre(pending, erased));
   EXPECT_LE(seen[0].at - asked, p2);
   EXPECT_GE(seen[1].at - asked, 45ms);
-  EXPECT_LE(seen[1].at - asked, 46ms);   // the first step of the clock after it
+  EXPECT_LE(seen[1].at - asked, 46ms);  // the first step of the clock after it
 }
 
 // The same chip's guaranteed limits: 400 ms for a block, 3 ms for 256 bytes, of which a set takes two and its mark one.
@@ -186,13 +186,13 @@ TEST_F(ResponsePending, TheSlowestChipThatIsSoldKeepsTheTimesToo) {
 
 // A wrong key is counted in FLASH before the refusal: nobody saves an attempt by pulling the plug on it.
 TEST_F(ResponsePending, ARefusalThatIsWrittenDownIsAnnouncedAsWell) {
-  tell("640#021001");   // default session: locked
+  tell("640#021001");  // default session: locked
   pass(10ms);
   tell("640#021003");
   pass(10ms);
   answer_to(uds::seed_request());
   const Segmented refused = ask_in_frames(uds::key_request(uds::Bytes(16, 0)));
-  ASSERT_THAT(frames(refused.answers), ElementsAre("648#037F2778CCCCCCCC", "648#037F2735CCCCCCCC"));   // invalidKey
+  ASSERT_THAT(frames(refused.answers), ElementsAre("648#037F2778CCCCCCCC", "648#037F2735CCCCCCCC"));  // invalidKey
   EXPECT_LE(refused.answers[0].at - refused.asked, p2);
   EXPECT_GE(refused.answers[1].at - refused.asked, 45ms);
 }
@@ -226,7 +226,7 @@ TEST_F(ResponsePending, IsNotDisturbedByTheKeepAliveOfASecondTester) {
   EXPECT_LE(seen_[0].at - asked, p2);
   EXPECT_GE(seen_[1].at - asked, 45ms);
   EXPECT_LE(seen_[1].at - asked, 46ms);
-  tell(keep_alive);   // nor does it block what comes right behind it
+  tell(keep_alive);  // nor does it block what comes right behind it
   EXPECT_THAT(frames(ask("640#023E00", 10ms)), ElementsAre("648#027E00CCCCCCCCCC"));
 }
 
@@ -241,7 +241,7 @@ TEST_F(ResponsePending, ASecondRequestMeanwhileIsNotObeyed) {
   }
   pass(500ms);
   EXPECT_THAT(frames(seen_), ElementsAre(pending, erased));
-  EXPECT_TRUE(unit_.diagnostics().unlocked());   // no reset, no other session
+  EXPECT_TRUE(unit_.diagnostics().unlocked());  // no reset, no other session
 }
 
 TEST_F(ResponsePending, KeepAliveBetweenTheFramesOfRequestAndAnswer) {
@@ -296,14 +296,14 @@ TEST_F(ResponsePending, ASessionOutlivesALongWrite) {
 TEST(TurnaroundOfTheTester, IsChargedOnceForEachAnswer) {
   const can::CanFrame request = frame("640#023601");
   Turnaround turnaround(2.0);
-  EXPECT_EQ(turnaround.heard(request, 5.0, 4.0), 5.0);               // nothing was answered
+  EXPECT_EQ(turnaround.heard(request, 5.0, 4.0), 5.0);  // nothing was answered
   turnaround.answer_sent();
   EXPECT_EQ(turnaround.heard(frame("640#300000"), 5.1, 5.1), 5.1);
   turnaround.answer_sent();
   EXPECT_DOUBLE_EQ(turnaround.heard(request, 9.9995, 10.0), 10.002);
-  EXPECT_EQ(turnaround.heard(request, 10.5, 10.4), 10.5);            // asked again before any answer
+  EXPECT_EQ(turnaround.heard(request, 10.5, 10.4), 10.5);  // asked again before any answer
   turnaround.answer_sent();
-  EXPECT_EQ(turnaround.heard(request, 12.0, 11.0), 12.0);            // the clock went on by itself meanwhile
+  EXPECT_EQ(turnaround.heard(request, 12.0, 11.0), 12.0);  // the clock went on by itself meanwhile
 }
 
 }  // namespace

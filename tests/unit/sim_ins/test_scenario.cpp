@@ -42,7 +42,7 @@ TEST(Scenario, FramesAreLostInTheirTimeOnlyAndBySeed) {
   EXPECT_EQ(passed(text, 200, 9.9).size(), 200U);
   EXPECT_EQ(passed(text, 200, 15.0).size(), 200U);
   const auto half = passed(text, 200, 12.0);
-  EXPECT_NEAR(static_cast<double>(half.size()), 100.0, 35.0);   // 5 sigma of 200 coin tosses
+  EXPECT_NEAR(static_cast<double>(half.size()), 100.0, 35.0);  // 5 sigma of 200 coin tosses
   EXPECT_EQ(half, passed(text, 200, 12.0));
   EXPECT_NE(half, passed("seed = 5" + text.substr(8), 200, 12.0));
 }
@@ -85,7 +85,8 @@ TEST(Scenario, GimbalGoesWrongAndIsNoticed) {
   EXPECT_NEAR(angle_after("[[fault]]\nkind='wrong_direction'\nvalue=2\n", 30.0), 0.0, 1e-9);
   // The second move ends after two dwells of 10 s and two moves of 5 s; it is noticed 2 s later.
   EXPECT_DOUBLE_EQ(*gimbal_failure_time(*scenario_of("[[fault]]\nkind='stuck_gimbal'\nvalue=2\n"), schedule), 32.0);
-  EXPECT_FALSE(gimbal_failure_time(*scenario_of("[[fault]]\nkind='stuck_gimbal'\nvalue=2\ndetected=false\n"), schedule));
+  EXPECT_FALSE(
+      gimbal_failure_time(*scenario_of("[[fault]]\nkind='stuck_gimbal'\nvalue=2\ndetected=false\n"), schedule));
 }
 
 TEST(Scenario, SensorsSaturateAndFreeze) {
@@ -95,7 +96,8 @@ TEST(Scenario, SensorsSaturateAndFreeze) {
   sample.delta_theta = {5000, -5000, 10};
   sample.delta_v = {4, 5, 6};
   ImuSample limited = sample;
-  EXPECT_TRUE(spoil_sample(*scenario_of("[[fault]]\nkind='saturated_gyro'\nvalue=1\namount=4000\n"), 0.0, before, limited));
+  EXPECT_TRUE(
+      spoil_sample(*scenario_of("[[fault]]\nkind='saturated_gyro'\nvalue=1\namount=4000\n"), 0.0, before, limited));
   EXPECT_EQ(limited.delta_theta[1], -4000);
   EXPECT_EQ(limited.delta_theta[0], 5000);
   ImuSample frozen = sample;
@@ -111,7 +113,7 @@ TEST(Scenario, CountsFromTheFirstTimeInAState) {
   scenario.note_state(ins::State::idle, 10.0);
   EXPECT_FALSE(off(6.0) || off(16.0));
   scenario.note_state(ins::State::rotating, 100.0);
-  scenario.note_state(ins::State::rotating, 103.0);   // still, or again: counted from the first time
+  scenario.note_state(ins::State::rotating, 103.0);  // still, or again: counted from the first time
   EXPECT_FALSE(off(104.9));
   EXPECT_TRUE(off(105.0));
   EXPECT_FALSE(off(107.0));
@@ -122,9 +124,12 @@ TEST(Scenario, FilesNameWhatIsWrong) {
     const auto scenario = scenario_of(text);
     return scenario ? std::string("accepted") : scenario.error().message;
   };
-  EXPECT_THAT(message("[[fault]]\nkind = 'gremlins'\n"), HasSubstr("scenario.toml:2: fault[0].kind: no fault is called 'gremlins'"));
-  EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nprobability = 2\n"), HasSubstr("scenario.toml:3: fault[0].probability: 2 is outside [0, 1]"));
-  EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nwhen = 2\n"), HasSubstr("scenario.toml:3: fault[0].when: no such key"));
+  EXPECT_THAT(message("[[fault]]\nkind = 'gremlins'\n"),
+              HasSubstr("scenario.toml:2: fault[0].kind: no fault is called 'gremlins'"));
+  EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nprobability = 2\n"),
+              HasSubstr("scenario.toml:3: fault[0].probability: 2 is outside [0, 1]"));
+  EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nwhen = 2\n"),
+              HasSubstr("scenario.toml:3: fault[0].when: no such key"));
   EXPECT_THAT(message("[[fault]]\nkind = 'drop'\nstate = 'asleep'\n"),
               HasSubstr("scenario.toml:3: fault[0].state: 'asleep' is no state of the INS"));
   EXPECT_THAT(message("[[fault]]\nkind = 'frozen_gyro'\nstate = 'rotating'\n"),

@@ -25,8 +25,8 @@ TEST(SensorErrors, SignsAreTheMissions) {
   using V = Vector3;
   EXPECT_EQ(accel_error(one(parameter::accel_bias + 1, 7.0), f), V(0, 7, 0));
   EXPECT_EQ(accel_error(one(parameter::accel_scale_pos, 0.5), f), V(1, 0, 0));
-  EXPECT_EQ(accel_error(one(parameter::accel_scale_pos + 1, 0.5), f), V(0, 0, 0));    // f_y < 0: K+ does nothing
-  EXPECT_EQ(accel_error(one(parameter::accel_scale_neg + 1, 0.5), f), V(0, 1.5, 0));  // K- multiplies |f|
+  EXPECT_EQ(accel_error(one(parameter::accel_scale_pos + 1, 0.5), f), V(0, 0, 0));        // f_y < 0: K+ does nothing
+  EXPECT_EQ(accel_error(one(parameter::accel_scale_neg + 1, 0.5), f), V(0, 1.5, 0));      // K- multiplies |f|
   EXPECT_EQ(accel_error(one(parameter::accel_misalignment, 0.5), f), V(0, 1, 0));         // yx
   EXPECT_EQ(accel_error(one(parameter::accel_misalignment + 1, 0.5), f), V(0, 0, 1));     // zx
   EXPECT_EQ(accel_error(one(parameter::accel_misalignment + 2, 0.5), f), V(0, 0, -1.5));  // zy
@@ -34,12 +34,12 @@ TEST(SensorErrors, SignsAreTheMissions) {
   EXPECT_EQ(gyro_error(one(parameter::gyro_drift + 2, 7.0), w), V(0, 0, 7));
   EXPECT_EQ(gyro_error(one(parameter::gyro_scale + 1, 0.5), w), V(0, -1.5, 0));
   const int G = parameter::gyro_misalignment;
-  EXPECT_EQ(gyro_error(one(G + 0, 0.5), w), V(-1.5, 0, 0));   // xy
-  EXPECT_EQ(gyro_error(one(G + 1, 0.5), w), V(2.5, 0, 0));    // xz
-  EXPECT_EQ(gyro_error(one(G + 2, 0.5), w), V(0, 1, 0));      // yx
-  EXPECT_EQ(gyro_error(one(G + 3, 0.5), w), V(0, 2.5, 0));    // yz
-  EXPECT_EQ(gyro_error(one(G + 4, 0.5), w), V(0, 0, 1));      // zx
-  EXPECT_EQ(gyro_error(one(G + 5, 0.5), w), V(0, 0, -1.5));   // zy
+  EXPECT_EQ(gyro_error(one(G + 0, 0.5), w), V(-1.5, 0, 0));  // xy
+  EXPECT_EQ(gyro_error(one(G + 1, 0.5), w), V(2.5, 0, 0));   // xz
+  EXPECT_EQ(gyro_error(one(G + 2, 0.5), w), V(0, 1, 0));     // yx
+  EXPECT_EQ(gyro_error(one(G + 3, 0.5), w), V(0, 2.5, 0));   // yz
+  EXPECT_EQ(gyro_error(one(G + 4, 0.5), w), V(0, 0, 1));     // zx
+  EXPECT_EQ(gyro_error(one(G + 5, 0.5), w), V(0, 0, -1.5));  // zy
 }
 
 Schedule short_schedule() { return *named_schedule("horizontal", 2.0); }
@@ -80,7 +80,7 @@ double scatter_of_sums(double arw, int axis) {
 
 TEST(Simulate, AngleRandomWalkIsAsAskedFor) {
   const double wanted = 0.01 * units::degree_per_sqrt_hour * std::sqrt(2.0);
-  EXPECT_NEAR(scatter_of_sums(0.01, 0) / wanted, 1.0, 0.16);   // 4 sigma
+  EXPECT_NEAR(scatter_of_sums(0.01, 0) / wanted, 1.0, 0.16);  // 4 sigma
   EXPECT_NEAR(scatter_of_sums(0.01, 2) / wanted, 1.0, 0.16);
   EXPECT_GT(scatter_of_sums(0.02, 0) / wanted, 1.5);
 }
@@ -118,7 +118,7 @@ TEST(Simulate, IntegralsOfOneSampleAreExact) {
   auto imu = ImuSimulator::create(config, gimbal, 3, {});
   ASSERT_TRUE(imu);
   for (int k = 95; k < 360; ++k) {
-    const double begin = k * 0.02 + 0.0013;   // off the profile's corners
+    const double begin = k * 0.02 + 0.0013;  // off the profile's corners
     const IdealIncrement at_once = imu->integrate(begin, begin + 0.02);
     IdealIncrement parts;
     for (int i = 0; i < 1000; ++i) {
@@ -134,7 +134,7 @@ TEST(Simulate, IntegralsOfOneSampleAreExact) {
 
 TEST(Simulate, RefusesWhatTheGimbalCannotDo) {
   Schedule schedule = short_schedule();
-  schedule.rotation_s = 2.0;   // 90 deg in 2 s
+  schedule.rotation_s = 2.0;  // 90 deg in 2 s
   const auto refused = simulate({}, schedule, 1, {});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
@@ -142,8 +142,10 @@ TEST(Simulate, RefusesWhatTheGimbalCannotDo) {
 }
 
 TEST(SimConfigFile, ReadsValuesAndNamesWhatIsWrong) {
-  const auto good = parse_sim_config("sample_rate_hz = 100\n[site]\nlatitude_deg = -33\n[base_motion]\npreset = 'moored'\n"
-                                     "[parameters]\ngyro_scale_y = 12.5\n", "sim.toml");
+  const auto good = parse_sim_config(
+      "sample_rate_hz = 100\n[site]\nlatitude_deg = -33\n[base_motion]\npreset = 'moored'\n"
+      "[parameters]\ngyro_scale_y = 12.5\n",
+      "sim.toml");
   ASSERT_TRUE(good) << good.error().message;
   EXPECT_EQ(good->sample_rate_hz, 100.0);
   EXPECT_EQ(good->latitude_deg, -33.0);

@@ -41,15 +41,15 @@ TEST(TrueMotion, LevelFacingNorthGimbalAtZero) {
   expect_state(resting(0, 0, 0, 0), {omega_north, omega_up, 0}, {0, gravity, 0});
 }
 
-TEST(TrueMotion, HeadingIsClockwise) {   // facing east: north is to the left, and z points right
+TEST(TrueMotion, HeadingIsClockwise) {  // facing east: north is to the left, and z points right
   expect_state(resting(90, 0, 0, 0), {0, omega_up, -omega_north}, {0, gravity, 0});
 }
 
-TEST(TrueMotion, OuterTurnsAboutZ) {     // right-handed about z (right): x goes up, so x takes gravity
+TEST(TrueMotion, OuterTurnsAboutZ) {  // right-handed about z (right): x goes up, so x takes gravity
   expect_state(resting(0, 0, 90, 0), {omega_up, -omega_north, 0}, {gravity, 0, 0});
 }
 
-TEST(TrueMotion, InnerTurnsAboutY) {     // right-handed about y (up): z turns to where x was
+TEST(TrueMotion, InnerTurnsAboutY) {  // right-handed about y (up): z turns to where x was
   expect_state(resting(0, 0, 0, 90), {0, omega_up, omega_north}, {0, gravity, 0});
 }
 

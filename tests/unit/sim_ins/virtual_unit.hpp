@@ -31,7 +31,7 @@ class VirtualUnit {
 
   bool accepts(const can::CanFrame& frame) const { return server_->accepts(frame); }
   void on_frame(const can::CanFrame& frame, Time now) {
-    if (instrument_->ready()) {   // nobody listens while the INS starts
+    if (instrument_->ready()) {  // nobody listens while the INS starts
       server_->on_frame(frame, now);
     }
   }

@@ -25,23 +25,42 @@ constexpr int internal = 5;
 struct Fault {
   const char* name;
   std::function<void(Recording&)> put;
-  std::vector<const char*> named;   // what the line must hold
+  std::vector<const char*> named;  // what the line must hold
 };
 
 const std::vector<Fault> faults = {
     {"nan", [](Recording& r) { r.delta_theta_rad[77][1] = std::nan(""); }, {"delta_theta_rad", "row 77", "nan"}},
-    {"infinity", [](Recording& r) { r.gimbal_outer_rad[5] = std::numeric_limits<double>::infinity(); },
+    {"infinity",
+     [](Recording& r) { r.gimbal_outer_rad[5] = std::numeric_limits<double>::infinity(); },
      {"gimbal_outer_rad", "row 5", "inf"}},
     {"time", [](Recording& r) { std::swap(r.time_s[200], r.time_s[201]); }, {"time_s", "row 201"}},
-    {"gap", [](Recording& r) { for (std::size_t k = 300; k < r.size(); ++k) r.time_s[k] += 1.0; },
+    {"gap",
+     [](Recording& r) {
+       for (std::size_t k = 300; k < r.size(); ++k) {
+         r.time_s[k] += 1.0;
+       }
+     },
      {"time_s", "row 300", "gap of 1.02 s"}},
     {"rate", [](Recording& r) { r.sample_rate_hz = 200.0; }, {"sample_rate_hz = 200", "50 Hz"}},
     {"latitude", [](Recording& r) { r.latitude_deg = 91.0; }, {"latitude_deg = 91"}},
     {"longitude", [](Recording& r) { r.longitude_deg = 1e3; }, {"longitude_deg = 1000"}},
     {"height", [](Recording& r) { r.height_m = 1e6; }, {"height_m = 1000000"}},
-    {"gimbal", [](Recording& r) { for (double& angle : r.gimbal_inner_rad) angle = -angle; },
+    {"gimbal",
+     [](Recording& r) {
+       for (double& angle : r.gimbal_inner_rad) {
+         angle = -angle;
+       }
+     },
      {"gimbal_inner_rad", "rows", "deg"}},
-    {"unit", [](Recording& r) { for (auto& d : r.delta_v_mps) for (double& c : d) c *= 1000.0; }, {"delta_v_mps"}},
+    {"unit",
+     [](Recording& r) {
+       for (auto& d : r.delta_v_mps) {
+         for (double& c : d) {
+           c *= 1000.0;
+         }
+       }
+     },
+     {"delta_v_mps"}},
 };
 
 class BadRecording : public ::testing::TestWithParam<std::size_t> {
@@ -58,7 +77,9 @@ TEST_P(BadRecording, OneLineAndStatusThree) {
   for (const std::string file : {"r.h5", "r.csv"}) {
     for (const bool json : {false, true}) {
       std::vector<std::string> arguments{"estimate", folder / file};
-      if (json) arguments.push_back("--json");
+      if (json) {
+        arguments.push_back("--json");
+      }
       const auto finished = run_selfcal(arguments);
       EXPECT_EQ(failure_fault(finished, bad_input), "") << file;
       for (const char* word : fault.named) {
@@ -108,8 +129,10 @@ TEST(BadFile, SimulationFilesNameLineAndKey) {
   finished = run_selfcal({"simulate", "--config", folder / "c.toml", "-o", out});
   EXPECT_EQ(failure_fault(finished, bad_input), "");
   EXPECT_THAT(finished.error, HasSubstr("no_such_key"));
-  EXPECT_EQ(failure_fault(run_selfcal({"simulate", "--schedule", "table2", "--dwell", "3", "-o",
-                                       folder / "absent/r.h5"}), internal), "");
+  EXPECT_EQ(
+      failure_fault(run_selfcal({"simulate", "--schedule", "table2", "--dwell", "3", "-o", folder / "absent/r.h5"}),
+                    internal),
+      "");
 }
 
 TEST(BadFile, ReportOfADocumentWithValuesOfOtherTypes) {
@@ -117,9 +140,10 @@ TEST(BadFile, ReportOfADocumentWithValuesOfOtherTypes) {
   const std::string out = folder / "page.html", run = folder / "run.json", past = folder / "past.json";
   const std::string sound = R"({"run": 1, "serial": "X", "state": "completed", "started_utc": "2026-01-01T00:00:00Z",
                                 "events": [], "result": {"parameters": [{"name": "gyro_drift_x", "value": 1, "sigma": 1}]}})";
-  for (const char* document : {R"({"run": 1, "serial": 7, "state": "completed", "started_utc": "", "events": [], "result": {}})",
-                               R"({"run": 1, "serial": "X", "state": "completed", "started_utc": [], "events": [], "result": {}})",
-                               R"({"run": 1, "serial": "X", "state": "completed", "started_utc": "", "events": [], "result": {},
+  for (const char* document :
+       {R"({"run": 1, "serial": 7, "state": "completed", "started_utc": "", "events": [], "result": {}})",
+        R"({"run": 1, "serial": "X", "state": "completed", "started_utc": [], "events": [], "result": {}})",
+        R"({"run": 1, "serial": "X", "state": "completed", "started_utc": "", "events": [], "result": {},
                                    "recording": 3})"}) {
     ASSERT_TRUE(write_file_atomically(run, document));
     const auto finished = run_selfcal({"report", run, "-o", out});
@@ -127,7 +151,8 @@ TEST(BadFile, ReportOfADocumentWithValuesOfOtherTypes) {
     EXPECT_THAT(finished.error, HasSubstr("run.json"));
   }
   ASSERT_TRUE(write_file_atomically(run, sound));
-  ASSERT_TRUE(write_file_atomically(past, R"({"serial": "X", "runs": 3, "parameters": [{"name": 4}, "gyro_drift_x"]})"));
+  ASSERT_TRUE(
+      write_file_atomically(past, R"({"serial": "X", "runs": 3, "parameters": [{"name": 4}, "gyro_drift_x"]})"));
   const auto beside = run_selfcal({"report", run, "--past", past, "-o", out});
   EXPECT_EQ(failure_fault(beside, bad_input), "");
   EXPECT_THAT(beside.error, HasSubstr("past.json"));

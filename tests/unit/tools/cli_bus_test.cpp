@@ -27,14 +27,15 @@ TEST(BusDecode, NamesRequestResponseAndRefusal) {
   const auto finished = run_selfcal({"bus", "decode", folder / "bus.log"});
   EXPECT_EQ(finished.status, 0) << finished.error;
   EXPECT_THAT(finished.out, HasSubstr("ReadDataByIdentifier"));
-  EXPECT_THAT(finished.out, HasSubstr("onditionsNotCorrect"));   // NRC 0x22
+  EXPECT_THAT(finished.out, HasSubstr("onditionsNotCorrect"));  // NRC 0x22
   EXPECT_EQ(std::count(finished.out.begin(), finished.out.end(), '\n'), 3) << finished.out;
 }
 
 TEST(BusDecode, OtherIdentifiersAreOthersBusiness) {
   const test::TemporaryFolder folder;
   ASSERT_TRUE(write_file_atomically(folder / "bus.log", read_serial_number));
-  const auto finished = run_selfcal({"bus", "decode", "--request-id", "0x700", "--response-id", "0x708", folder / "bus.log"});
+  const auto finished =
+      run_selfcal({"bus", "decode", "--request-id", "0x700", "--response-id", "0x708", folder / "bus.log"});
   EXPECT_EQ(finished.status, 0) << finished.error;
   EXPECT_EQ(finished.out, "");
 }
@@ -43,7 +44,7 @@ TEST(BusDecode, MissingFrameIsTold) {
   const test::TemporaryFolder folder;
   std::string log = read_serial_number;
   const std::size_t third = log.find("(1436509052.252713)");
-  log.erase(third, log.find('\n', third) + 1 - third);   // the consecutive frame
+  log.erase(third, log.find('\n', third) + 1 - third);  // the consecutive frame
   ASSERT_TRUE(write_file_atomically(folder / "bus.log", log));
   const auto finished = run_selfcal({"bus", "decode", folder / "bus.log"});
   EXPECT_EQ(finished.status, 1);

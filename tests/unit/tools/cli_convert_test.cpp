@@ -29,8 +29,8 @@ TEST(Convert, ThereAndBackGivesTheSameBits) {
 TEST(Simulate, SameSeedSameBitsAndAnotherSeedOthers) {
   const test::TemporaryFolder folder;
   const auto simulate = [&](const std::string& seed, const std::string& file) {
-    const auto finished = run_selfcal({"simulate", "--schedule", "horizontal", "--dwell", "4", "--seed", seed, "-o",
-                                       folder / file});
+    const auto finished =
+        run_selfcal({"simulate", "--schedule", "horizontal", "--dwell", "4", "--seed", seed, "-o", folder / file});
     EXPECT_EQ(finished.status, 0) << finished.error;
     EXPECT_EQ(finished.error, "");
     auto read = read_hdf5(folder / file);

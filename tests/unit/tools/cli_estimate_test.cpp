@@ -16,15 +16,30 @@ using nlohmann::json;
 using test::run_selfcal;
 
 // interfaces.md, written out: the program's own table must not be its own witness.
-const std::vector<std::pair<std::string, std::string>> names_and_units = {
-    {"accel_bias_x", "ug"}, {"accel_bias_y", "ug"}, {"accel_bias_z", "ug"},
-    {"gyro_drift_x", "deg/h"}, {"gyro_drift_y", "deg/h"}, {"gyro_drift_z", "deg/h"},
-    {"accel_scale_pos_x", "ppm"}, {"accel_scale_pos_y", "ppm"}, {"accel_scale_pos_z", "ppm"},
-    {"accel_scale_neg_x", "ppm"}, {"accel_scale_neg_y", "ppm"}, {"accel_scale_neg_z", "ppm"},
-    {"accel_misalignment_yx", "arcsec"}, {"accel_misalignment_zx", "arcsec"}, {"accel_misalignment_zy", "arcsec"},
-    {"gyro_scale_x", "ppm"}, {"gyro_scale_y", "ppm"}, {"gyro_scale_z", "ppm"},
-    {"gyro_misalignment_xy", "arcsec"}, {"gyro_misalignment_xz", "arcsec"}, {"gyro_misalignment_yx", "arcsec"},
-    {"gyro_misalignment_yz", "arcsec"}, {"gyro_misalignment_zx", "arcsec"}, {"gyro_misalignment_zy", "arcsec"}};
+const std::vector<std::pair<std::string, std::string>> names_and_units = {{"accel_bias_x", "ug"},
+                                                                          {"accel_bias_y", "ug"},
+                                                                          {"accel_bias_z", "ug"},
+                                                                          {"gyro_drift_x", "deg/h"},
+                                                                          {"gyro_drift_y", "deg/h"},
+                                                                          {"gyro_drift_z", "deg/h"},
+                                                                          {"accel_scale_pos_x", "ppm"},
+                                                                          {"accel_scale_pos_y", "ppm"},
+                                                                          {"accel_scale_pos_z", "ppm"},
+                                                                          {"accel_scale_neg_x", "ppm"},
+                                                                          {"accel_scale_neg_y", "ppm"},
+                                                                          {"accel_scale_neg_z", "ppm"},
+                                                                          {"accel_misalignment_yx", "arcsec"},
+                                                                          {"accel_misalignment_zx", "arcsec"},
+                                                                          {"accel_misalignment_zy", "arcsec"},
+                                                                          {"gyro_scale_x", "ppm"},
+                                                                          {"gyro_scale_y", "ppm"},
+                                                                          {"gyro_scale_z", "ppm"},
+                                                                          {"gyro_misalignment_xy", "arcsec"},
+                                                                          {"gyro_misalignment_xz", "arcsec"},
+                                                                          {"gyro_misalignment_yx", "arcsec"},
+                                                                          {"gyro_misalignment_yz", "arcsec"},
+                                                                          {"gyro_misalignment_zx", "arcsec"},
+                                                                          {"gyro_misalignment_zy", "arcsec"}};
 
 std::vector<double> truth_of(const std::filesystem::path& file) {
   const json truth = json::parse(read_text_file(file, 1 << 20).value());
@@ -43,7 +58,7 @@ TEST(Estimate, JsonIsTheDocumentOfTheInterface) {
   const auto finished = run_selfcal({"estimate", "--json", folder / "r.h5"});
   EXPECT_THAT(finished.status, ::testing::AnyOf(0, 1));
   EXPECT_EQ(finished.error, "");
-  const json document = json::parse(finished.out);   // throws, and so fails, on anything but one document
+  const json document = json::parse(finished.out);  // throws, and so fails, on anything but one document
   ASSERT_EQ(document.at("parameters").size(), names_and_units.size());
   bool all_determined = true;
   for (std::size_t k = 0; k < names_and_units.size(); ++k) {
@@ -70,8 +85,8 @@ TEST(Estimate, JsonIsTheDocumentOfTheInterface) {
 TEST(Estimate, ToleranceDecidesWhatIsDetermined) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(run_selfcal({"simulate", "--schedule", "horizontal", "--dwell", "30", "-o", folder / "r.h5"}).status, 0);
-  const auto finished =
-      run_selfcal({"estimate", "--json", folder / "r.h5", "--tolerance", "gyro_scale=0.001", "--tolerance", "gyro_drift=1"});
+  const auto finished = run_selfcal(
+      {"estimate", "--json", folder / "r.h5", "--tolerance", "gyro_scale=0.001", "--tolerance", "gyro_drift=1"});
   EXPECT_EQ(finished.status, 1);
   const json document = json::parse(finished.out);
   for (const json& parameter : document.at("parameters")) {
@@ -117,16 +132,18 @@ TEST_P(KnownRecording, WithinFourSigmaOfTheTruth) {
   EXPECT_EQ(undetermined, GetParam().undetermined);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Recordings, KnownRecording,
-    ::testing::Values(Known{"table3-horizontal-level", 0, {}}, Known{"table5-table2-pitch90", 0, {}},
-                      Known{"table5-horizontal-moored", 0, {}},
-                      Known{"table5-table2-level", 1, {"accel_misalignment_zx", "gyro_scale_y", "gyro_misalignment_xz"}}),
-    [](const auto& parameter) {
-      std::string name = parameter.param.name;
-      std::replace(name.begin(), name.end(), '-', '_');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Recordings, KnownRecording,
+                         ::testing::Values(Known{"table3-horizontal-level", 0, {}},
+                                           Known{"table5-table2-pitch90", 0, {}},
+                                           Known{"table5-horizontal-moored", 0, {}},
+                                           Known{"table5-table2-level",
+                                                 1,
+                                                 {"accel_misalignment_zx", "gyro_scale_y", "gyro_misalignment_xz"}}),
+                         [](const auto& parameter) {
+                           std::string name = parameter.param.name;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace selfcal

@@ -27,7 +27,7 @@ void write(lcm::LogFile& log, const std::string& channel, const Message& message
   static std::int64_t number = 0;
   lcm::LogEvent event{};
   event.eventnum = number;
-  event.timestamp = 1000 * ++number;   // a message a millisecond: whole runs replay in a moment
+  event.timestamp = 1000 * ++number;  // a message a millisecond: whole runs replay in a moment
   event.channel = channel;
   event.datalen = static_cast<std::int32_t>(bytes.size());
   event.data = bytes.data();

@@ -45,7 +45,7 @@ TEST(MonitorView, FillsExactlyAnyScreen) {
   MonitorState state = state_of({"one", "two"});
   selfcal_lcm::estimate estimate{};
   for (int k = 0; k < 24; ++k) {
-    estimate.name.emplace_back("accel_misalignment_yx");   // the longest
+    estimate.name.emplace_back("accel_misalignment_yx");  // the longest
     estimate.unit.emplace_back("arcsec");
     estimate.sigma.push_back(9990.0);
     estimate.tolerance.push_back(5.0);

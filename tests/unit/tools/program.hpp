@@ -7,7 +7,7 @@
 namespace selfcal::test {
 
 struct Finished {
-  int status = -1;      // exit status; 128 + signal where it died of one
+  int status = -1;  // exit status; 128 + signal where it died of one
   std::string out;
   std::string error;
 };
