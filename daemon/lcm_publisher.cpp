@@ -11,8 +11,8 @@
 #include <selfcal_lcm/ins_status.hpp>
 #include <selfcal_lcm/service_status.hpp>
 
-#include "daemon/journal.hpp"
-#include "daemon/wall_clock.hpp"
+#include "daemon/host/journal.hpp"
+#include "daemon/host/wall_clock.hpp"
 
 namespace selfcal {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/calibration_run.hpp"
-#include "daemon/timers.hpp"
+#include "daemon/host/timers.hpp"
+#include "daemon/run/calibration_run.hpp"
 
 namespace lcm {
 class LCM;

@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "daemon/journal.hpp"
+#include "daemon/host/journal.hpp"
 #include "daemon/service.hpp"
 
 namespace {

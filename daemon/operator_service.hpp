@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration_run.hpp"
+#include "daemon/run/calibration_run.hpp"
 
 namespace selfcal {
 

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <system_error>
 
-#include "daemon/database_copies.hpp"
-#include "daemon/journal.hpp"
-#include "daemon/page_recording.hpp"
-#include "daemon/recording_store.hpp"
-#include "daemon/wall_clock.hpp"
+#include "daemon/host/journal.hpp"
+#include "daemon/host/wall_clock.hpp"
+#include "daemon/store/database_copies.hpp"
+#include "daemon/store/page_recording.hpp"
+#include "daemon/store/recording_store.hpp"
 #include "protocol/operator_api/names.hpp"
 
 namespace selfcal {

@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "daemon/bus_connection.hpp"
-#include "daemon/calibration_run.hpp"
-#include "daemon/config.hpp"
-#include "daemon/estimate_worker.hpp"
-#include "daemon/event_loop.hpp"
+#include "daemon/estimate/estimate_worker.hpp"
+#include "daemon/host/bus_connection.hpp"
+#include "daemon/host/config.hpp"
+#include "daemon/host/event_loop.hpp"
+#include "daemon/host/state_lock.hpp"
 #include "daemon/lcm_publisher.hpp"
 #include "daemon/operator_service.hpp"
-#include "daemon/run_store.hpp"
-#include "daemon/state_lock.hpp"
+#include "daemon/run/calibration_run.hpp"
+#include "daemon/store/run_store.hpp"
 
 namespace selfcal {
 

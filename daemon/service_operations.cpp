@@ -3,14 +3,14 @@
 
 #include <stdexcept>
 
-#include "daemon/can_port.hpp"
-#include "daemon/database_copies.hpp"
-#include "daemon/journal.hpp"
-#include "daemon/recording_store.hpp"
-#include "daemon/run_documents.hpp"
+#include "daemon/host/journal.hpp"
+#include "daemon/host/wall_clock.hpp"
+#include "daemon/ins/can_port.hpp"
+#include "daemon/ins/unlock_key.hpp"
 #include "daemon/service.hpp"
-#include "daemon/unlock_key.hpp"
-#include "daemon/wall_clock.hpp"
+#include "daemon/store/database_copies.hpp"
+#include "daemon/store/recording_store.hpp"
+#include "daemon/store/run_documents.hpp"
 #include "protocol/operator_api/names.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
 

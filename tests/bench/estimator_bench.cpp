@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
 #include "estimator/models/segments.hpp"
 #include "estimator/models/sensor_noise.hpp"
 #include "estimator/navigation/coarse_alignment.hpp"

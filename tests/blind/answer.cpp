@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "tests/blind/rivals.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/planning/plan.hpp"
 #include "sim_ins/simulate.hpp"

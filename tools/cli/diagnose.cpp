@@ -5,8 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "daemon/calibration/calibrate_recording.hpp"
-#include "daemon/calibration/diagnosis_json.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"

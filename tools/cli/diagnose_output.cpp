@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/calibration/diagnosis_json.hpp"
+#include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
 

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "daemon/calibration/calibrate_recording.hpp"
-#include "daemon/calibration/result_json.hpp"
-#include "daemon/calibration/result_table.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/result_json.hpp"
+#include "daemon/estimate/result_table.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/estimator_arguments.hpp"

@@ -4,8 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/database_copies.hpp"
-#include "daemon/state_lock.hpp"
+#include "daemon/host/state_lock.hpp"
+#include "daemon/store/database_copies.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "daemon/calibration/calibrate_recording.hpp"
-#include "daemon/calibration/diagnosis_json.hpp"
-#include "daemon/wall_clock.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/diagnosis_json.hpp"
+#include "daemon/host/wall_clock.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"

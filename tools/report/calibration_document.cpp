@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/calibration/calibrate_recording.hpp"
-#include "daemon/calibration/result_json.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/result_json.hpp"
 #include "estimator/diagnosis/signature_pass.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/report/allan_deviation.hpp"

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "daemon/parameter_trend.hpp"
-#include "daemon/wall_clock.hpp"
+#include "daemon/host/wall_clock.hpp"
+#include "daemon/store/parameter_trend.hpp"
 
 namespace selfcal::report {
 namespace {

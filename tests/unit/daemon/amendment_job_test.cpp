@@ -1,12 +1,12 @@
 // What an amendment makes of a diagnosis: whose 24, what it may be written for, and what it says.
-#include "daemon/amendment_job.hpp"
+#include "daemon/estimate/amendment_job.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
 
 namespace selfcal {
 namespace {

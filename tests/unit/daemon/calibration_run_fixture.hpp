@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration_run.hpp"
+#include "daemon/run/calibration_run.hpp"
 #include "tests/unit/daemon/fake_ins.hpp"
 #include "tests/unit/daemon/scratch_folder.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/config.hpp"
+#include "daemon/host/config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Backups and the way back, and who may work on a state directory.
-#include "daemon/database_copies.hpp"
+#include "daemon/store/database_copies.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 
 #include <fstream>
 
-#include "daemon/run_store.hpp"
-#include "daemon/state_lock.hpp"
+#include "daemon/host/state_lock.hpp"
+#include "daemon/store/run_store.hpp"
 #include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {

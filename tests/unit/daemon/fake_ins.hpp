@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/ins_port.hpp"
-#include "daemon/unlock_key.hpp"
+#include "daemon/ins/ins_port.hpp"
+#include "daemon/ins/unlock_key.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/ins_interface/records.hpp"
 #include "tests/unit/daemon/simulated_timers.hpp"

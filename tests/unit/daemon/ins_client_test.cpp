@@ -1,5 +1,5 @@
 // An INS whose answers make no sense: each dialogue ends with one line that begins with the interface.
-#include "daemon/ins_client.hpp"
+#include "daemon/ins/ins_client.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "daemon/parameter_trend.hpp"
+#include "daemon/store/parameter_trend.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

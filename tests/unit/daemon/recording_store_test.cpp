@@ -1,5 +1,5 @@
 // Which recordings go, and what a run needs before it starts.
-#include "daemon/recording_store.hpp"
+#include "daemon/store/recording_store.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

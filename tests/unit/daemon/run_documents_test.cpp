@@ -1,5 +1,5 @@
 // What programs get to read of a run: the sets that went over the bus, the history, its warnings.
-#include "daemon/run_documents.hpp"
+#include "daemon/store/run_documents.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

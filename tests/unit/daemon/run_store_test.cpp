@@ -1,4 +1,4 @@
-#include "daemon/run_store.hpp"
+#include "daemon/store/run_store.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

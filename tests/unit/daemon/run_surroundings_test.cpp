@@ -5,7 +5,7 @@
 #include <cctype>
 #include <filesystem>
 
-#include "daemon/journal.hpp"
+#include "daemon/host/journal.hpp"
 #include "tests/unit/daemon/calibration_run_fixture.hpp"
 
 namespace selfcal {

@@ -1,5 +1,5 @@
 // The running estimate on data of the simulator: sigma shrinks as pages arrive, and the forecast keeps its word.
-#include "daemon/running_estimate.hpp"
+#include "daemon/estimate/running_estimate.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "daemon/estimate_job.hpp"
+#include "daemon/estimate/estimate_job.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/flash/page.hpp"
 #include "sim_ins/simulate.hpp"

@@ -11,7 +11,7 @@
 #include <array>
 #include <fstream>
 
-#include "daemon/database_copies.hpp"
+#include "daemon/store/database_copies.hpp"
 #include "protocol/operator_api/names.hpp"
 #include "tests/unit/daemon/scratch_folder.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "daemon/timers.hpp"
+#include "daemon/host/timers.hpp"
 
 namespace selfcal::testing_support {
 

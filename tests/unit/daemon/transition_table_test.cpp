@@ -1,4 +1,4 @@
-#include "daemon/transition_table.hpp"
+#include "daemon/run/transition_table.hpp"
 
 #include <gtest/gtest.h>
 

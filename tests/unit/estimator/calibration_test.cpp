@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "daemon/calibration/calibrate_recording.hpp"
+#include "daemon/estimate/calibrate_recording.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tests/unit/estimator/simulated.hpp"
 

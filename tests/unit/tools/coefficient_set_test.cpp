@@ -1,4 +1,4 @@
-#include "daemon/calibration/coefficient_set.hpp"
+#include "daemon/estimate/coefficient_set.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,0 +1,130 @@
+#include "daemon/estimate/diagnosis_json.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimator/geometry/sensor_parameters.hpp"
+
+namespace selfcal {
+namespace {
+
+using diagnosis::Adequacy;
+using diagnosis::Finding;
+using diagnosis::Located;
+using nlohmann::ordered_json;
+
+ordered_json to_json(const Located& l) {
+  ordered_json j;
+  j["where"] = l.where;
+  if (l.position > 0) {
+    j["position"] = l.position;
+  }
+  j["axis"] = l.axis;
+  j["significance"] = l.significance;
+  if (l.end_s > l.start_s) {  // a place in time
+    j["start_s"] = l.start_s;
+    j["end_s"] = l.end_s;
+  }
+  j["bias"] = l.size;
+  j["unit"] = l.axis.starts_with("gyro") ? "deg/h" : "ug";
+  j["words"] = l.words;
+  return j;
+}
+
+ordered_json to_json(const Finding& f) {
+  ordered_json j;
+  j["effect"] = f.effect;
+  j["equation"] = f.equation;
+  j["where"] = f.excited;
+  j["parameters"] = ordered_json::array();
+  for (const auto& p : f.parameters) {
+    j["parameters"].push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"sigma", p.sigma}});
+  }
+  j["equivalent"] = f.equivalent;
+  j["experiment"] = f.experiment;
+  j["significance"] = f.significance;
+  j["stochastic"] = f.stochastic;
+  j["evidence"] = {{"delta_bic", f.delta_bic},
+                   {"p_value", std::exp(f.log_p)},
+                   {"log10_p", f.log_p / std::log(10.0)},
+                   {"held_out_gain", f.held_out_gain},
+                   {"probability", f.probability}};
+  return j;
+}
+
+ordered_json to_json(const Adequacy& a) {
+  return {{"accepted", a.accepted},
+          {"nis", a.nis},
+          {"whiteness_log10_p", a.log_p_white / std::log(10.0)},
+          {"largest_located_sigma", a.largest_sigma},
+          {"misfit", a.misfit}};
+}
+
+template <typename T>
+ordered_json list(const std::vector<T>& all) {
+  ordered_json j = ordered_json::array();
+  for (const T& one : all) {
+    j.push_back(to_json(one));
+  }
+  return j;
+}
+
+ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diagnosis::Located>& by) {
+  places.insert(places.end(), by.begin(), by.end());
+  return list(places);
+}
+
+}  // namespace
+
+std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
+  switch (verdict) {
+    case diagnosis::DiagnosisVerdict::adequate: return "adequate";
+    case diagnosis::DiagnosisVerdict::named: return "named";
+    case diagnosis::DiagnosisVerdict::none_of_the_above: return "none of the above";
+    case diagnosis::DiagnosisVerdict::not_enough_information: return "not enough information";
+    case diagnosis::DiagnosisVerdict::data_fault: return "data fault";
+  }
+  return {};
+}
+
+ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate) {
+  ordered_json j;
+  j["mismatch"] = d.mismatch;
+  j["verdict"] = verdict_name(d.verdict);
+  j["false_alarm_rate"] = false_alarm_rate;
+  j["adequacy"] = {{"before", to_json(d.before)}, {"after", to_json(d.after)}};
+  j["located"] = list(d.located, d.located_by);
+  j["findings"] = list(d.findings);
+  j["undetectable_here"] = ordered_json::array();
+  j["expected_z"] = ordered_json::object();
+  for (const auto& u : d.undetectable) {
+    j["undetectable_here"].push_back(u.effect);
+    j["expected_z"][u.effect] = u.expected_z;
+  }
+  for (const auto& u : d.detectable) {
+    j["expected_z"][u.effect] = u.expected_z;
+  }
+  j["unexplained"] = d.unexplained;
+  j["rejected"] = list(d.rejected);
+  j["suspected"] = list(d.suspected);
+  j["remaining"] = list(d.remaining, d.remaining_by);
+  j["data_faults"] = ordered_json::array();
+  for (const auto& f : d.faults) {
+    j["data_faults"].push_back(
+        {{"id", f.id}, {"words", f.words}, {"first_sample", f.first_sample}, {"count", f.count}});
+  }
+  j["base"] = d.calibration.moored ? "moored" : "still";
+  j["parameters"] = ordered_json::array();
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+    j["parameters"].push_back({{"name", p.name},
+                               {"unit", p.unit},
+                               {"value", d.value(k) / p.si_per_unit},
+                               {"sigma", d.sigma(k) / p.si_per_unit},
+                               {"value_without", d.calibration.value(k) / p.si_per_unit},
+                               {"sigma_without", d.calibration.sigma(k) / p.si_per_unit}});
+  }
+  return j;
+}
+
+}  // namespace selfcal

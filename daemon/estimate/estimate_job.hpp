@@ -1,0 +1,27 @@
+// From the pages in a run's folder to the answer: what the estimator's thread does.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/estimate/estimate_worker.hpp"
+#include "daemon/store/page_recording.hpp"
+#include "protocol/recording/check.hpp"
+
+namespace selfcal {
+
+CalibrationOptions calibration_options(const InsConfig& config);
+
+// Why a result may not be written without the operator's word; empty: it may.
+std::vector<std::string> gate_objections(const CalibrationResult& result, const InsConfig& config);
+
+// All samples of the pages, gap-free from the first; warnings are about saturation.
+Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings);
+
+EstimateJob estimate_job(EstimateRequest request);
+
+// A recording that a run kept, as `selfcal diagnose` would read it.
+Expected<LoadedRecording> read_kept_recording(const std::filesystem::path& path);
+
+}  // namespace selfcal

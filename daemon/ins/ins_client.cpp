@@ -1,0 +1,232 @@
+#include "daemon/ins/ins_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/flash/page.hpp"
+#include "protocol/uds/messages.hpp"
+#include "protocol/uds/security.hpp"
+
+namespace selfcal {
+namespace {
+
+// One request under way; breaking off the task forgets it.
+class Exchange {
+ public:
+  Exchange(InsPort& port, Bytes payload) : port_(port), payload_(std::move(payload)) {}
+  Exchange(const Exchange&) = delete;
+  Exchange& operator=(const Exchange&) = delete;
+  ~Exchange() {
+    if (waiting_) {
+      port_.cancel();
+    }
+  }
+
+  bool await_ready() const noexcept { return false; }
+  void await_suspend(std::coroutine_handle<> task) {
+    waiting_ = true;
+    port_.request(payload_, [this, task](Answer<Bytes> answer) {
+      waiting_ = false;
+      answer_ = std::move(answer);
+      task.resume();
+    });
+  }
+  Answer<Bytes> await_resume() { return std::move(answer_); }
+
+ private:
+  InsPort& port_;
+  Bytes payload_;
+  Answer<Bytes> answer_;
+  bool waiting_ = false;
+};
+
+// An answer that came, but makes no sense.
+tl::unexpected<PortError> senseless(const InsPort& port, const Error& error) {
+  return tl::unexpected<PortError>(
+      PortError{PortError::Kind::protocol, 0, fmt::format("{}: {}", port.interface(), error.message)});
+}
+
+template <typename Record>
+Answer<Record> decoded(const InsPort& port, const Answer<Bytes>& bytes, Expected<Record> (*decode)(ins::ByteView)) {
+  if (!bytes) {
+    return tl::unexpected(bytes.error());
+  }
+  auto record = decode(*bytes);
+  if (!record) {
+    return senseless(port, record.error());
+  }
+  return std::move(*record);
+}
+
+std::string text(const Bytes& bytes) {
+  std::string result(bytes.begin(), bytes.end());
+  std::erase_if(result, [](char c) { return c < 0x20 || c > 0x7E; });  // padding, and what no serial number holds
+  return result;
+}
+
+}  // namespace
+
+Task<Answer<Bytes>> InsClient::ask(Bytes payload) {
+  Exchange exchange(port_, std::move(payload));
+  co_return co_await exchange;
+}
+
+Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
+  // Where a second tester is on the bus the answer to its question may come first.
+  constexpr int attempts = 4;
+  for (int attempt = 1;; ++attempt) {
+    const Answer<Bytes> response = co_await ask(uds::read_request(did));
+    if (!response) {
+      co_return tl::unexpected(response.error());
+    }
+    const auto record = uds::read_read_response(*response, did);
+    if (record) {
+      co_return Bytes(record->begin(), record->end());
+    }
+    if (attempt == attempts) {
+      co_return senseless(port_, record.error());
+    }
+  }
+}
+
+Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
+  const Answer<Bytes> response = co_await ask(uds::write_request(did, record));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (const auto well = uds::read_write_response(*response, did); !well) {
+    co_return senseless(port_, well.error());
+  }
+  co_return Done{};
+}
+
+Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t routine, Bytes option) {
+  const Answer<Bytes> response = co_await ask(uds::routine_request(action, routine, option));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  const auto record = uds::read_routine_response(*response, action, routine);
+  if (!record) {
+    co_return senseless(port_, record.error());
+  }
+  co_return Bytes(record->begin(), record->end());
+}
+
+Task<Answer<InsClient::Identity>> InsClient::identify() {
+  const Answer<Bytes> serial = co_await read_record(ins::did::serial_number);
+  if (!serial) {
+    co_return tl::unexpected(serial.error());
+  }
+  const Answer<Bytes> software = co_await read_record(ins::did::software_version);
+  if (!software) {
+    co_return tl::unexpected(software.error());
+  }
+  Identity identity{text(*serial), text(*software)};
+  if (identity.serial.empty()) {
+    co_return senseless(port_, {ErrorKind::device, "the INS tells an empty serial number"});
+  }
+  co_return identity;
+}
+
+Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
+  Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (auto well = uds::read_session_response(*response, uds::Session::extended); !well) {
+    co_return senseless(port_, well.error());
+  }
+  response = co_await ask(uds::seed_request());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  const auto seed = uds::read_seed_response(*response);
+  if (!seed) {
+    co_return senseless(port_, seed.error());
+  }
+  if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) {
+    co_return Done{};
+  }
+  const auto secret = uds::answer_seed(key, *seed);
+  if (!secret) {
+    co_return senseless(port_, secret.error());
+  }
+  response = co_await ask(uds::key_request(*secret));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (auto well = uds::read_key_response(*response); !well) {
+    co_return senseless(port_, well.error());
+  }
+  co_return Done{};
+}
+
+Task<Answer<ins::StateRecord>> InsClient::read_state() {
+  const Answer<Bytes> bytes = co_await read_record(ins::did::state);
+  co_return decoded(port_, bytes, ins::decode_state);
+}
+
+Task<Answer<ins::DirectoryRecord>> InsClient::read_directory() {
+  const Answer<Bytes> bytes = co_await read_record(ins::did::raw_data_directory);
+  co_return decoded(port_, bytes, ins::decode_directory);
+}
+
+Task<Answer<ins::SampleFormatRecord>> InsClient::read_sample_format() {
+  const Answer<Bytes> bytes = co_await read_record(ins::did::sample_format);
+  co_return decoded(port_, bytes, ins::decode_sample_format);
+}
+
+Task<Answer<ins::SiteRecord>> InsClient::read_site() {
+  const Answer<Bytes> bytes = co_await read_record(ins::did::site);
+  co_return decoded(port_, bytes, ins::decode_site);
+}
+
+Task<Answer<Done>> InsClient::reset() {
+  const Answer<Bytes> response = co_await ask(uds::reset_request(uds::ResetType::hard));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (const auto well = uds::read_reset_response(*response, uds::ResetType::hard); !well) {
+    co_return senseless(port_, well.error());
+  }
+  co_return Done{};
+}
+
+Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
+  const std::size_t wanted = std::size_t{count} * flash::page_bytes;
+  Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)));
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  if (const auto longest = uds::read_upload_response(*response); !longest) {
+    co_return senseless(port_, longest.error());
+  }
+  Bytes data;
+  data.reserve(wanted);
+  std::uint32_t whole = 0;
+  for (std::uint8_t block = 1; data.size() < wanted; ++block) {
+    response = co_await ask(uds::transfer_request(block));
+    if (!response) {
+      co_return tl::unexpected(response.error());
+    }
+    const auto part = uds::read_transfer_response(*response, block);
+    if (!part) {
+      co_return senseless(port_, part.error());
+    }
+    if (part->empty() || data.size() + part->size() > wanted) {
+      co_return senseless(port_, {ErrorKind::device, "transferData: more or less data than was asked for"});
+    }
+    data.insert(data.end(), part->begin(), part->end());
+    for (; (whole + 1) * flash::page_bytes <= data.size(); ++whole) {
+      on_page(first + whole, std::span(data).subspan(whole * flash::page_bytes, flash::page_bytes));
+    }
+  }
+  response = co_await ask(uds::transfer_exit_request());
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  co_return Done{};
+}
+
+}  // namespace selfcal

@@ -1,0 +1,48 @@
+// The dialogues with an INS, each a coroutine that answers with what was learnt or why it was not. No state of the
+// calibration lives here.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "daemon/host/task.hpp"
+#include "daemon/host/timers.hpp"
+#include "daemon/ins/ins_port.hpp"
+#include "daemon/ins/unlock_key.hpp"
+#include "protocol/ins_interface/coefficients.hpp"
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/ins_interface/records.hpp"
+#include "protocol/uds/services.hpp"
+
+namespace selfcal {
+
+class InsClient {
+ public:
+  explicit InsClient(InsPort& port) : port_(port) {}
+
+  struct Identity {
+    std::string serial;
+    std::string software;
+  };
+  Task<Answer<Identity>> identify();
+  Task<Answer<Done>> unlock(UnlockKey key);  // extended session, then SecurityAccess
+  Task<Answer<ins::StateRecord>> read_state();
+  Task<Answer<ins::DirectoryRecord>> read_directory();
+  Task<Answer<ins::SampleFormatRecord>> read_sample_format();
+  Task<Answer<ins::SiteRecord>> read_site();
+  Task<Answer<Bytes>> read_record(std::uint16_t did);
+  Task<Answer<Done>> write_record(std::uint16_t did, Bytes record);
+  Task<Answer<Bytes>> routine(uds::RoutineAction action, std::uint16_t routine, Bytes option);
+  Task<Answer<Done>> reset();
+
+  // Pages first .. first+count-1 of the latest run; `on_page(page, bytes)` gets each as soon as it is whole.
+  using OnPage = std::function<void(std::uint32_t, std::span<const std::uint8_t>)>;
+  Task<Answer<Done>> upload(std::uint32_t first, std::uint32_t count, OnPage on_page);
+
+ private:
+  Task<Answer<Bytes>> ask(Bytes payload);
+
+  InsPort& port_;
+};
+
+}  // namespace selfcal

@@ -1,0 +1,18 @@
+// The SecurityAccess key: 16 bytes, as 32 hexadecimal digits in a file that others cannot read. Never logged.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "daemon/host/config.hpp"
+#include "protocol/error.hpp"
+
+namespace selfcal {
+
+using UnlockKey = std::array<std::uint8_t, 16>;
+
+// From key_file, else from the systemd credential NAME.key, else from the credential ins.key.
+Expected<UnlockKey> load_unlock_key(const InsConfig& config);
+
+}  // namespace selfcal

@@ -1,0 +1,142 @@
+// The estimate that runs along with the rotation, and its early end.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "daemon/run/calibration_run.hpp"
+
+namespace selfcal {
+namespace {
+
+using namespace std::chrono_literals;
+
+// An estimate may take this part of one processor at most, whatever the pace of the data.
+constexpr double pause_per_work = 4.0;
+// From the rotation's clock, so that the gimbal still stands when the stop arrives: what the last status frame may be
+// old, and a round trip on the operator's clock.
+constexpr double status_age_s = 1.0;
+constexpr double round_trip_s = 0.2;
+
+// Whether the gimbal stands in a dwell at `elapsed_s` and for `margin_s` more.
+bool stands(const Schedule& schedule, double elapsed_s, double margin_s) {
+  double begin = 0.0;
+  for (const double dwell : schedule.dwell_s) {
+    if (elapsed_s >= begin && elapsed_s + margin_s < begin + dwell) {
+      return true;
+    }
+    begin += dwell + schedule.rotation_s;
+  }
+  return false;
+}
+
+}  // namespace
+
+void CalibrationRun::show_estimate(const ParameterVector& value, const ParameterVector& sigma) {
+  progress_.estimate_known = true;
+  progress_.tolerances_met = 0;
+  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
+    progress_.value[i] = value(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
+    progress_.sigma[i] = sigma(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
+    if (progress_.sigma[i] <= progress_.tolerance[i]) {
+      ++progress_.tolerances_met;
+    }
+  }
+}
+
+// Of what has arrived without a gap, whenever so much more has.
+void CalibrationRun::estimate_meanwhile() {
+  if (config_.running_estimate_s <= 0 || running_busy_) {
+    return;
+  }
+  const std::uint32_t pages = pages_->missing(progress_.pages_expected, 1).first;
+  const double data_s = pages * page_s_;
+  const SteadyTime now = context_.timers.now();
+  if (data_s < least_running_data_s || data_s < running_begun_s_ + config_.running_estimate_s) {
+    return;
+  }
+  if (now < running_not_before_) {
+    return;
+  }
+  if (!running_estimator_) {
+    running_estimator_ = std::make_shared<RunningEstimator>(
+        EstimateRequest{folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_});
+  }
+  running_busy_ = true;
+  running_begun_s_ = data_s;
+  context_.estimators.start_running(
+      running_job(running_estimator_, pages),
+      [this](const Expected<RunningEstimate>& answer, double cpu_s) { on_running_estimate(answer, cpu_s); });
+}
+
+void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s) {
+  running_busy_ = false;
+  running_not_before_ =
+      context_.timers.now() + std::chrono::nanoseconds(static_cast<std::int64_t>(pause_per_work * cpu_s * 1e9));
+  if (!answer) {  // too little as yet; what is wrong with the data the final estimate will say
+    remember("estimate",
+             fmt::format("after {:.0f} s of data: no estimate yet: {}", running_begun_s_, answer.error().message));
+    return;
+  }
+  const bool first_met = answer->met && !(running_ && running_->met);
+  running_ = *answer;
+  progress_.running = true;
+  progress_.data_s = running_->data_s;
+  progress_.met_at_s = running_->forecast.met_at_s;
+  show_estimate(running_->value, running_->sigma);
+  foresee_finish();
+  if (first_met) {
+    remember("estimate",
+             fmt::format("after {:.0f} s of data every parameter is determined to its tolerance", running_->data_s));
+  }
+  const auto& missing = running_->forecast.out_of_reach;
+  // Early on the noise is known too badly to alarm anybody.
+  if (!missing.empty() && !out_of_reach_said_ && running_->data_s > 0.25 * schedule_.duration_s()) {
+    out_of_reach_said_ = true;
+    warn(
+        fmt::format("this schedule will not determine {} to tolerance in this installation", fmt::join(missing, ", ")));
+  }
+  report_progress(true);
+}
+
+// When the rotation ends, by its schedule or before.
+void CalibrationRun::foresee_finish() {
+  progress_.finish_in_s = -1.0;
+  if (progress_.ins.state != ins::State::rotating) {
+    return;
+  }
+  double left = progress_.ins.time_left_s;
+  if (record_.stop_when_met && progress_.running && progress_.met_at_s >= 0) {
+    const double elapsed = schedule_.duration_s() - left;
+    left = std::min(left, std::max(0.0, progress_.met_at_s - elapsed));
+  }
+  progress_.finish_in_s = left / config_.time_scale;
+}
+
+// Where the gimbal stands at a position of the schedule, by its own word and by the clock. A gimbal that was never
+// heard of is not stopped before its time.
+bool CalibrationRun::may_end_early() const {
+  if (!record_.stop_when_met || !running_ || !running_->met) {
+    return false;
+  }
+  const double heard_s = std::chrono::duration<double>(context_.timers.now() - status_at_).count();
+  if (status_at_ == SteadyTime{} || heard_s > status_age_s || progress_.ins.moving) {
+    return false;
+  }
+  const double elapsed = schedule_.duration_s() - progress_.ins.time_left_s;
+  return stands(schedule_, elapsed, status_age_s + (heard_s + round_trip_s) * config_.time_scale);
+}
+
+Task<CalibrationRun::Step> CalibrationRun::end_rotation_early() {
+  if (record_.early_end_s < 0) {
+    record_.early_end_s = running_ ? running_->data_s : 0.0;  // until the last page tells
+    remember("estimate", fmt::format("rotation ended early at position {} of {}, {:.0f} s before its time: every "
+                                     "tolerance is met",
+                                     progress_.ins.position, progress_.positions, progress_.ins.time_left_s));
+  }
+  if (auto rests = co_await bring_to_rest(); !rests) {
+    co_return tl::unexpected(rests.error());
+  }
+  co_return Event::rotation_ended;
+}
+
+}  // namespace selfcal
