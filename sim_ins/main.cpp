@@ -47,7 +47,7 @@ Expected<void> take_fault(const std::string& text, NodeOptions& node, Instrument
     return tl::unexpected(value.error());
   }
   if (key == "nrc") {
-    node.diagnostics.answer_all_with = static_cast<uds::Nrc>(static_cast<std::uint8_t>(*value));
+    node.refuse_all_with = static_cast<uds::Nrc>(static_cast<std::uint8_t>(*value));
   } else if (key == "crc") {
     instrument.spoilt_page = static_cast<std::uint32_t>(*value);
   } else if (key == "stuck") {

@@ -16,6 +16,7 @@ enum SignalIndex : std::size_t {
   state_signal,
   moving_signal,
   unlocked_signal,
+  session_signal,
   faults_signal,
   position_signal,
   pages_signal,
@@ -51,11 +52,12 @@ std::uint32_t angle_counts(const Signal& signal, double degrees) {
 
 }  // namespace
 
-const std::array<Signal, 11> status_signals = {{
+const std::array<Signal, 12> status_signals = {{
     {can_id::status, "State", 0, 4, 1, 0, 6, "",
      "0=starting 1=idle 2=rotating 3=complete 4=aborted 5=failed 6=checking"},
     {can_id::status, "GimbalMoving", 4, 1, 1, 0, 1, "", ""},
     {can_id::status, "Unlocked", 5, 1, 1, 0, 1, "", ""},
+    {can_id::status, "Session", 6, 2, 1, 0, 3, "", "1=default 2=programming 3=extended"},
     {can_id::status, "Faults", 8, 8, 1, 0, 255, "", ""},
     {can_id::status, "Position", 16, 8, 1, 0, 255, "", ""},
     {can_id::status, "PagesWritten", 24, 24, 1, 0, 16777215, "page", ""},
@@ -84,6 +86,7 @@ can::CanFrame encode_state_frame(const Status& status, std::uint8_t alive, std::
   put_signal(status_signals[state_signal], static_cast<std::uint32_t>(status.state), frame);
   put_signal(status_signals[moving_signal], status.moving ? 1 : 0, frame);
   put_signal(status_signals[unlocked_signal], status.unlocked ? 1 : 0, frame);
+  put_signal(status_signals[session_signal], status.session & 3U, frame);
   put_signal(status_signals[faults_signal], status.faults, frame);
   put_signal(status_signals[position_signal], status.position, frame);
   put_signal(status_signals[pages_signal], std::min<std::uint32_t>(status.pages_written, 0xFFFFFF), frame);
@@ -131,6 +134,7 @@ bool apply_status_frame(const can::CanFrame& frame, Status& status) {
   status.state = static_cast<State>(raw(state_signal));
   status.moving = raw(moving_signal) != 0;
   status.unlocked = raw(unlocked_signal) != 0;
+  status.session = static_cast<std::uint8_t>(raw(session_signal));
   status.faults = static_cast<std::uint8_t>(raw(faults_signal));
   status.position = static_cast<std::uint8_t>(raw(position_signal));
   status.pages_written = raw(pages_signal);

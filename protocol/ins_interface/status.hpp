@@ -35,6 +35,7 @@ struct Status {
   std::uint8_t position = 0;  // 1 first; 0: not in a schedule
   bool moving = false;        // the gimbal turns
   bool unlocked = false;
+  std::uint8_t session = 1;         // of ISO 14229-1: 1 default, 2 programming, 3 extended; 0: not told
   std::uint32_t pages_written = 0;  // of this run, 24 bits
   double outer_deg = 0.0;           // LSB 0.01
   double inner_deg = 0.0;
@@ -53,7 +54,7 @@ struct Signal {
   std::string_view unit;
   std::string_view values;  // "0=starting 1=idle ..." or empty
 };
-extern const std::array<Signal, 11> status_signals;
+extern const std::array<Signal, 12> status_signals;
 
 // `alive` counts the frames of each kind, modulo 256.
 can::CanFrame encode_state_frame(const Status& status, std::uint8_t alive, std::uint32_t id);

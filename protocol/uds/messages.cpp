@@ -144,12 +144,17 @@ Expected<ByteView> read_transfer_exit_response(ByteView response) {
 }
 
 tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request) {
-  if (request.size() != 11) {
+  constexpr std::size_t shortest = 5;  // service, two formats, one byte each of address and length
+  constexpr std::size_t wanted = 11;
+  if (request.size() < shortest) {
     return tl::unexpected(Nrc::incorrect_message_length);
   }
   ByteReader in(request.subspan(1));
   if (in.get<std::uint8_t>() != no_compression || in.get<std::uint8_t>() != four_and_four) {
     return tl::unexpected(Nrc::request_out_of_range);
+  }
+  if (request.size() != wanted) {  // for this format
+    return tl::unexpected(Nrc::incorrect_message_length);
   }
   UploadRange range;
   range.first_page = in.get<std::uint32_t>();
@@ -158,13 +163,16 @@ tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request) {
 }
 
 tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request) {
-  if (request.size() < 4) {
+  if (request.size() < 2) {
     return tl::unexpected(Nrc::incorrect_message_length);
   }
   ByteReader in(request.subspan(1));
   const auto action = in.get<std::uint8_t>();
   if (action < code(RoutineAction::start) || action > code(RoutineAction::result)) {
     return tl::unexpected(Nrc::sub_function_not_supported);
+  }
+  if (request.size() < 4) {
+    return tl::unexpected(Nrc::incorrect_message_length);
   }
   return RoutineCall{static_cast<RoutineAction>(action), in.get<std::uint16_t>(), request.subspan(4)};
 }

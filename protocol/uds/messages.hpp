@@ -16,6 +16,7 @@ namespace selfcal::uds {
 
 using Bytes = std::vector<std::uint8_t>;
 using ByteView = std::span<const std::uint8_t>;
+using Reply = tl::expected<Bytes, Nrc>;  // of a server: a positive response, or the code of the negative one
 
 inline constexpr std::size_t seed_bytes = 16;
 

@@ -46,7 +46,6 @@ class Server {
 
   // The answer to a request for which the handler said `later`.
   void respond(std::span<const std::uint8_t> response, Time now);
-  bool responding_later() const { return later_; }
   bool idle() const { return !later_ && !transport_.sending(); }  // everything is out: a reset may happen
 
   // On in every session but the default one; may be told over and over, only requests renew it.

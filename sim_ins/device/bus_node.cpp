@@ -155,7 +155,7 @@ void BusNode::advance_clock(Time now) {
   if (const Fault* refusal = options_.scenario.active(FaultKind::nrc, now_s_)) {
     diagnostics_.answer_all_with(static_cast<uds::Nrc>(static_cast<std::uint8_t>(refusal->value)));
   } else {
-    diagnostics_.answer_all_with(options_.diagnostics.answer_all_with);
+    diagnostics_.answer_all_with(options_.refuse_all_with);
   }
   diagnostics_.set_instrument_time(now_s_);
   instrument_.advance(now_s_);
@@ -198,6 +198,7 @@ void BusNode::queue_status() {
   next_status_s_ = now_s_ + std::max(status_interval_s, least_real_interval_s * options_.speed);
   ins::Status status = instrument_.status();
   status.unlocked = diagnostics_.unlocked();
+  status.session = static_cast<std::uint8_t>(diagnostics_.session());
   if (acts(FaultKind::late_status)) {
     faulty_.count(FaultKind::late_status);
     return;

@@ -38,8 +38,9 @@ struct NodeOptions {
   double turnaround_ms = 0.0;  // INS time from an answer to the tester's next request, in an upload
   double patience = 1.0;       // stretches N_As, N_Bs, N_Cr and S3, which run in real time
   FrameFaults frame_faults;
-  Scenario scenario;                 // faults of the bus, of status and answers, by time
-  std::optional<double> reset_at_s;  // INS time of one spontaneous reset
+  std::optional<uds::Nrc> refuse_all_with;  // fault on demand: every request is refused so
+  Scenario scenario;                        // faults of the bus, of status and answers, by time
+  std::optional<double> reset_at_s;         // INS time of one spontaneous reset
   std::uint64_t seed = 1;
   DiagnosticOptions diagnostics;
 };

@@ -1,10 +1,8 @@
 #include "sim_ins/device/diagnostics.hpp"
 
-#include <sys/random.h>
-
 #include <algorithm>
+#include <array>
 #include <string_view>
-#include <utility>
 
 #include "protocol/byte_order.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
@@ -13,11 +11,43 @@ namespace selfcal::sim {
 namespace {
 
 using uds::Nrc;
+namespace service = uds::service;
 
 constexpr std::string_view software_version = "sim_ins 1.0";
-constexpr std::uint32_t free_attempts = 3;  // wrong keys before the delay
-constexpr Time delay_after_wrong_keys = std::chrono::seconds(10);
 constexpr uds::SessionTimings timings{std::chrono::milliseconds(50), std::chrono::seconds(5)};
+constexpr std::size_t schedule_head_bytes = 5;  // number of positions, time of a move
+constexpr std::size_t position_bytes = 12;
+constexpr std::size_t site_bytes = 24;
+constexpr std::size_t check_request_bytes = 5;
+constexpr std::size_t word_bytes = 4;
+
+// What figures 5 and 6 ask of every request. No sub-function depends on the session other than through its service, so
+// that subFunctionNotSupportedInActiveSession (0x7E) never comes.
+struct ServiceRule {
+  std::uint8_t id;
+  bool in_default_session;
+  std::size_t shortest;         // service and sub-function, or what the service's own figure says
+  std::uint16_t sub_functions;  // bit per value; 0: the service has none
+};
+constexpr std::uint16_t values(std::initializer_list<unsigned> list) {
+  unsigned bits = 0;
+  for (const unsigned value : list) {
+    bits |= 1U << value;
+  }
+  return static_cast<std::uint16_t>(bits);
+}
+constexpr std::array<ServiceRule, 10> service_rules = {{
+    {service::session_control, true, 2, values({1, 2, 3})},
+    {service::ecu_reset, false, 2, values({1, 2})},
+    {service::read_data, true, 3, 0},
+    {service::security_access, false, 2, values({uds::security_seed_level, uds::security_key_level})},
+    {service::write_data, false, 4, 0},
+    {service::routine_control, false, 2, values({1, 2, 3})},
+    {service::request_upload, false, 5, 0},
+    {service::transfer_data, false, 2, 0},
+    {service::transfer_exit, false, 1, 0},
+    {service::tester_present, true, 2, values({0})},
+}};
 
 uds::Bytes as_bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
@@ -28,31 +58,48 @@ uds::Bytes as_bytes(const Array& array) requires requires {
   return {array.begin(), array.end()};
 }
 
+const ins::DataIdentifier* find_did(std::uint16_t id) {
+  const auto found = std::ranges::find(ins::data_identifiers, id, &ins::DataIdentifier::id);
+  return found == ins::data_identifiers.end() ? nullptr : &*found;
+}
+
+// Those that take no time to speak of have nothing to stop and no result.
+bool lasts(std::uint16_t routine) {
+  return routine == ins::routine::self_calibration || routine == ins::routine::navigation_check;
+}
+
+tl::unexpected<Nrc> no(Nrc nrc) { return tl::unexpected(nrc); }
+
 }  // namespace
 
 Diagnostics::Diagnostics(Instrument& instrument, const DiagnosticOptions& options)
-    : instrument_(instrument), options_(options) {}
+    : instrument_(instrument),
+      lock_(instrument.flash(), instrument.counters(), options.key, options.seed_salt),
+      upload_(instrument.raw(), options.longest_response) {}
 
 void Diagnostics::power_on(Time now) {
-  session_expired(now);
-  seed_.reset();
-  reset_wanted_ = false;
+  enter(uds::Session::standard);
+  lock_.power_on(now);
+  upload_.forget();
+  reset_wanted_ = calibration_started_ = check_started_ = false;
   answer_.reset();
-  pages_served_ = 0;
-  // The delay survives a reset: else a reset would be the way round it.
-  locked_until_ = instrument_.counters().get().wrong_keys >= free_attempts ? now + delay_after_wrong_keys : Time{0};
 }
 
-void Diagnostics::session_expired(Time) {
-  session_ = uds::Session::standard;
-  unlocked_ = false;
-  upload_.reset();
+// Also into the session that it is in: security goes with every transition (ISO 14229-1, 9.2.1).
+void Diagnostics::enter(uds::Session session) {
+  session_ = session;
+  lock_.close();
+  upload_.drop();
 }
+
+void Diagnostics::session_expired(Time) { enter(uds::Session::standard); }
 
 uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& response, Time now) {
   const double written_before_s = instrument_.flash().ready_at_s();
-  const Reply reply =
-      options_.answer_all_with ? Reply(tl::unexpected(*options_.answer_all_with)) : dispatch(request, now, response);
+  const Reply reply = refusal_ ? Reply(no(*refusal_)) : dispatch(request, now, response);
+  if (lock_.busy()) {
+    return Answer::later;
+  }
   if (!reply) {
     const auto negative = uds::negative_response(request[0], reply.error());
     response.assign(negative.begin(), negative.end());
@@ -68,338 +115,287 @@ uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& respon
 }
 
 std::optional<uds::Bytes> Diagnostics::take_answer() {
+  if (const auto reply = lock_.take_answer(now_s_)) {
+    if (*reply) {
+      return **reply;
+    }
+    const auto negative = uds::negative_response(service::security_access, reply->error());
+    return uds::Bytes(negative.begin(), negative.end());
+  }
   if (!answer_ || now_s_ < answer_->due_s) {
     return std::nullopt;
   }
   return std::exchange(answer_, std::nullopt)->response;
 }
 
-Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& response) {
-  switch (request[0]) {
-    case uds::service::session_control: return session_control(request);
-    case uds::service::ecu_reset: return ecu_reset(request);
-    case uds::service::security_access: return security_access(request, now);
-    case uds::service::read_data: return read_data(request);
-    case uds::service::write_data: return write_data(request);
-    case uds::service::routine_control: return routine(request);
-    case uds::service::request_upload: return request_upload(request);
-    case uds::service::transfer_data: return transfer(request, response);
-    case uds::service::transfer_exit:
-      if (request.size() != 1) {
-        return tl::unexpected(Nrc::incorrect_message_length);
-      }
-      if (!upload_) {
-        return tl::unexpected(Nrc::request_sequence_error);
-      }
-      upload_.reset();
-      return uds::transfer_exit_response();
-    case uds::service::tester_present:
-      if (request.size() != 2) {
-        return tl::unexpected(Nrc::incorrect_message_length);
-      }
-      if ((request[1] & ~uds::suppress_response_bit) != 0) {
-        return tl::unexpected(Nrc::sub_function_not_supported);
-      }
-      return uds::Bytes{uds::service::tester_present + uds::positive_offset, 0};
-    default: return tl::unexpected(Nrc::service_not_supported);
+// Figures 5 and 6, without security, which here belongs to sub-functions, identifiers and routines.
+Nrc Diagnostics::general_objection(View request) const {
+  const auto rule = std::ranges::find(service_rules, request[0], &ServiceRule::id);
+  if (rule == service_rules.end()) {
+    return Nrc::service_not_supported;
   }
+  if (session_ == uds::Session::standard && !rule->in_default_session) {
+    return Nrc::service_not_supported_in_session;
+  }
+  if (request.size() < rule->shortest) {
+    return Nrc::incorrect_message_length;
+  }
+  if (rule->sub_functions != 0) {
+    const unsigned value = request[1] & ~unsigned{uds::suppress_response_bit};
+    if (value > 15 || (rule->sub_functions >> value & 1U) == 0) {
+      return Nrc::sub_function_not_supported;
+    }
+  }
+  return Nrc::none;
 }
 
-Nrc Diagnostics::why_not_change() const {
-  return session_ == uds::Session::standard ? Nrc::service_not_supported_in_session : Nrc::security_access_denied;
+Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& response) {
+  if (const Nrc nrc = general_objection(request); nrc != Nrc::none) {
+    return no(nrc);
+  }
+  switch (request[0]) {
+    case service::session_control: return session_control(request);
+    case service::ecu_reset: return ecu_reset(request);
+    case service::security_access: return security_access(request, now);
+    case service::read_data: return read_data(request);
+    case service::write_data: return write_data(request);
+    case service::routine_control: return routine(request);
+    case service::request_upload: return upload_.request(request);
+    case service::transfer_data: return upload_.transfer(request, response);
+    case service::transfer_exit: return upload_.exit(request);
+    default:
+      return request.size() == 2 ? Reply(uds::Bytes{service::tester_present + uds::positive_offset, 0})
+                                 : Reply(no(Nrc::incorrect_message_length));
+  }
 }
 
 Diagnostics::Reply Diagnostics::session_control(View request) {
   if (request.size() != 2) {
-    return tl::unexpected(Nrc::incorrect_message_length);
+    return no(Nrc::incorrect_message_length);
   }
-  const auto session = static_cast<uds::Session>(request[1] & ~uds::suppress_response_bit);
-  if (session != uds::Session::standard && session != uds::Session::programming && session != uds::Session::extended) {
-    return tl::unexpected(Nrc::sub_function_not_supported);
-  }
-  if (session != session_) {  // a change of session locks again
-    unlocked_ = false;
-    upload_.reset();
-  }
-  session_ = session;
-  return uds::session_response(session, timings);
+  enter(static_cast<uds::Session>(request[1] & ~uds::suppress_response_bit));
+  return uds::session_response(session_, timings);
 }
 
 Diagnostics::Reply Diagnostics::ecu_reset(View request) {
+  if (!lock_.open()) {  // figure 6: security of the sub-function before all that is the service's own
+    return no(Nrc::security_access_denied);
+  }
   if (request.size() != 2) {
-    return tl::unexpected(Nrc::incorrect_message_length);
-  }
-  const auto type = static_cast<std::uint8_t>(request[1] & ~uds::suppress_response_bit);
-  if (type != static_cast<std::uint8_t>(uds::ResetType::hard) &&
-      type != static_cast<std::uint8_t>(uds::ResetType::key_off_on)) {
-    return tl::unexpected(Nrc::sub_function_not_supported);
-  }
-  if (!may_change()) {
-    return tl::unexpected(why_not_change());
+    return no(Nrc::incorrect_message_length);
   }
   reset_wanted_ = true;
-  return uds::Bytes{uds::service::ecu_reset + uds::positive_offset, type};
+  return uds::Bytes{service::ecu_reset + uds::positive_offset,
+                    static_cast<std::uint8_t>(request[1] & ~uds::suppress_response_bit)};
 }
 
 Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
-  if (request.size() < 2) {
-    return tl::unexpected(Nrc::incorrect_message_length);
+  const bool seed_wanted = (request[1] & ~uds::suppress_response_bit) == uds::security_seed_level;
+  if (!seed_wanted && !lock_.seed_given()) {  // figure 6: sequence of the sub-functions
+    return no(Nrc::request_sequence_error);
   }
-  if (session_ == uds::Session::standard) {
-    return tl::unexpected(Nrc::service_not_supported_in_session);
+  if (request.size() != (seed_wanted ? 2 : 2 + uds::seed_bytes)) {
+    return no(Nrc::incorrect_message_length);
   }
-  const auto level = static_cast<std::uint8_t>(request[1] & ~uds::suppress_response_bit);
-  if (level == uds::security_seed_level) {
-    return request.size() == 2 ? give_seed(now) : Reply(tl::unexpected(Nrc::incorrect_message_length));
+  if (seed_wanted) {
+    return lock_.give_seed(now);
   }
-  if (level == uds::security_key_level) {
-    return request.size() == 2 + uds::seed_bytes ? take_key(request.subspan(2), now)
-                                                 : Reply(tl::unexpected(Nrc::incorrect_message_length));
-  }
-  return tl::unexpected(Nrc::sub_function_not_supported);
+  lock_.begin_attempt(request.subspan(2), now);
+  return uds::Bytes{};
 }
 
-Diagnostics::Reply Diagnostics::give_seed(Time now) {
-  if (now < locked_until_) {
-    return tl::unexpected(Nrc::required_time_delay_not_expired);
+std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
+  const auto set = [](const std::optional<ins::Coefficients>& coefficients) {
+    return coefficients ? std::optional(as_bytes(ins::encode(*coefficients))) : std::nullopt;
+  };
+  switch (id) {
+    case ins::did::serial_number: return as_bytes(std::string_view(instrument_.serial()));
+    case ins::did::software_version: return as_bytes(software_version);
+    case ins::did::state: return ins::encode(instrument_.state_record());
+    case ins::did::schedule:
+      return instrument_.schedule() ? std::optional(ins::encode(*instrument_.schedule())) : std::nullopt;
+    case ins::did::site: return ins::encode(instrument_.site());
+    case ins::did::coefficients_in_force: return set(instrument_.coefficients().in_force());
+    case ins::did::coefficients_inactive: return set(instrument_.coefficients().inactive());
+    case ins::did::coefficients_factory: return set(instrument_.coefficients().factory());
+    case ins::did::raw_data_directory: return ins::encode(instrument_.raw().directory());
+    case ins::did::sample_format: return ins::encode(instrument_.sample_format());
+    default: return std::nullopt;
   }
-  std::array<std::uint8_t, uds::seed_bytes> seed{};
-  if (unlocked_) {  // all zeros: nothing to answer
-    return uds::seed_response(seed);
-  }
-  if (options_.seed_salt != 0) {
-    ByteWriter writer(seed);
-    writer.put(options_.seed_salt);
-    writer.put(++seeds_given_);
-  } else if (::getrandom(seed.data(), seed.size(), 0) != static_cast<ssize_t>(seed.size())) {
-    return tl::unexpected(Nrc::conditions_not_correct);
-  }
-  seed_ = seed;
-  return uds::seed_response(seed);
-}
-
-Diagnostics::Reply Diagnostics::take_key(View key, Time now) {
-  if (!seed_) {
-    return tl::unexpected(Nrc::request_sequence_error);
-  }
-  const auto expected = uds::answer_seed(options_.key, *seed_);
-  seed_.reset();  // an answer counts once: a recorded one is worth nothing
-  const Counters& counters = instrument_.counters().get();
-  if (!expected || !uds::equal_in_constant_time(*expected, key)) {
-    const std::uint32_t wrong = counters.wrong_keys + 1;
-    instrument_.counters().set(counters.power_cycles, wrong);
-    if (wrong >= free_attempts) {
-      locked_until_ = now + delay_after_wrong_keys;
-      return tl::unexpected(Nrc::exceeded_number_of_attempts);
-    }
-    return tl::unexpected(Nrc::invalid_key);
-  }
-  if (counters.wrong_keys != 0) {
-    instrument_.counters().set(counters.power_cycles, 0);
-  }
-  unlocked_ = true;
-  return uds::Bytes{uds::service::security_access + uds::positive_offset, uds::security_key_level};
 }
 
 Diagnostics::Reply Diagnostics::read_data(View request) {
-  if (request.size() != 3) {
-    return tl::unexpected(Nrc::incorrect_message_length);
+  if (request.size() != 3) {  // one identifier in a request
+    return no(Nrc::incorrect_message_length);
   }
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  const auto record = [&]() -> std::optional<uds::Bytes> {
-    switch (id) {
-      case ins::did::serial_number: return as_bytes(std::string_view(instrument_.serial()));
-      case ins::did::software_version: return as_bytes(software_version);
-      case ins::did::state: return ins::encode(instrument_.state_record());
-      case ins::did::schedule:
-        return instrument_.schedule() ? std::optional(ins::encode(*instrument_.schedule())) : std::nullopt;
-      case ins::did::site: return ins::encode(instrument_.site());
-      case ins::did::coefficients_in_force: return as_bytes(ins::encode(instrument_.coefficients().in_force()));
-      case ins::did::coefficients_inactive: {
-        const auto set = instrument_.coefficients().inactive();
-        return set ? std::optional(as_bytes(ins::encode(*set))) : std::nullopt;
-      }
-      case ins::did::coefficients_factory: {
-        const auto set = instrument_.coefficients().factory();
-        return set ? std::optional(as_bytes(ins::encode(*set))) : std::nullopt;
-      }
-      case ins::did::raw_data_directory: return ins::encode(instrument_.raw().directory());
-      case ins::did::sample_format: return ins::encode(instrument_.sample_format());
-      default: return std::nullopt;
-    }
-  }();
-  if (!record) {
-    const bool known = std::any_of(ins::data_identifiers.begin(), ins::data_identifiers.end(),
-                                   [id](const ins::DataIdentifier& d) { return d.id == id; });
-    return tl::unexpected(known ? Nrc::conditions_not_correct : Nrc::request_out_of_range);
+  if (find_did(id) == nullptr) {
+    return no(Nrc::request_out_of_range);
   }
-  return uds::read_response(id, *record);
+  const auto content = record(id);
+  return content ? Reply(uds::read_response(id, *content)) : Reply(no(Nrc::conditions_not_correct));
 }
 
+// ISO 14229-1, WriteDataByIdentifier: identifier, its security, total length, record, conditions.
 Diagnostics::Reply Diagnostics::write_data(View request) {
-  if (request.size() < 4) {
-    return tl::unexpected(Nrc::incorrect_message_length);
-  }
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  const View record = request.subspan(3);
-  const auto known = std::find_if(ins::data_identifiers.begin(), ins::data_identifiers.end(),
-                                  [id](const ins::DataIdentifier& d) { return d.id == id; });
-  if (known == ins::data_identifiers.end() || !known->writable) {
-    return tl::unexpected(Nrc::request_out_of_range);
+  const ins::DataIdentifier* const known = find_did(id);
+  if (known == nullptr || !known->writable) {
+    return no(Nrc::request_out_of_range);
   }
-  if (!may_change()) {
-    return tl::unexpected(why_not_change());
+  if (!lock_.open()) {
+    return no(Nrc::security_access_denied);
+  }
+  const View record = request.subspan(3);
+  const Reply written = id == ins::did::schedule ? write_schedule(record)
+                        : id == ins::did::site   ? write_site(record)
+                                                 : write_coefficients(record);
+  return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
+}
+
+Diagnostics::Reply Diagnostics::write_schedule(View record) {
+  if (record.size() != schedule_head_bytes + position_bytes * record[0]) {
+    return no(Nrc::incorrect_message_length);
+  }
+  const auto schedule = ins::decode_schedule(record);
+  if (!schedule || !instrument_.check_schedule(*schedule)) {
+    return no(Nrc::request_out_of_range);
   }
   if (instrument_.busy()) {
-    return tl::unexpected(Nrc::conditions_not_correct);
+    return no(Nrc::conditions_not_correct);
   }
-  if (id == ins::did::schedule) {
-    const auto schedule = ins::decode_schedule(record);
-    if (!schedule || !instrument_.set_schedule(*schedule)) {
-      return tl::unexpected(Nrc::request_out_of_range);
-    }
-  } else if (id == ins::did::site) {
-    const auto site = ins::decode_site(record);
-    if (!site) {
-      return tl::unexpected(Nrc::request_out_of_range);
-    }
-    instrument_.set_site(*site);
-  } else {
-    const auto set = ins::decode_coefficients(record);
-    if (!set) {
-      return tl::unexpected(Nrc::request_out_of_range);
-    }
-    if (!instrument_.coefficients().write_inactive(*set)) {
-      return tl::unexpected(Nrc::general_programming_failure);  // not erased
-    }
-  }
-  return uds::write_response(id);
+  instrument_.set_schedule(*schedule);
+  return uds::Bytes{};
 }
 
+Diagnostics::Reply Diagnostics::write_site(View record) {
+  if (record.size() != site_bytes) {
+    return no(Nrc::incorrect_message_length);
+  }
+  const auto site = ins::decode_site(record);
+  if (!site) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (instrument_.busy()) {
+    return no(Nrc::conditions_not_correct);
+  }
+  instrument_.set_site(*site);
+  return uds::Bytes{};
+}
+
+Diagnostics::Reply Diagnostics::write_coefficients(View record) {
+  if (record.size() != ins::coefficients_bytes) {
+    return no(Nrc::incorrect_message_length);
+  }
+  const auto set = ins::decode_coefficients(record);
+  if (!set) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (instrument_.busy()) {
+    return no(Nrc::conditions_not_correct);
+  }
+  if (!instrument_.coefficients().write_inactive(*set)) {
+    return no(Nrc::general_programming_failure);  // not erased
+  }
+  return uds::Bytes{};
+}
+
+// ISO 14229-1, RoutineControl: length, identifier, its security, sub-function for it, total length, option, sequence,
+// conditions.
 Diagnostics::Reply Diagnostics::routine(View request) {
   const auto call = uds::parse_routine_request(request);
   if (!call) {
-    return tl::unexpected(call.error());
+    return no(call.error());
   }
-  const bool known = std::any_of(ins::routines.begin(), ins::routines.end(),
-                                 [&](const ins::Routine& r) { return r.id == call->routine; });
-  if (!known) {
-    return tl::unexpected(Nrc::request_out_of_range);
+  if (std::ranges::find(ins::routines, call->routine, &ins::Routine::id) == ins::routines.end()) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (!lock_.open()) {
+    return no(Nrc::security_access_denied);
+  }
+  if (call->action == uds::RoutineAction::start) {
+    return start_routine(*call);
+  }
+  if (!lasts(call->routine)) {
+    return no(Nrc::sub_function_not_supported);
+  }
+  if (!call->option.empty()) {
+    return no(Nrc::incorrect_message_length);
+  }
+  const bool calibration = call->routine == ins::routine::self_calibration;
+  if (!(calibration ? calibration_started_ : check_started_)) {
+    return no(Nrc::request_sequence_error);
   }
   if (call->action == uds::RoutineAction::result) {
-    if (call->routine == ins::routine::self_calibration) {
-      return uds::routine_response(*call, ins::encode(instrument_.run_record()));
-    }
-    if (call->routine == ins::routine::navigation_check) {
-      return uds::routine_response(*call, ins::encode(instrument_.navigation_check()));
-    }
-    return uds::routine_response(*call);
+    return routine_result(*call);
   }
-  if (!may_change()) {
-    return tl::unexpected(why_not_change());
-  }
-  if (call->action == uds::RoutineAction::stop) {
-    instrument_.stop();
-    return uds::routine_response(*call);
-  }
-  return start_routine(*call);
+  calibration ? instrument_.stop_rotation() : instrument_.stop_check();
+  return uds::routine_response(*call);
+}
+
+Diagnostics::Reply Diagnostics::routine_result(const uds::RoutineCall& call) {
+  return uds::routine_response(call, call.routine == ins::routine::self_calibration
+                                         ? ins::encode(instrument_.run_record())
+                                         : ins::encode(instrument_.navigation_check()));
 }
 
 Diagnostics::Reply Diagnostics::start_routine(const uds::RoutineCall& call) {
-  ByteReader option(call.option);
-  bool done = false;
-  if (call.routine == ins::routine::self_calibration || call.routine == ins::routine::commit_coefficients) {
-    const auto word = option.get<std::uint32_t>();
-    if (!option.ok() || option.left() != 0) {
-      return tl::unexpected(Nrc::incorrect_message_length);
-    }
-    if (call.routine == ins::routine::commit_coefficients) {
-      if (instrument_.busy()) {
-        return tl::unexpected(Nrc::conditions_not_correct);
-      }
-      if (!instrument_.coefficients().commit_inactive(word)) {
-        return tl::unexpected(Nrc::request_out_of_range);
-      }
-      done = true;
-    } else {
-      done = instrument_.start_rotation(word, now_s_).has_value();
-      pages_served_ = 0;
-      upload_.reset();
-    }
-  } else if (call.routine == ins::routine::erase_inactive) {
-    if (instrument_.busy()) {
-      return tl::unexpected(Nrc::conditions_not_correct);
-    }
-    instrument_.coefficients().erase_inactive();
-    done = true;
-  } else {
-    const auto request = ins::decode_navigation_request(call.option);
-    if (!request) {
-      return tl::unexpected(Nrc::request_out_of_range);
-    }
-    done = instrument_.start_navigation_check(*request, now_s_).has_value();
+  switch (call.routine) {
+    case ins::routine::self_calibration: return start_calibration(call);
+    case ins::routine::commit_coefficients: return commit(call);
+    case ins::routine::navigation_check: return start_check(call);
+    default: break;
   }
-  return done ? Reply(uds::routine_response(call)) : Reply(tl::unexpected(Nrc::conditions_not_correct));
+  if (!call.option.empty()) {
+    return no(Nrc::incorrect_message_length);
+  }
+  if (instrument_.busy()) {
+    return no(Nrc::conditions_not_correct);
+  }
+  instrument_.coefficients().erase_inactive();
+  return uds::routine_response(call);
 }
 
-Diagnostics::Reply Diagnostics::request_upload(View request) {
-  const auto range = uds::parse_upload_request(request);
-  if (!range) {
-    return tl::unexpected(range.error());
+Diagnostics::Reply Diagnostics::start_calibration(const uds::RoutineCall& call) {
+  if (call.option.size() != word_bytes) {
+    return no(Nrc::incorrect_message_length);
   }
-  if (session_ == uds::Session::standard) {
-    return tl::unexpected(Nrc::service_not_supported_in_session);
+  if (!instrument_.start_rotation(ByteReader(call.option).get<std::uint32_t>(), now_s_)) {
+    return no(Nrc::conditions_not_correct);
   }
-  const ins::DirectoryRecord directory = instrument_.raw().directory();
-  const std::uint64_t end = std::uint64_t{range->first_page} * flash::page_bytes + range->bytes;
-  if (range->bytes == 0 || range->first_page < directory.first_page ||
-      end > std::uint64_t{directory.pages_written} * flash::page_bytes) {
-    return tl::unexpected(Nrc::request_out_of_range);
-  }
-  upload_ = Upload{range->first_page, range->bytes, 0, 1, 0};
-  return uds::upload_response(options_.longest_response);
+  calibration_started_ = true;
+  upload_.forget();
+  return uds::routine_response(call);
 }
 
-Diagnostics::Reply Diagnostics::transfer(View request, uds::Bytes& response) {
-  if (request.size() != 2) {
-    return tl::unexpected(Nrc::incorrect_message_length);
+Diagnostics::Reply Diagnostics::commit(const uds::RoutineCall& call) {
+  if (call.option.size() != word_bytes) {
+    return no(Nrc::incorrect_message_length);
   }
-  if (!upload_) {
-    return tl::unexpected(Nrc::request_sequence_error);
+  const auto crc = ByteReader(call.option).get<std::uint32_t>();
+  if (instrument_.coefficients().inactive_crc() != crc) {
+    return no(Nrc::request_out_of_range);
   }
-  Upload& u = *upload_;
-  const std::uint8_t block = request[1];
-  if (block == static_cast<std::uint8_t>(u.next_block - 1) && u.last_size > 0) {
-    u.done -= u.last_size;  // the block before, asked for again
-  } else if (block == u.next_block) {
-    ++u.next_block;
-  } else {
-    return tl::unexpected(Nrc::wrong_block_sequence_counter);
+  if (instrument_.busy()) {
+    return no(Nrc::conditions_not_correct);
   }
-  const auto room = options_.longest_response - static_cast<std::uint32_t>(uds::transfer_overhead);
-  u.last_size = std::min(room, u.bytes - u.done);
-  if (u.last_size == 0) {
-    return tl::unexpected(Nrc::request_sequence_error);
+  instrument_.coefficients().commit_inactive();
+  return uds::routine_response(call);
+}
+
+Diagnostics::Reply Diagnostics::start_check(const uds::RoutineCall& call) {
+  if (call.option.size() != check_request_bytes) {
+    return no(Nrc::incorrect_message_length);
   }
-  uds::Bytes data;
-  data.reserve(u.last_size);
-  for (std::uint32_t at = u.done; at < u.done + u.last_size;) {
-    const std::uint32_t page = u.first_page + at / static_cast<std::uint32_t>(flash::page_bytes);
-    const std::uint32_t offset = at % static_cast<std::uint32_t>(flash::page_bytes);
-    const std::uint32_t part =
-        std::min(static_cast<std::uint32_t>(flash::page_bytes) - offset, u.done + u.last_size - at);
-    const auto bytes = instrument_.raw().page(page).subspan(offset, part);
-    data.insert(data.end(), bytes.begin(), bytes.end());
-    if (instrument_.raw().spoilt() == page && part > 64) {
-      data.back() ^= 0x40;
-      instrument_.raw().mend();
-    }
-    at += part;
+  const auto request = ins::decode_navigation_request(call.option);
+  if (!request) {
+    return no(Nrc::request_out_of_range);
   }
-  u.done += u.last_size;
-  pages_served_ = std::max(pages_served_, u.first_page + u.done / static_cast<std::uint32_t>(flash::page_bytes));
-  uds::transfer_response(block, data, response);
-  return uds::Bytes{};
+  if (!instrument_.start_navigation_check(*request, now_s_)) {
+    return no(Nrc::conditions_not_correct);
+  }
+  check_started_ = true;
+  return uds::routine_response(call);
 }
 
 }  // namespace selfcal::sim

@@ -27,7 +27,6 @@ Expected<FlashMemory> FlashMemory::open(const std::string& path, std::size_t byt
   assert(bytes % flash_block_bytes == 0);
   FlashMemory memory;
   memory.blocks_.resize(bytes / flash_block_bytes);
-  memory.wear_.assign(bytes / flash_block_bytes, 0);
   if (path.empty()) {
     return memory;
   }
@@ -58,7 +57,6 @@ Expected<FlashMemory> FlashMemory::open(const std::string& path, std::size_t byt
 
 FlashMemory::FlashMemory(FlashMemory&& other) noexcept
     : blocks_(std::move(other.blocks_)),
-      wear_(std::move(other.wear_)),
       fd_(std::exchange(other.fd_, -1)),
       file_bytes_(other.file_bytes_),
       budget_(other.budget_),
@@ -68,7 +66,6 @@ FlashMemory::FlashMemory(FlashMemory&& other) noexcept
 
 FlashMemory& FlashMemory::operator=(FlashMemory&& other) noexcept {
   std::swap(blocks_, other.blocks_);
-  std::swap(wear_, other.wear_);
   std::swap(fd_, other.fd_);
   std::swap(file_bytes_, other.file_bytes_);
   std::swap(budget_, other.budget_);
@@ -133,10 +130,7 @@ void FlashMemory::program(std::size_t offset, std::span<const std::uint8_t> byte
   }
 }
 
-void FlashMemory::erase(std::size_t block) {
-  ++wear_[block];
-  operate(block * flash_block_bytes, blank, timings_.erase_s);
-}
+void FlashMemory::erase(std::size_t block) { operate(block * flash_block_bytes, blank, timings_.erase_s); }
 
 double FlashMemory::ready_at_s() const { return pending_.empty() ? now_s_ : pending_.back().end_s; }
 

@@ -42,7 +42,6 @@ class FlashMemory {
   std::span<const std::uint8_t> read(std::size_t offset, std::size_t count) const;
   void program(std::size_t offset, std::span<const std::uint8_t> bytes);  // new = old AND bytes, byte after byte
   void erase(std::size_t block);
-  std::uint32_t erase_count(std::size_t block) const { return wear_[block]; }
   std::size_t size() const { return blocks_.size() * flash_block_bytes; }
 
   // The clock, seconds on any scale that does not go back: what is done by now is done for good.
@@ -75,7 +74,6 @@ class FlashMemory {
   std::uint8_t* place(std::size_t offset);  // with a block of its own behind it
 
   std::vector<std::unique_ptr<Block>> blocks_;  // null: erased, and never written since this process began
-  std::vector<std::uint32_t> wear_;             // since this process began
   int fd_ = -1;
   std::size_t file_bytes_ = 0;
   std::optional<std::uint64_t> budget_;

@@ -87,7 +87,7 @@ void Instrument::power_on(double now_s) {
   stopped_at_s_.reset();
   coefficients_.power_on();
   counters_.power_on();
-  counters_.set(counters_.get().power_cycles + 1, counters_.get().wrong_keys);
+  counters_.set(counters_.get().power_cycles + 1, counters_.get().key_attempts);
   raw_.power_on();
   run_id_ = raw_.directory().run_id;
   faults_ = coefficients_.fell_back() ? ins::fault::coefficients : std::uint8_t{0};
@@ -95,12 +95,8 @@ void Instrument::power_on(double now_s) {
   ready_at_s_ = std::max(now_s + start_up_s, flash_.ready_at_s());
 }
 
-Expected<void> Instrument::set_schedule(const ins::ScheduleRecord& schedule) {
-  if (auto sound = check_schedule(config_.gimbal, as_schedule(schedule)); !sound) {
-    return sound;
-  }
-  schedule_ = schedule;
-  return {};
+Expected<void> Instrument::check_schedule(const ins::ScheduleRecord& schedule) const {
+  return sim::check_schedule(config_.gimbal, as_schedule(schedule));
 }
 
 Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
@@ -138,10 +134,14 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   return {};
 }
 
-void Instrument::stop() {
+void Instrument::stop_rotation() {
   if (state_ == ins::State::rotating) {
     finish_rotation(ins::State::aborted);
-  } else if (state_ == ins::State::checking) {
+  }
+}
+
+void Instrument::stop_check() {
+  if (state_ == ins::State::checking) {
     navigation_.reset();
     state_ = ins::State::idle;
   }

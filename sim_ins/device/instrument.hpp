@@ -38,14 +38,16 @@ class Instrument {
   void advance(double now_s);   // everything due up to then happens
 
   // Self-calibration. Fails with what stands in its way.
-  [[nodiscard]] Expected<void> set_schedule(const ins::ScheduleRecord& schedule);
+  [[nodiscard]] Expected<void> check_schedule(const ins::ScheduleRecord& schedule) const;
+  void set_schedule(const ins::ScheduleRecord& schedule) { schedule_ = schedule; }  // a checked one
   const std::optional<ins::ScheduleRecord>& schedule() const { return schedule_; }
   bool busy() const { return state_ == ins::State::rotating || state_ == ins::State::checking; }
   bool ready() const { return state_ != ins::State::starting; }
   [[nodiscard]] Expected<void> start_rotation(std::uint32_t run_id, double now_s);
-  void stop();
+  void stop_rotation();
 
   [[nodiscard]] Expected<void> start_navigation_check(const ins::NavigationCheckRequest& request, double now_s);
+  void stop_check();
   const ins::NavigationCheckRecord& navigation_check() const { return check_; }
 
   ins::State state() const { return state_; }

@@ -87,12 +87,13 @@ bool CoefficientStore::write_inactive(const ins::Coefficients& set) {
   return true;
 }
 
-bool CoefficientStore::commit_inactive(std::uint32_t crc) {
-  if (!inactive() || ins::stored_crc(record_of(flash_, inactive_slot())) != crc) {
-    return false;
-  }
-  program_word(flash_, block_of(inactive_slot()) * flash_block_bytes + mark_offset, crc ^ mark_key);
-  return true;
+std::optional<std::uint32_t> CoefficientStore::inactive_crc() const {
+  return inactive() ? std::optional(ins::stored_crc(record_of(flash_, inactive_slot()))) : std::nullopt;
+}
+
+void CoefficientStore::commit_inactive() {
+  const std::uint32_t mark = ins::stored_crc(record_of(flash_, inactive_slot())) ^ mark_key;
+  program_word(flash_, block_of(inactive_slot()) * flash_block_bytes + mark_offset, mark);
 }
 
 void CounterStore::power_on() {
@@ -103,20 +104,20 @@ void CounterStore::power_on() {
     Counters c;
     c.generation = reader.get<std::uint32_t>();
     c.power_cycles = reader.get<std::uint32_t>();
-    c.wrong_keys = reader.get<std::uint32_t>();
+    c.key_attempts = reader.get<std::uint32_t>();
     if (reader.get<std::uint32_t>() == flash::crc32c(bytes.first(12)) && c.generation > counters_.generation) {
       counters_ = c;
     }
   }
 }
 
-void CounterStore::set(std::uint32_t power_cycles, std::uint32_t wrong_keys) {
-  counters_ = {counters_.generation + 1, power_cycles, wrong_keys};
+void CounterStore::set(std::uint32_t power_cycles, std::uint32_t key_attempts) {
+  counters_ = {counters_.generation + 1, power_cycles, key_attempts};
   std::array<std::uint8_t, counter_bytes> bytes{};
   ByteWriter writer(bytes);
   writer.put(counters_.generation);
   writer.put(counters_.power_cycles);
-  writer.put(counters_.wrong_keys);
+  writer.put(counters_.key_attempts);
   writer.put(flash::crc32c(std::span(bytes).first(12)));
   const std::size_t block = counter_block + counters_.generation % 2;
   flash_.erase(block);

@@ -41,7 +41,8 @@ class CoefficientStore {
   void erase_inactive();
   bool inactive_blank() const;
   bool write_inactive(const ins::Coefficients& set);  // false: not erased
-  bool commit_inactive(std::uint32_t crc);            // false: no record of this CRC there
+  std::optional<std::uint32_t> inactive_crc() const;  // of the record there, if it is whole
+  void commit_inactive();                             // which must be whole
 
  private:
   std::optional<ins::Coefficients> read(ins::Slot slot) const;
@@ -57,7 +58,7 @@ class CoefficientStore {
 struct Counters {
   std::uint32_t generation = 0;
   std::uint32_t power_cycles = 0;
-  std::uint32_t wrong_keys = 0;  // since the last right one
+  std::uint32_t key_attempts = 0;  // SecurityAccess: keys received since the last right one
 };
 
 class CounterStore {
@@ -65,7 +66,7 @@ class CounterStore {
   explicit CounterStore(FlashMemory& flash) : flash_(flash) {}
   void power_on();
   const Counters& get() const { return counters_; }
-  void set(std::uint32_t power_cycles, std::uint32_t wrong_keys);
+  void set(std::uint32_t power_cycles, std::uint32_t key_attempts);
 
  private:
   FlashMemory& flash_;

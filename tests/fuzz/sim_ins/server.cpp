@@ -155,6 +155,7 @@ class Scene {
     const uds::Bytes response = ask(uds::seed_request());
     if (const auto seed = uds::read_seed_response(response)) {
       ask(uds::key_request(*uds::answer_seed(key, *seed)));
+      pass(120ms);  // the attempt is counted, then judged
     }
     opened_ = opened_ || unit_.diagnostics().unlocked();
   }

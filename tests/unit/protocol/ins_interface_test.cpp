@@ -67,7 +67,7 @@ TEST(StatusFrames, LiteralBytes) {
   status.outer_deg = 270.0;
   status.inner_deg = -90.0;
   status.time_left_s = 2940.0;
-  EXPECT_EQ(test::text(encode_state_frame(status, 0xAB, can_id::status)), "650#12041303020100AB");
+  EXPECT_EQ(test::text(encode_state_frame(status, 0xAB, can_id::status)), "650#52041303020100AB");
   EXPECT_EQ(test::text(encode_gimbal_frame(status, 0xAC, can_id::gimbal)), "651#78697869D87200AC");
 }
 
@@ -76,6 +76,7 @@ RC_GTEST_PROP(StatusFrames, ComeBackToTheirResolution, ()) {
   status.state = static_cast<State>(*rc::gen::inRange(0, 7));
   status.moving = *rc::gen::arbitrary<bool>();
   status.unlocked = *rc::gen::arbitrary<bool>();
+  status.session = *rc::gen::inRange<std::uint8_t>(0, 4);
   status.faults = *rc::gen::arbitrary<std::uint8_t>();
   status.position = *rc::gen::arbitrary<std::uint8_t>();
   status.pages_written = *rc::gen::inRange<std::uint32_t>(0, 1U << 24U);
@@ -85,6 +86,7 @@ RC_GTEST_PROP(StatusFrames, ComeBackToTheirResolution, ()) {
   RC_ASSERT(apply_status_frame(encode_state_frame(status, 0, can_id::status), read));
   RC_ASSERT(apply_status_frame(encode_gimbal_frame(status, 0, can_id::gimbal), read));
   RC_ASSERT(read.state == status.state && read.moving == status.moving && read.unlocked == status.unlocked);
+  RC_ASSERT(read.session == status.session);
   RC_ASSERT(read.faults == status.faults && read.position == status.position);
   RC_ASSERT(read.pages_written == status.pages_written);
   RC_ASSERT(std::abs(read.outer_deg - status.outer_deg) <= 0.005 + 1e-9);  // half of the LSB

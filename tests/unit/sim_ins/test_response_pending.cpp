@@ -137,7 +137,9 @@ class ResponsePending : public testing::Test {
     const auto seed = uds::read_seed_response(response);
     ASSERT_TRUE(seed);
     answer_to(uds::key_request(*uds::answer_seed(key, *seed)));
+    pass(100ms);  // the attempt is counted, then judged
     ASSERT_TRUE(unit_.diagnostics().unlocked());
+    tell(keep_alive);  // S3 begins here
     tick();
     seen_.clear();
   }
@@ -184,17 +186,27 @@ TEST_F(ResponsePending, TheSlowestChipThatIsSoldKeepsTheTimesToo) {
   EXPECT_LE(committed.answers[0].at - committed.asked, p2);
 }
 
-// A wrong key is counted in FLASH before the refusal: nobody saves an attempt by pulling the plug on it.
-TEST_F(ResponsePending, ARefusalThatIsWrittenDownIsAnnouncedAsWell) {
-  tell("640#021001");  // default session: locked
-  pass(10ms);
-  tell("640#021003");
-  pass(10ms);
-  answer_to(uds::seed_request());
-  const Segmented refused = ask_in_frames(uds::key_request(uds::Bytes(16, 0)));
-  ASSERT_THAT(frames(refused.answers), ElementsAre("648#037F2778CCCCCCCC", "648#037F2735CCCCCCCC"));  // invalidKey
-  EXPECT_LE(refused.answers[0].at - refused.asked, p2);
-  EXPECT_GE(refused.answers[1].at - refused.asked, 45ms);
+// An attempt is counted in FLASH and judged by a second write: response-pending, then the answer, at the same times
+// whether the key is right or wrong. A listener with a clock learns nothing before the answer.
+TEST_F(ResponsePending, ARightKeyIsAnsweredWhenAWrongOneIs) {
+  const auto attempt = [&](bool right) {
+    tell("640#021001");  // default session: locked
+    pass(10ms);
+    tell("640#021003");
+    pass(10ms);
+    const uds::Bytes seed = answer_to(uds::seed_request());
+    const auto expected = uds::answer_seed(key, std::span(seed).subspan(2));
+    return ask_in_frames(uds::key_request(right ? uds::Bytes(expected->begin(), expected->end()) : uds::Bytes(16, 0)));
+  };
+  const Segmented wrong = attempt(false);
+  const Segmented right = attempt(true);
+  ASSERT_THAT(frames(wrong.answers), ElementsAre("648#037F2778CCCCCCCC", "648#037F2735CCCCCCCC"));  // invalidKey
+  ASSERT_THAT(frames(right.answers), ElementsAre("648#037F2778CCCCCCCC", "648#026702CCCCCCCCCC"));
+  EXPECT_LE(wrong.answers[0].at - wrong.asked, p2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(wrong.answers[i].at - wrong.asked, right.answers[i].at - right.asked) << i;
+  }
+  EXPECT_GE(wrong.answers[1].at - wrong.asked, 2 * 45ms);
 }
 
 // A chip at the end of its life: 12 s are three times P2*.

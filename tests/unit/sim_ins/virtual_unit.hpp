@@ -17,8 +17,10 @@ class VirtualUnit {
   VirtualUnit(const SimConfig& config, FlashMemory flash, const DiagnosticOptions& diagnostics)
       : config_(config), diagnostic_options_(diagnostics) {
     link_.address = {ins::can_id::response, ins::can_id::request, ins::can_id::functional, false};
-    link_.max_message = 4095;
-    diagnostic_options_.longest_response = 4095;
+    // What fits into a block fits into a message.
+    link_.max_message = diagnostic_options_.longest_response;
+    link_.fd = link_.max_message > 4095;
+    link_.frame_bytes = link_.fd ? can::max_fd_bytes : can::max_classic_bytes;
     boot(std::move(flash));
   }
 

@@ -1,0 +1,89 @@
+#include "sim_ins/device/raw_upload.hpp"
+
+#include <algorithm>
+
+namespace selfcal::sim {
+
+using uds::Nrc;
+using uds::Reply;
+
+void RawUpload::forget() {
+  upload_.reset();
+  pages_served_ = 0;
+}
+
+Reply RawUpload::request(std::span<const std::uint8_t> request) {
+  const auto range = uds::parse_upload_request(request);
+  if (!range) {
+    return tl::unexpected(range.error());
+  }
+  const ins::DirectoryRecord directory = raw_.directory();
+  const std::uint64_t end = std::uint64_t{range->first_page} * flash::page_bytes + range->bytes;
+  if (range->bytes == 0 || range->first_page < directory.first_page ||
+      end > std::uint64_t{directory.pages_written} * flash::page_bytes) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  upload_ = Upload{range->first_page, range->bytes, 0, 1, 0};
+  return uds::upload_response(longest_response_);
+}
+
+// A request that is refused changes nothing: the last block can still be asked for again.
+Reply RawUpload::transfer(std::span<const std::uint8_t> request, uds::Bytes& response) {
+  if (request.size() != 2) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  if (!upload_) {
+    return tl::unexpected(Nrc::request_sequence_error);
+  }
+  Upload next = *upload_;
+  const std::uint8_t block = request[1];
+  if (block == static_cast<std::uint8_t>(next.next_block - 1) && next.last_size > 0) {
+    next.done -= next.last_size;  // the block before, asked for again
+  } else if (block == next.next_block) {
+    ++next.next_block;
+  } else {
+    return tl::unexpected(Nrc::wrong_block_sequence_counter);
+  }
+  const auto room = longest_response_ - static_cast<std::uint32_t>(uds::transfer_overhead);
+  next.last_size = std::min(room, next.bytes - next.done);
+  if (next.last_size == 0) {  // all of it was handed over
+    return tl::unexpected(Nrc::request_sequence_error);
+  }
+  uds::transfer_response(block, data(next), response);
+  next.done += next.last_size;
+  upload_ = next;
+  pages_served_ = std::max(pages_served_, next.first_page + next.done / static_cast<std::uint32_t>(flash::page_bytes));
+  return uds::Bytes{};
+}
+
+uds::Bytes RawUpload::data(const Upload& upload) {
+  constexpr auto page_bytes = static_cast<std::uint32_t>(flash::page_bytes);
+  uds::Bytes data;
+  data.reserve(upload.last_size);
+  const std::uint32_t end = upload.done + upload.last_size;
+  for (std::uint32_t at = upload.done; at < end;) {
+    const std::uint32_t page = upload.first_page + at / page_bytes;
+    const std::uint32_t part = std::min(page_bytes - at % page_bytes, end - at);
+    const auto bytes = raw_.page(page).subspan(at % page_bytes, part);
+    data.insert(data.end(), bytes.begin(), bytes.end());
+    if (raw_.spoilt() == page && part > 64) {
+      data.back() ^= 0x40;
+      raw_.mend();
+    }
+    at += part;
+  }
+  return data;
+}
+
+Reply RawUpload::exit(std::span<const std::uint8_t> request) {
+  if (request.size() != 1) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  if (!upload_ || upload_->done < upload_->bytes) {
+    return tl::unexpected(Nrc::request_sequence_error);
+  }
+  upload_.reset();
+  return uds::transfer_exit_response();
+}
+
+}  // namespace selfcal::sim

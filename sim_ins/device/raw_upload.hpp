@@ -1,0 +1,44 @@
+// RequestUpload, TransferData and RequestTransferExit (ISO 14229-1, 14.3 to 14.5): the pages of the latest run.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "protocol/uds/messages.hpp"
+#include "sim_ins/device/stores.hpp"
+
+namespace selfcal::sim {
+
+class RawUpload {
+ public:
+  // `longest_response` of TransferData, bytes.
+  RawUpload(RawStore& raw, std::uint32_t longest_response) : raw_(raw), longest_response_(longest_response) {}
+
+  void forget();  // power-on, or a run that writes over what was uploaded
+  void drop() { upload_.reset(); }
+  bool active() const { return upload_.has_value(); }
+  // Pages of which the tester has had every byte.
+  std::uint32_t pages_served() const { return pages_served_; }
+
+  [[nodiscard]] uds::Reply request(std::span<const std::uint8_t> request);
+  // Fills `response`, whose capacity is kept; an empty reply is a positive one.
+  [[nodiscard]] uds::Reply transfer(std::span<const std::uint8_t> request, uds::Bytes& response);
+  [[nodiscard]] uds::Reply exit(std::span<const std::uint8_t> request);
+
+ private:
+  struct Upload {
+    std::uint32_t first_page = 0, bytes = 0;
+    std::uint32_t done = 0;  // bytes handed over
+    std::uint8_t next_block = 1;
+    std::uint32_t last_size = 0;  // of the block before, should it be asked for again
+  };
+  uds::Bytes data(const Upload& upload);  // of the block that begins at `done`
+
+  RawStore& raw_;
+  std::uint32_t longest_response_;
+  std::optional<Upload> upload_;
+  std::uint32_t pages_served_ = 0;
+};
+
+}  // namespace selfcal::sim
