@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/geometry/units.hpp"
+#include "protocol/document/document_head.hpp"
 #include "sim_ins/gimbal.hpp"
 #include "sim_ins/imu_simulator.hpp"
 #include "sim_ins/random.hpp"
@@ -124,7 +125,7 @@ Expected<void> write_truth(const std::string& path, const SimConfig& config, std
   if (!errors) {
     return tl::unexpected(errors.error());
   }
-  nlohmann::ordered_json truth;
+  nlohmann::ordered_json truth = document::head(document::truth);
   truth["serial"] = config.serial;
   truth["seed"] = seed;
   truth["parameters"] = nlohmann::ordered_json::array();

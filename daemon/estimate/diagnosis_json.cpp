@@ -87,8 +87,8 @@ std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
   return {};
 }
 
-ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate) {
-  ordered_json j;
+ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate, const document::InputFile& input) {
+  ordered_json j = document::head(document::diagnosis, input);
   j["mismatch"] = d.mismatch;
   j["verdict"] = verdict_name(d.verdict);
   j["false_alarm_rate"] = false_alarm_rate;

@@ -8,6 +8,7 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/result_json.hpp"
+#include "protocol/document/document_head.hpp"
 #include "protocol/recording/hdf5.hpp"
 
 namespace selfcal {
@@ -55,7 +56,11 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   }
   estimate.result = std::move(*result);
   estimate.objections = gate_objections(estimate.result, request.config);
-  estimate.result_json = result_json_text(estimate.result, options, *recording, estimate.warnings);
+  const auto input = document::identify_file(estimate.recording);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  estimate.result_json = result_json_text(estimate.result, options, *recording, estimate.warnings, false, *input);
   return estimate;
 }
 

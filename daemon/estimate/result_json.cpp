@@ -141,9 +141,11 @@ Json consistency_json(const Consistency& consistency) {
 }  // namespace
 
 nlohmann::ordered_json result_json(const CalibrationResult& result, const CalibrationOptions& options,
-                                   const Recording& recording, const std::vector<std::string>& warnings, bool curves) {
+                                   const Recording& recording, const std::vector<std::string>& warnings, bool curves,
+                                   const document::InputFile& input) {
   const Attitude& attitude = result.initial_attitude;
-  Json document = {{"serial", recording.serial},
+  Json document = document::head(document::estimate, input);
+  document.update({{"serial", recording.serial},
                    {"acceptable", acceptable(result)},
                    {"objections", objections(result, options)},
                    {"parameters", parameters_json(result, options)},
@@ -170,7 +172,7 @@ nlohmann::ordered_json result_json(const CalibrationResult& result, const Calibr
                      {"longitude_deg", recording.longitude_deg},
                      {"height_m", recording.height_m}}},
                    {"start_time_utc", recording.start_time_utc},
-                   {"warnings", warnings}};
+                   {"warnings", warnings}});
   if (curves) {
     document["correlation"] = correlation_json(result);
   }
@@ -178,8 +180,9 @@ nlohmann::ordered_json result_json(const CalibrationResult& result, const Calibr
 }
 
 std::string result_json_text(const CalibrationResult& result, const CalibrationOptions& options,
-                             const Recording& recording, const std::vector<std::string>& warnings, bool curves) {
-  return result_json(result, options, recording, warnings, curves).dump();
+                             const Recording& recording, const std::vector<std::string>& warnings, bool curves,
+                             const document::InputFile& input) {
+  return result_json(result, options, recording, warnings, curves, input).dump();
 }
 
 }  // namespace selfcal

@@ -5,6 +5,7 @@
 #include "daemon/host/wall_clock.hpp"
 #include "daemon/store/parameter_trend.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/document/document_head.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 
 namespace selfcal {
@@ -70,7 +71,7 @@ Expected<ordered_json> set_document(const RunStore& store, RunId run, SetRole ro
 }  // namespace
 
 Expected<std::string> run_document(const RunStore& store, const RunRecord& run) {
-  ordered_json document = summary(run);
+  ordered_json document = document::with_head(document::run, summary(run));
   const auto events = store.events(run.id);
   if (!events) {
     return tl::unexpected(events.error());
@@ -100,7 +101,8 @@ Expected<std::string> history_document(const RunStore& store, const std::string&
   if (!runs) {
     return tl::unexpected(runs.error());
   }
-  ordered_json document{{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}};
+  ordered_json document = document::with_head(
+      document::history, {{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}});
   for (const RunRecord& run : *runs) {
     document["runs"].push_back(summary(run));
   }

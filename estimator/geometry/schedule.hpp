@@ -20,8 +20,8 @@ struct Schedule {
   double duration_s() const;
 };
 
-// "table2" (the source's Table 2) or "horizontal" (mission.md: the inner axis is turned while it lies level);
-// every position is held for dwell_s.
+// "table2": Table 2 of Zhang & Jiang (2019). "horizontal": the same up to position 13, then the inner axis is turned
+// while it lies level. Every position is held for dwell_s.
 std::optional<Schedule> named_schedule(std::string_view name, double dwell_s = 150.0, double rotation_s = 5.0);
 
 }  // namespace selfcal

@@ -15,6 +15,9 @@
 
 namespace selfcal {
 
+// What every program takes where no schedule is given.
+inline constexpr std::string_view default_schedule = "horizontal";
+
 // Limits of what is accepted; outside them a schedule is refused (bad_input) with key, index and value.
 inline constexpr std::size_t max_schedule_positions = 255;
 inline constexpr double max_dwell_s = 86400.0;

@@ -6,9 +6,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "bench"))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tools" / "bench"), str(ROOT / "tests" / "documents")]
 
 import bench  # noqa: E402
+import schema_validator  # noqa: E402
 import witness  # noqa: E402
 
 # Where numbers do not matter: four positions, 75 s of the INS's clock at 50 Hz; the
@@ -22,6 +24,18 @@ SHORT_S = 4 * 15.0 + 3 * 5.0
 DONE, ANSWER_IS_NO, USAGE, BAD_INPUT, DEVICE_TROUBLE = 0, 1, 2, 3, 4
 
 
+class ValidatingBench(bench.Bench):
+    """Every JSON document that a test asks for follows its schema."""
+
+    def selfcal(self, *arguments, **more):
+        done = super().selfcal(*arguments, **more)
+        if "--json" in arguments and done.stdout:
+            faults = schema_validator.text_faults(done.stdout)
+            if faults:
+                raise AssertionError(f"selfcal {' '.join(map(str, arguments))}: " + "; ".join(faults))
+        return done
+
+
 class OnBench(unittest.TestCase):
     maxDiff = None
 
@@ -30,7 +44,7 @@ class OnBench(unittest.TestCase):
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
         sim = {"serial": "TEST-0001", "sample_rate_hz": 50.0} | settings.pop("sim", {})
         ins = {"drift_check_s": 0.0, "lost_after_s": 5.0} | settings.pop("ins", {})
-        unit = bench.Bench(folder, speed=settings.pop("speed", 20.0), sim=sim, ins=ins, **settings)
+        unit = ValidatingBench(folder, speed=settings.pop("speed", 20.0), sim=sim, ins=ins, **settings)
         (unit.folder / "short.toml").write_text(SHORT_SCHEDULE, encoding="ascii")
         unit.short = unit.folder / "short.toml"
         self.addCleanup(unit.stop)

@@ -36,6 +36,7 @@ constexpr CheckPolicy lenient{.gaps_are_errors = false, .gimbal_contradiction_is
 
 // A recording with the estimator's view of it; stays where it is, for the view points into it.
 struct Opened {
+  document::InputFile file;
   LoadedRecording loaded;
   std::vector<double> first_temperature;
   ImuData data;
@@ -49,7 +50,12 @@ Expected<std::unique_ptr<Opened>> open(const std::string& path) {
   for (const std::string& warning : loaded->warnings) {
     fmt::print(stderr, "selfcal diagnose: warning: {}: {}\n", path, warning);
   }
+  Expected<document::InputFile> file = document::identify_file(path);
+  if (!file) {
+    return tl::unexpected(file.error());
+  }
   auto opened = std::make_unique<Opened>();
+  opened->file = std::move(*file);
   opened->loaded = std::move(*loaded);
   opened->data = imu_view(opened->loaded.recording, opened->first_temperature);
   return opened;
@@ -64,7 +70,7 @@ diagnosis::DiagnosisOptions options_from(const DiagnoseArguments& arguments) {
   return options;
 }
 
-Expected<int> compare_with(const DiagnoseArguments& arguments, const ImuData& data,
+Expected<int> compare_with(const DiagnoseArguments& arguments, const Opened& recording,
                            const diagnosis::DiagnosisOptions& options) {
   const Expected<std::unique_ptr<Opened>> simulation = open(arguments.against);
   if (!simulation) {
@@ -72,7 +78,7 @@ Expected<int> compare_with(const DiagnoseArguments& arguments, const ImuData& da
   }
   const diagnosis::ComparisonOutcome outcome = [&] {
     ProgressLine line;
-    return diagnosis::compare(data, (*simulation)->data, options,
+    return diagnosis::compare(recording.data, (*simulation)->data, options,
                               [&line](const std::string& words) { line.show(words); });
   }();
   if (!outcome.comparison) {
@@ -80,8 +86,9 @@ Expected<int> compare_with(const DiagnoseArguments& arguments, const ImuData& da
                 fmt::format("{} against {}: {}", arguments.recording, arguments.against, outcome.failure));
   }
   if (arguments.json) {
-    nlohmann::ordered_json json = comparison_json(*outcome.comparison, arguments.false_alarm_rate);
+    nlohmann::ordered_json json = comparison_json(*outcome.comparison, arguments.false_alarm_rate, recording.file);
     json["against"] = arguments.against;
+    json["against_sha256"] = (*simulation)->file.sha256;
     fmt::print("{}\n", json.dump());
   } else {
     fmt::print("{}", comparison_text(*outcome.comparison));
@@ -146,8 +153,9 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
 }
 
 // There is no physics to try on another recording, to split or to write.
-Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis) {
-  fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate).dump() + "\n"
+Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
+                          const document::InputFile& file) {
+  fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate, file).dump() + "\n"
                                   : diagnosis_text(diagnosis));
   for (const std::string* asked :
        {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
@@ -167,7 +175,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   const ImuData& data = (*opened)->data;
   const diagnosis::DiagnosisOptions options = options_from(arguments);
   if (!arguments.against.empty()) {
-    return compare_with(arguments, data, options);
+    return compare_with(arguments, **opened, options);
   }
   const diagnosis::DiagnosisOutcome outcome = [&] {
     ProgressLine line;
@@ -178,7 +186,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   }
   const diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
   if (!diagnosis.faults.empty()) {
-    return tell_faults(arguments, diagnosis);
+    return tell_faults(arguments, diagnosis, (*opened)->file);
   }
   const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
   if (!holdout) {
@@ -193,7 +201,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     description = diagnosis::describe_empirically(data, diagnosis, arguments.false_alarm_rate);
   }
   if (arguments.json) {
-    nlohmann::ordered_json json = diagnosis_json(diagnosis, arguments.false_alarm_rate);
+    nlohmann::ordered_json json = diagnosis_json(diagnosis, arguments.false_alarm_rate, (*opened)->file);
     if (*holdout) {
       json["holdout"] = holdout_json(**holdout);
     }

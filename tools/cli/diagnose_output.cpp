@@ -108,8 +108,10 @@ ordered_json to_json(const diagnosis::HeldOutState& s) {
 
 }  // namespace
 
-ordered_json comparison_json(const diagnosis::Comparison& c, double false_alarm_rate) {
+ordered_json comparison_json(const diagnosis::Comparison& c, double false_alarm_rate,
+                             const document::InputFile& recording) {
   ordered_json j = diagnosis_json(c.diagnosis, false_alarm_rate);
+  j.update(document::head(document::comparison, recording));
   for (int k = 0; k < sensor_parameter_count; ++k) {
     const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
     j["parameters"][static_cast<std::size_t>(k)] = {{"name", p.name},

@@ -9,12 +9,14 @@
 #include "estimator/diagnosis/empirical.hpp"
 #include "estimator/diagnosis/holdout.hpp"
 #include "estimator/diagnosis/isolability.hpp"
+#include "protocol/document/document_head.hpp"
 
 namespace selfcal::cli {
 
 std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis);
 // The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
-nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate);
+nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate,
+                                       const document::InputFile& recording);
 std::string comparison_text(const diagnosis::Comparison& comparison);
 nlohmann::ordered_json empirical_json(const diagnosis::EmpiricalDescription& description);
 std::string empirical_text(const diagnosis::EmpiricalDescription& description);

@@ -67,7 +67,12 @@ Expected<int> estimate(const EstimateArguments& arguments) {
     return fail(result.error().kind, fmt::format("{}: {}", arguments.recording, result.error().message));
   }
   if (arguments.json) {
-    fmt::print("{}\n", result_json_text(*result, *options, loaded->recording, loaded->warnings, arguments.curves));
+    const Expected<document::InputFile> input = document::identify_file(arguments.recording);
+    if (!input) {
+      return tl::unexpected(input.error());
+    }
+    fmt::print("{}\n",
+               result_json_text(*result, *options, loaded->recording, loaded->warnings, arguments.curves, *input));
   } else {
     fmt::print("{}", result_table(*result, *options, loaded->recording, use_colour(stdout)));
   }

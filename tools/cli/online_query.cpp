@@ -7,6 +7,7 @@
 #include "daemon/host/state_lock.hpp"
 #include "daemon/store/database_copies.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/document/document_head.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_text.hpp"
@@ -96,7 +97,7 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
     return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
   }
   if (options.json) {
-    fmt::print("{}\n", nlohmann::ordered_json{{"instruments", all}}.dump());
+    fmt::print("{}\n", document::with_head(document::status, {{"instruments", all}}).dump());
     return 0;
   }
   for (const auto& ins : all) {
@@ -135,7 +136,7 @@ Expected<int> abort_run(ManagerClient& manager, const Options& options) {
     return tl::unexpected(asked.error());
   }
   if (options.json) {
-    fmt::print("{}\n", nlohmann::json{{"ins", *ins}, {"stopping", true}}.dump());
+    fmt::print("{}\n", document::with_head(document::request, {{"ins", *ins}, {"stopping", true}}).dump());
   }
   return 0;
 }
@@ -188,7 +189,9 @@ Expected<int> check_database(ManagerClient& manager, const Options& options) {
     return tl::unexpected(complaint.error());
   }
   if (options.json) {
-    fmt::print("{}\n", nlohmann::json{{"sound", complaint->empty()}, {"complaint", *complaint}}.dump());
+    fmt::print(
+        "{}\n",
+        document::with_head(document::database, {{"sound", complaint->empty()}, {"complaint", *complaint}}).dump());
   } else {
     fmt::print("{}\n", complaint->empty() ? "the database is sound" : *complaint);
   }
@@ -200,12 +203,12 @@ Expected<int> backup_database(ManagerClient& manager, const Options& options) {
   if (!path) {
     return tl::unexpected(path.error());
   }
-  fmt::print("{}\n", options.json ? nlohmann::json{{"path", *path}}.dump() : *path);
+  fmt::print("{}\n", options.json ? document::with_head(document::database, {{"path", *path}}).dump() : *path);
   return 0;
 }
 
 Expected<int> say_restored(const std::string& kept, const Options& options) {
-  fmt::print("{}\n", options.json   ? nlohmann::json{{"kept", kept}}.dump()
+  fmt::print("{}\n", options.json   ? document::with_head(document::database, {{"kept", kept}}).dump()
                      : kept.empty() ? std::string("restored")
                                     : "restored; the former database is " + kept);
   return 0;

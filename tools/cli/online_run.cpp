@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/document/document_head.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_text.hpp"
@@ -226,7 +227,8 @@ Expected<int> run(const RunOptions& options) {
     return tl::unexpected(id.error());
   }
   if (options.detach) {
-    fmt::print("{}\n", options.json ? fmt::format("{{\"run\":{}}}", *id) : fmt::format("run {}", *id));
+    fmt::print("{}\n", options.json ? document::with_head(document::request, {{"run", *id}}).dump()
+                                    : fmt::format("run {}", *id));
     return 0;
   }
   const auto ending = follower.follow(*id);

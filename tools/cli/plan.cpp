@@ -9,6 +9,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "estimator/planning/plan.hpp"
+#include "protocol/document/document_head.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
 #include "tools/cli/command.hpp"
@@ -20,7 +21,7 @@ namespace selfcal::cli {
 namespace {
 
 struct PlanArguments {
-  std::string schedule = "table2";
+  std::string schedule{default_schedule};
   std::optional<double> dwell_s;
   std::optional<double> rotation_s;
   std::vector<double> attitude_deg = {0.0, 0.0, 0.0};  // roll, pitch, heading
@@ -219,7 +220,17 @@ Expected<int> plan(const PlanArguments& a) {
     }
   }
   if (a.json) {
-    fmt::print("{}\n", plan_json(result, schedule, *installation, warnings).dump(1));
+    document::InputFile input;
+    if (!a.optimize && !named_schedule(a.schedule)) {  // then it was read from a file
+      const Expected<document::InputFile> file = document::identify_file(a.schedule);
+      if (!file) {
+        return tl::unexpected(file.error());
+      }
+      input = *file;
+    }
+    fmt::print(
+        "{}\n",
+        document::with_head(document::plan, plan_json(result, schedule, *installation, warnings), input).dump(1));
   } else {
     print_table(result, schedule, *installation);
     if (a.optimize) {

@@ -11,6 +11,7 @@
 
 #include "estimator/diagnosis/poses.hpp"
 #include "estimator/geometry/units.hpp"
+#include "protocol/document/document_head.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "tools/cli/command.hpp"
 
@@ -140,7 +141,11 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.file, d.failure));
   }
   if (arguments.json) {
-    fmt::print("{}\n", answer_json(d).dump());
+    const Expected<document::InputFile> file = document::identify_file(arguments.file);
+    if (!file) {
+      return tl::unexpected(file.error());
+    }
+    fmt::print("{}\n", document::with_head(document::poses, answer_json(d), *file).dump());
   } else {
     fmt::print("{}", answer_text(d));
   }

@@ -14,7 +14,7 @@ namespace {
 
 struct SimulateArguments {
   std::string config;
-  std::string schedule = "table2";
+  std::string schedule{default_schedule};
   std::optional<double> dwell_s;
   std::optional<double> rotation_s;
   std::uint64_t seed = 1;

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "protocol/schedule_file/schedule_file.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -21,6 +23,7 @@ TEST(Config, TheShippedFileIsWellFormedAndHoldsTheDefaults) {
   ASSERT_TRUE(config) << config.error().message;
   const InsConfig defaults;
   const InsConfig& shipped = config->instruments.at(0);
+  EXPECT_EQ(defaults.schedule, default_schedule);  // that of the command line
   EXPECT_EQ(shipped.request_id, defaults.request_id);
   EXPECT_EQ(shipped.response_id, defaults.response_id);
   EXPECT_EQ(shipped.status_id, defaults.status_id);
