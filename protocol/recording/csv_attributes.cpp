@@ -37,7 +37,7 @@ Expected<std::string> sound_text(const TomlFile& file, std::string_view key) {
 }
 
 // A TOML basic string. text_fault() keeps control characters out of what we write.
-std::string quoted(std::string_view text) {
+std::string toml_string(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') {
@@ -101,8 +101,8 @@ Expected<Recording> parse_attributes(std::string_view toml, const std::string& n
 }
 
 std::string format_attributes(const Recording& recording) {
-  std::string text = fmt::format("format = {}\nversion = {}\nserial = {}\n", quoted(recording_format),
-                                 recording_version, quoted(recording.serial));
+  std::string text = fmt::format("format = {}\nversion = {}\nserial = {}\n", toml_string(recording_format),
+                                 recording_version, toml_string(recording.serial));
   const auto add = [&text](std::string_view key, double value) {
     text += fmt::format("{} = {}\n", key, number_text(value));
   };
@@ -117,7 +117,7 @@ std::string format_attributes(const Recording& recording) {
     add("rotation_s", *recording.rotation_s);
   }
   if (!recording.start_time_utc.empty()) {
-    text += fmt::format("start_time_utc = {}\n", quoted(recording.start_time_utc));
+    text += fmt::format("start_time_utc = {}\n", toml_string(recording.start_time_utc));
   }
   if (!recording.schedule_deg.empty()) {
     text += "# outer, inner\nschedule_deg = [\n";
