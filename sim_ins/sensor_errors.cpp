@@ -10,7 +10,7 @@ Vector3 group(const SensorErrors& errors, int first) {
 
 }  // namespace
 
-// mission.md: df = bias + K+ max(f,0) + K- max(-f,0), then the lower-triangular misalignment.
+// tools/handbook/frames-and-signs.md: df = bias + K+ max(f,0) + K- max(-f,0), then the lower-triangular misalignment.
 Vector3 accel_error(const SensorErrors& errors, const Vector3& f) {
   const Vector3 A = group(errors, parameter::accel_misalignment);  // yx zx zy
   Vector3 df = group(errors, parameter::accel_bias) +

@@ -1,4 +1,4 @@
-// Rotations by their group laws, and the signs of mission.md by cases worked out by hand.
+// Rotations by their group laws, and the signs of tools/handbook/frames-and-signs.md by cases worked out by hand.
 #include <gtest/gtest.h>
 
 #include <random>

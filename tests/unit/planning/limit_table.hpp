@@ -1,4 +1,4 @@
-// The published table of the physical limit (mission.md), and how its printed figures are compared.
+// The published table of the physical limit (lower bounds from covariance analysis), and how its printed figures are compared.
 #pragma once
 
 #include <Eigen/Core>

@@ -29,7 +29,7 @@ double sigma_along(const Plan& plan, const UndeterminedDirection& direction, con
   return std::sqrt(weight.dot(plan.covariance * weight));
 }
 
-// Table 2 on a level base turns the inner axis only while it is vertical (mission.md): two directions stay open.
+// Table 2 on a level base turns the inner axis only while it is vertical: two directions stay open.
 TEST(Remedy, NamedTurnsDetermineTheDirection) {
   const Installation installation = level_base();
   const Schedule table2 = *named_schedule("table2");

@@ -19,7 +19,7 @@ SensorErrors one(int index, double value) {
   return errors;
 }
 
-// mission.md, "Frames and signs", number by number.
+// tools/handbook/frames-and-signs.md, number by number.
 TEST(SensorErrors, SignsAreTheMissions) {
   const Vector3 f(2.0, -3.0, 5.0);
   using V = Vector3;

@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 using test::run_selfcal;
 
-// interfaces.md, written out: the program's own table must not be its own witness.
+// tools/handbook/parameters.md, written out: the program's own table must not be its own witness.
 const std::vector<std::pair<std::string, std::string>> names_and_units = {{"accel_bias_x", "ug"},
                                                                           {"accel_bias_y", "ug"},
                                                                           {"accel_bias_z", "ug"},

@@ -1,0 +1,264 @@
+// The handbook's pages that are made from the programs' own tables: `selfcal_write_handbook FOLDER`. The pages are kept
+// beside this file; ctest -R documents.generated compares them with what this program writes.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <set>
+#include <string>
+
+#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+#include "estimator/passes/calibration.hpp"
+#include "protocol/flash/page.hpp"
+#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/ins_interface/record_fields.hpp"
+#include "protocol/ins_interface/status.hpp"
+#include "protocol/isotp/transport.hpp"
+#include "protocol/uds/client.hpp"
+#include "protocol/uds/server.hpp"
+#include "sim_ins/config.hpp"
+#include "sim_ins/physics.hpp"
+
+namespace {
+
+using namespace selfcal;
+
+std::string made_from(std::string_view source) {
+  return fmt::format("<!-- Made by selfcal_write_handbook from {}. Change that, not this page. -->\n\n", source);
+}
+
+std::string words(const diagnosis::Effect& e) {
+  if (e.parameters.empty()) {
+    return "-";
+  }
+  // Parameters of one unit and size stand together: "x y z: 50 ug".
+  std::string text;
+  for (std::size_t first = 0; first < e.parameters.size();) {
+    const diagnosis::EffectParameter& p = e.parameters[first];
+    std::size_t end = first;
+    std::string names;
+    while (end < e.parameters.size() && e.parameters[end].unit == p.unit && e.parameters[end].typical == p.typical) {
+      names += (names.empty() ? "" : " ") + e.parameters[end++].name;
+    }
+    text += fmt::format("{}`{}`: {:g} {}", text.empty() ? "" : "; ", names, p.typical, p.unit);
+    first = end;
+  }
+  return text;
+}
+
+std::string effects_page() {
+  std::string text = "# Catalogue of effects\n\n" + made_from("estimator/diagnosis and sim_ins/physics.cpp");
+  text +=
+      R"(An effect is physics that the 24 parameters leave out. `selfcal diagnose` names effects by these ids, and a physics file
+conceals them in a simulation. In the equations *i* is a sensor axis, *u* the specific force over g, *f* the specific force, *w*
+the angular rate, *s* the time since the end of the last turn, *t* the time since the start, *T* the temperature less its mean.
+`df` and `dw` add to the sensor's output. The typical size is what such sensors show; the diagnosis states for each recording
+with which significance it would see that size (`expected_z` in its JSON).
+
+## Effects that the diagnosis names
+
+)";
+  for (const diagnosis::Effect& e : diagnosis::catalogue()) {
+    text += fmt::format("### {}{}\n\n", e.id, e.needs_temperature ? " (with a temperature channel)" : "");
+    text += fmt::format("    {}\n\n- coefficients and typical size: {}\n", e.equation, words(e));
+    if (e.constants.empty() || !std::isnan(e.constants.front())) {
+      text += fmt::format("- constant: {}, fitted\n",
+                          e.constant_name.empty() ? std::string("periods found in the recording")
+                                                  : fmt::format("`{}` in {}", e.constant_name, e.constant_unit));
+    }
+    text += fmt::format("- where it shows: {}\n- what tells it from its rivals: {}\n\n", e.excited, e.experiment);
+  }
+  text +=
+      R"(The diagnosis also reports the stochastic part (`gyro_noise_level`, `accel_noise_level`, `gyro_random_walk`,
+`accel_random_walk`, `quantisation`, `vibration_line`) and faults of the data, such as `lost_samples`.
+
+## Keys of a physics file
+
+A physics file conceals effects in `selfcal simulate` and `sim_ins`: `[[effect]]`, an `id`, and any of these keys. A key that is
+left out has the value of the last column. Several effects add up.
+
+| id | key | unit | if left out |
+|---|---|---|---|
+)";
+  for (const sim::EffectDescription& e : sim::physics_effects()) {
+    for (std::size_t first = 0; first < e.parameters.size();) {
+      const sim::EffectParameter& p = e.parameters[first];
+      const std::string id =
+          first > 0 ? "" : fmt::format("`{}`{}", e.id, e.in_catalogue ? "" : " (not in the catalogue)");
+      std::string keys;
+      for (; first < e.parameters.size() && e.parameters[first].unit == p.unit &&
+             e.parameters[first].default_value == p.default_value;
+           ++first) {
+        keys += fmt::format("{}`{}`", keys.empty() ? "" : " ", e.parameters[first].name);
+      }
+      text += fmt::format("| {} | {} | {} | {:g} |\n", id, keys, p.unit, p.default_value);
+    }
+  }
+  return text;
+}
+
+std::string milliseconds(Time time) {
+  return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
+}
+
+std::string record_tables() {
+  std::string text;
+  for (const ins::RecordLayout& record : ins::record_layouts()) {
+    std::size_t offset = 0;
+    bool open_ended = false;
+    text += fmt::format("### {}\n\n{}\n\n| offset | field | type | meaning |\n|---|---|---|---|\n", record.name,
+                        record.what);
+    for (const ins::RecordField& f : record.fields) {
+      const std::string type =
+          f.count == 1 ? std::string(ins::name(f.type)) : fmt::format("{}[{}]", ins::name(f.type), f.count);
+      text += fmt::format("| {} | {} | {} | {} |\n", offset, f.name, type, f.meaning);
+      offset += ins::bytes(f);
+      open_ended = open_ended || f.repeated;
+    }
+    text +=
+        fmt::format("\n{} bytes{}.\n\n", offset, open_ended ? " with one position, 12 more with each further one" : "");
+  }
+  return text;
+}
+
+std::string interface_page() {
+  std::string text = "# INS interface\n\n" + made_from("protocol/ins_interface");
+  text +=
+      R"(How the service speaks to an INS: UDS (ISO 14229-1) over ISO-TP (ISO 15765-2) on classic CAN or CAN FD. `config/selfcal.dbc`
+holds the two status frames for CAN tools. Records and raw pages are big-endian; the signals of the status frames are
+little-endian.
+
+## CAN identifiers
+
+| identifier | direction | use |
+|---|---|---|
+)";
+  text += fmt::format("| 0x{:03X} | tester to INS | requests (key `request_id`) |\n", ins::can_id::request);
+  text += fmt::format("| 0x{:03X} | INS to tester | responses (key `response_id`) |\n", ins::can_id::response);
+  text += fmt::format("| 0x{:03X} | tester to all | TesterPresent (key `functional_id`) |\n", ins::can_id::functional);
+  text += fmt::format("| 0x{:03X} | INS to all | state frame, periodic (key `status_id`) |\n", ins::can_id::status);
+  text += fmt::format("| 0x{:03X} | INS to all | gimbal frame, periodic |\n", ins::can_id::gimbal);
+  text += "\n## Data identifiers\n\n| DID | name | content | write |\n|---|---|---|---|\n";
+  for (const ins::DataIdentifier& d : ins::data_identifiers) {
+    text += fmt::format("| 0x{:04X} | {} | {} | {} |\n", d.id, d.name, d.content,
+                        !d.writable                        ? "no"
+                        : d.write == ins::Access::unlocked ? "extended session, unlocked"
+                                                           : "yes");
+  }
+  text += R"(
+## Routines
+
+All need the extended session and the unlocked state.
+
+| routine | name | actions |
+|---|---|---|
+)";
+  for (const ins::Routine& r : ins::routines) {
+    text += fmt::format("| 0x{:04X} | {} | {} |\n", r.id, r.name, r.content);
+  }
+  text += "\n## Records\n\n" + record_tables();
+  text += R"(## Status frames
+
+Eight bytes each, little-endian, start bit as in a DBC.
+
+| frame | signal | start bit | bits | factor | range | unit | values |
+|---|---|---|---|---|---|---|---|
+)";
+  for (const ins::Signal& s : ins::status_signals) {
+    text += fmt::format("| 0x{:03X} | {} | {} | {} | {:g} | {:g} to {:.10g} | {} | {} |\n", s.frame_id, s.name,
+                        s.start_bit, s.bits, s.factor, s.minimum, s.maximum, s.unit, s.values);
+  }
+  text += fmt::format(R"(
+## Raw data
+
+RequestUpload (0x35) addresses pages, not bytes: page *p* of the latest run, in multiples of {} bytes. A page has {} bytes of
+header and up to {} samples of {} bytes; unused room is 0xFF:
+
+| offset | field | type |
+|---|---|---|
+| 0 | magic "SCRP" | u32 |
+| 4 | format, {} | u16 |
+| 6 | number of samples | u16 |
+| 8 | run id | u32 |
+| 12 | sequence, from 0 | u32 |
+| 16 | index of the first sample | u64 |
+| 24 | temperature, 0.01 degC | i16 |
+| 26 | flags: {} last of the run, {} a sensor was saturated | u16 |
+| 28 | reserved, 0 | u32 |
+| 32 | CRC-32C of all {} bytes, this field taken as 0 | u32 |
+
+A sample is three i32 of delta theta, three i32 of delta v, and u16 outer and inner angle, in counts; DID `sampleFormat` says what
+a count is worth. Sample *i* of the run ends at (i + 1) / rate.
+
+)",
+                      flash::page_bytes, flash::page_header_bytes, flash::samples_per_page, flash::sample_bytes,
+                      flash::page_format, flash::page_flag::last_of_run, flash::page_flag::sensor_saturated,
+                      flash::page_bytes);
+  const uds::ServerTimings server;
+  const uds::ClientTimings client;
+  const isotp::Options transport;
+  text += "## Timing\n\n| time | value | meaning |\n|---|---|---|\n";
+  text += fmt::format("| P2 (INS) | {} | the virtual INS answers within it, or says response-pending |\n",
+                      milliseconds(server.p2));
+  text += fmt::format("| P2* (INS) | {} | the same after response-pending |\n", milliseconds(server.p2_star));
+  text += fmt::format("| S3 | {} | without a request: default session, locked |\n", milliseconds(server.s3));
+  text += fmt::format(
+      "| P2 (tester) | {} | to the first frame of the answer, bus delay included; key `request_timeout_s` sets it for "
+      "an INS |\n",
+      milliseconds(client.p2));
+  text += fmt::format("| response-pending | {} | altogether, for one request |\n", milliseconds(client.pending_limit));
+  text += fmt::format("| TesterPresent | {} | interval |\n", milliseconds(client.tester_present));
+  text += fmt::format("| N_As, N_Bs, N_Cr | {}, {}, {} | of ISO 15765-2 |\n", milliseconds(transport.n_as),
+                      milliseconds(transport.n_bs), milliseconds(transport.n_cr));
+  text += R"(
+## Unlocking
+
+SecurityAccess (0x27) level 1 gives a seed of 16 bytes; the key is AES-CMAC-128 of the seed (NIST SP 800-38B, RFC 4493) with the
+secret of the INS, 32 hexadecimal digits in the key file. Everything that writes or turns needs the extended session and the
+unlocked state.
+)";
+  return text;
+}
+
+std::string parameters_page() {
+  std::string text = "# The 24 parameters\n\n" + made_from("estimator/geometry/sensor_parameters and estimator/passes");
+  text +=
+      R"(Names, units and order are the same in every file, document and record. The tolerance is the largest sigma with which a
+parameter counts as determined where nothing else is configured. [Frames and signs](frames-and-signs.md) has the equations.
+
+| name | unit | SI value of the unit | default tolerance (sigma) |
+|---|---|---|---|
+)";
+  const CalibrationOptions options;
+  for (std::size_t k = 0; k < sensor_parameters.size(); ++k) {
+    const SensorParameter& p = sensor_parameters[k];
+    text += fmt::format("| `{}` | {} | {:.9g} | {:.4g} |\n", p.name, p.unit, p.si_per_unit,
+                        options.tolerance(static_cast<Eigen::Index>(k)) / p.si_per_unit);
+  }
+  return text;
+}
+
+bool write(const std::string& folder, const char* file, const std::string& text) {
+  std::ofstream out(folder + "/" + file);
+  out << text;
+  out.close();
+  if (!out) {
+    fmt::print(stderr, "selfcal_write_handbook: {}/{}: cannot be written\n", folder, file);
+  }
+  return out.good();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    fmt::print(stderr, "usage: selfcal_write_handbook FOLDER\n");
+    return 2;
+  }
+  const bool well = write(argv[1], "effects.md", effects_page()) &&
+                    write(argv[1], "ins-interface.md", interface_page()) &&
+                    write(argv[1], "parameters.md", parameters_page());
+  return well ? 0 : 3;
+}
