@@ -168,7 +168,12 @@ void Transport::end_reception() {
 
 void Transport::on_first(const FirstFrame& first, Time now, Events& events) {
   end_reception_for_new_message(events);
+  announced_ = first.length;
   if (first.length > options_.max_message) {
+    const std::size_t kept = std::min(first.payload.size(), receiver_.buffer.size());
+    std::ranges::copy(first.payload.first(kept), receiver_.buffer.begin());
+    receiver_.done = kept;
+    message_ = incoming();
     owe_flow_control(FlowStatus::overflow, now);
     events.add(Result::message_too_long);
     return;
@@ -182,6 +187,13 @@ void Transport::on_first(const FirstFrame& first, Time now, Events& events) {
   receiver_.waits = 0;
   events.add(Result::reception_started);
   grant_or_wait(now, events);
+}
+
+void Transport::refuse_incoming(Time now) {
+  if (receiver_.active) {
+    end_reception();
+    owe_flow_control(FlowStatus::overflow, now);
+  }
 }
 
 void Transport::grant_or_wait(Time now, Events& events) {

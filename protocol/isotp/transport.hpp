@@ -102,8 +102,13 @@ class Transport {
   // Like next_deadline, but without the time-out of frames that wait for the bus: when pending() will have something.
   std::optional<Time> next_transmission() const;
 
-  // The last message received; valid until the next on_frame().
+  // The last message received; valid until the next on_frame(). After message_too_long: its first bytes.
   std::span<const std::uint8_t> message() const { return message_; }
+  // The message that is being received, or was refused as too long: its first bytes and its length as announced.
+  std::span<const std::uint8_t> incoming() const { return std::span(receiver_.buffer).first(receiver_.done); }
+  std::uint32_t announced() const { return announced_; }
+  // Right after reception_started: the sender is told that there is no room (overflow), and nothing is received.
+  void refuse_incoming(Time now);
 
   // While held, a peer that wants to send gets WAIT (repeated each n_bs/2, at most max_wait_frames times).
   void hold_reception(bool hold, Time now);
@@ -167,6 +172,7 @@ class Transport {
   Options options_;
   Sender sender_;
   Receiver receiver_;
+  std::uint32_t announced_ = 0;  // by the last first frame
   Owed flow_;
   Owed functional_;
   bool held_ = false;

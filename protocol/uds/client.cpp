@@ -6,10 +6,15 @@
 namespace selfcal::uds {
 namespace {
 
-// Bytes after the service that a positive response repeats and that say what it is about: the identifier of a record, and
-// of a routine behind its sub-function.
+// Bytes after the service that a positive response repeats and that say what it is about: the sub-function, the block
+// counter, the identifier of a record, and that of a routine behind its sub-function.
 std::size_t identifier_size(std::uint8_t service) {
   switch (service) {
+    case service::session_control:
+    case service::ecu_reset:
+    case service::security_access:
+    case service::transfer_data:
+    case service::tester_present: return 1;
     case service::read_data:
     case service::write_data: return 2;
     case service::routine_control: return 3;
@@ -17,11 +22,25 @@ std::size_t identifier_size(std::uint8_t service) {
   }
 }
 
+constexpr Time bus_delay = std::chrono::milliseconds(100);
+constexpr Time longest_p2 = std::chrono::seconds(10);
+constexpr Time longest_p2_star = std::chrono::seconds(30);
+
+Time with_stated(Time configured, Time stated, Time longest) {
+  return stated > longest ? configured : std::max(configured, stated + bus_delay);
+}
+
 }  // namespace
+
+ClientTimings with_stated(ClientTimings configured, const SessionTimings& stated) {
+  configured.p2 = with_stated(configured.p2, stated.p2, longest_p2);
+  configured.p2_star = with_stated(configured.p2_star, stated.p2_star, longest_p2_star);
+  return configured;
+}
 
 Client::Client(const isotp::Options& options, const ClientTimings& timings) : transport_(options), timings_(timings) {}
 
-bool Client::request(std::span<const std::uint8_t> message, Time now) {
+bool Client::request(std::span<const std::uint8_t> message, Time now, std::size_t longest_answer) {
   if (waiting_ || !transport_.send(message, now)) {
     return false;
   }
@@ -30,6 +49,8 @@ bool Client::request(std::span<const std::uint8_t> message, Time now) {
   answered_by_size_ = std::min(message.size(), 1 + identifier_size(service_));
   std::copy_n(message.begin(), answered_by_size_, answered_by_.begin());
   answered_by_[0] = static_cast<std::uint8_t>(service_ + positive_offset);
+  longest_answer_ = longest_answer;
+  passed_over_ = 0;
   deadline_.reset();
   pending_until_.reset();
   return true;
@@ -65,7 +86,7 @@ std::optional<Outcome> Client::on_time(Time now) {
     return outcome;
   }
   if (waiting_ && deadline_ && now >= *deadline_) {
-    return finish({Outcome::Kind::timeout, {}, 0, isotp::Result::sent});
+    return finish({.kind = Outcome::Kind::timeout});
   }
   return std::nullopt;
 }
@@ -79,6 +100,16 @@ std::optional<Outcome> Client::handle(const isotp::Events& events, Time now) {
       case isotp::Result::sent: deadline_ = now + timings_.p2; break;
       case isotp::Result::reception_started:
         deadline_.reset();  // N_Cr watches from here on
+        if (transport_.announced() > longest_answer_) {
+          if (auto outcome = judge_announcement(now)) {
+            return outcome;
+          }
+        }
+        break;
+      case isotp::Result::message_too_long:
+        if (auto outcome = judge_announcement(now)) {
+          return outcome;
+        }
         break;
       case isotp::Result::received:
         if (auto outcome = judge_message(now)) {
@@ -88,31 +119,45 @@ std::optional<Outcome> Client::handle(const isotp::Events& events, Time now) {
       case isotp::Result::received_functional:  // another tester speaks
       case isotp::Result::unexpected_frame:     // the message that displaced the old one may be the answer
         break;
-      default: return finish({Outcome::Kind::transport, {}, 0, result});
+      default: return finish({.kind = Outcome::Kind::transport, .why = result});
     }
   }
   return std::nullopt;
 }
 
-// Whatever does not answer the request under way is the late answer to one that was given up, or the answer to another
-// tester with the same identifiers: passed over.
+bool Client::answers_request(std::span<const std::uint8_t> message) const {
+  const std::size_t compared = std::min(message.size(), answered_by_size_);
+  return std::equal(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(compared), answered_by_.begin());
+}
+
+// A message longer than the answer can be. Another tester's is its own affair.
+std::optional<Outcome> Client::judge_announcement(Time now) {
+  if (!answers_request(transport_.incoming())) {
+    return std::nullopt;
+  }
+  transport_.refuse_incoming(now);
+  return finish({.kind = Outcome::Kind::too_long, .announced = transport_.announced()});
+}
+
+// Whatever does not answer the request under way is the late or second answer to an earlier one, or the answer to
+// another tester with the same identifiers: passed over.
 std::optional<Outcome> Client::judge_message(Time now) {
   const auto message = transport_.message();
-  const std::size_t compared = std::min(message.size(), answered_by_size_);
-  if (std::equal(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(compared), answered_by_.begin())) {
-    return finish({Outcome::Kind::positive, message, 0, isotp::Result::received});
+  if (answers_request(message)) {
+    return finish({.kind = Outcome::Kind::positive, .response = message});
   }
   if (!deadline_ && !transport_.sending()) {
     deadline_ = now + timings_.p2;  // the stranger was a long message, which had stopped the clock
   }
   if (message[0] != service::negative_response || message.size() < 2 || message[1] != service_) {
+    ++passed_over_;
     return std::nullopt;
   }
   if (message.size() != 3) {
-    return finish({Outcome::Kind::malformed, message, 0, isotp::Result::received});
+    return finish({.kind = Outcome::Kind::malformed, .response = message});
   }
   if (message[2] != static_cast<std::uint8_t>(Nrc::response_pending)) {
-    return finish({Outcome::Kind::negative, message, message[2], isotp::Result::received});
+    return finish({.kind = Outcome::Kind::negative, .response = message, .nrc = message[2]});
   }
   pending_until_ = pending_until_.value_or(now + timings_.pending_limit);
   deadline_ = std::min(now + timings_.p2_star, *pending_until_);
@@ -120,6 +165,7 @@ std::optional<Outcome> Client::judge_message(Time now) {
 }
 
 Outcome Client::finish(Outcome outcome) {
+  outcome.passed_over = passed_over_;
   waiting_ = false;
   deadline_.reset();
   pending_until_.reset();

@@ -116,6 +116,75 @@ TEST_F(UdsClient, BrokenAnswerIsATransportFailure) {
   EXPECT_EQ(outcome->why, isotp::Result::wrong_sequence);
 }
 
+// A stranger's long message is received, so that its frames disturb nothing, and passed over; an answer that announces
+// more than the request can yield is refused at its first frame.
+TEST_F(UdsClient, AnAnswerLongerThanItCanBeIsRefused) {
+  ASSERT_TRUE(client.request(read_request(0x0220), ms(0), 64));
+  take_all(client, ms(0));
+  const auto outcome = client.on_frame(frame("648#1041620220010203"), ms(1));  // 65 bytes
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::too_long);
+  EXPECT_EQ(outcome->announced, 65U);
+  EXPECT_THAT(take_all(client, ms(1)), ElementsAre("640#320000CCCCCCCCCC"));  // overflow
+
+  ASSERT_TRUE(client.request(read_request(0x0220), ms(10), 64));
+  take_all(client, ms(10));
+  EXPECT_FALSE(client.on_frame(frame("648#1041620210010203"), ms(11)));
+  EXPECT_THAT(take_all(client, ms(11)), ElementsAre("640#300000CCCCCCCCCC"));
+  EXPECT_FALSE(client.on_frame(frame("648#1040620220010203"), ms(12)));  // 64 bytes: all that is allowed
+}
+
+TEST_F(UdsClient, AnAnswerOf32BitLengthIsRefused) {
+  ask(transfer_request(1), ms(0));
+  const auto outcome = client.on_frame(frame("648#1000FFFFFFFF7601"), ms(1));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::too_long);
+  EXPECT_EQ(outcome->announced, 0xFFFFFFFFU);
+  ask(transfer_request(1), ms(2));
+  EXPECT_FALSE(client.on_frame(frame("648#1000FFFFFFFF6202"), ms(3)));  // a stranger's
+}
+
+// A bus that delivers everything twice: the second seed is not the answer to the key.
+TEST_F(UdsClient, AnAnswerThatArrivesTwiceIsNotTheNextOne) {
+  const std::pair<Bytes, const char*> dialogue[] = {{session_request(Session::extended), "648#065003003201F4CC"},
+                                                    {seed_request(), "648#0667010000000000"},
+                                                    {reset_request(ResetType::hard), "648#025101CCCCCCCCCC"},
+                                                    {transfer_request(1), "648#047601AABBCCCCCC"},
+                                                    {transfer_request(2), "648#047602AABBCCCCCC"}};
+  Time now = ms(0);
+  const char* last = nullptr;
+  for (const auto& [request, answer] : dialogue) {
+    ask(request, now);
+    if (last != nullptr) {
+      EXPECT_FALSE(client.on_frame(frame(last), now)) << last;
+    }
+    const auto outcome = client.on_frame(frame(answer), now + ms(1));
+    ASSERT_TRUE(outcome) << answer;
+    EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
+    EXPECT_EQ(outcome->passed_over, last == nullptr ? 0U : 1U);
+    EXPECT_FALSE(client.on_frame(frame(answer), now + ms(1)));
+    last = answer;
+    now += ms(10);
+  }
+  ask(Bytes{0x27, 0x02, 1, 2}, now);
+  EXPECT_FALSE(client.on_frame(frame("648#0667010000000000"), now));
+  EXPECT_TRUE(client.on_frame(frame("648#026702CCCCCCCCCC"), now));
+}
+
+TEST(UdsClientTimings, WhatTheServerStatesIsTakenUpWithinBounds) {
+  ClientTimings configured;
+  configured.p2 = ms(1000);
+  configured.p2_star = ms(5000);
+  EXPECT_EQ(with_stated(configured, {ms(50), ms(5000)}).p2, ms(1000));
+  EXPECT_EQ(with_stated(configured, {ms(50), ms(5000)}).p2_star, ms(5100));
+  EXPECT_EQ(with_stated(configured, {ms(2000), ms(20000)}).p2, ms(2100));
+  EXPECT_EQ(with_stated(configured, {ms(2000), ms(20000)}).p2_star, ms(20100));
+  EXPECT_EQ(with_stated(configured, {ms(0), ms(0)}).p2_star, ms(5000));
+  // 65.5 s and eleven minutes, the most that the fields hold: a server that states this is not waited for.
+  EXPECT_EQ(with_stated(configured, {ms(65535), ms(655350)}).p2, ms(1000));
+  EXPECT_EQ(with_stated(configured, {ms(65535), ms(655350)}).p2_star, ms(5000));
+}
+
 TEST_F(UdsClient, TesterPresentKeepsTheSession) {
   client.keep_session(true, ms(0));
   EXPECT_EQ(client.next_deadline(), ms(2000));
