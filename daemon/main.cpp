@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <utility>
 
 #include "daemon/host/journal.hpp"
 #include "daemon/service.hpp"
@@ -39,11 +40,14 @@ int serve(const std::string& config_file) {
     return complain(service.error());
   }
 
+  bool stopping = false;
   for (const int number : {SIGTERM, SIGINT}) {
     loop.on_signal(number, [&] {
       sd_notify(0, "STOPPING=1\nSTATUS=Stopping; runs in progress go on at the next start");
-      (*service)->prepare_to_stop();
-      loop.stop(0);
+      if (std::exchange(stopping, true)) {
+        return loop.stop(0);  // asked for twice
+      }
+      (*service)->stop([&] { loop.stop(0); });
     });
   }
   loop.on_signal(SIGHUP, [&] {

@@ -161,6 +161,16 @@ class OperatorService::Ins : public sdbus::AdaptorInterfaces<org::selfcal::Ins1_
     return progress == nullptr ? Entries{} : entries(*progress);
   }
 
+  Entries Standing() override {
+    const selfcal::Standing standing = operations_.standing(ins_);
+    return {{"bus", standing.bus},
+            {"serial", standing.serial},
+            {"last_calibration", static_cast<std::uint64_t>(standing.last_calibration)},
+            {"last_calibration_utc", standing.last_calibration_utc},
+            {"last_calibration_kind", standing.last_calibration_kind},
+            {"set_version", standing.set_version}};
+  }
+
   Operations& operations_;
   std::string ins_;
 };

@@ -29,6 +29,16 @@ struct StartRequest {
   std::string user;
 };
 
+// What is known of an INS without asking it.
+struct Standing {
+  std::string bus;  // "up", or what is wrong with the interface
+  std::string serial;
+  RunId last_calibration = 0;  // the latest run that wrote its set; 0: none
+  std::string last_calibration_utc;
+  std::string last_calibration_kind;  // calibration, amendment, rollback
+  std::uint32_t set_version = 0;      // that it put in force
+};
+
 // Why a request was not taken up; `name` is the D-Bus error's.
 struct Refusal {
   std::string name;
@@ -54,6 +64,7 @@ class Operations {
   // Null before the first run of this daemon's life.
   virtual const RunProgress* progress(const std::string& ins) const = 0;
   virtual const RunRecord* record(const std::string& ins) const = 0;
+  virtual Standing standing(const std::string& ins) const = 0;
 };
 
 class OperatorService {

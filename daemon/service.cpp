@@ -190,14 +190,14 @@ void Service::reload() {
       kept = std::move(node.mapped());
     }
     // A port is opened anew by the next run; one in use stays until then.
-    if (!kept.active()) {
+    if (!kept.busy()) {
       kept.run.reset();
       kept.port.reset();
     }
     kept.config = ins;
   }
   for (auto& [name, old] : sessions_) {
-    if (!old.active()) {
+    if (!old.busy()) {
       continue;
     }
     journal::write(journal::Level::warning, fmt::format("ins.{} was removed, but its run goes on", name));
@@ -213,7 +213,22 @@ void Service::reload() {
   journal::write(journal::Level::notice, "configuration reloaded");
 }
 
-void Service::prepare_to_stop() { stopping_ = true; }
+void Service::stop(std::function<void()> done) {
+  stopping_ = true;
+  suspending_ = 1;  // this call itself, so that nobody is last before all have been asked
+  const auto one_less = [this, done = std::move(done)] {
+    if (--suspending_ == 0) {
+      done();
+    }
+  };
+  for (auto& [name, session] : sessions_) {
+    if (session.busy()) {
+      ++suspending_;
+      session.run->suspend(one_less);
+    }
+  }
+  one_less();
+}
 
 void Service::on_state(const RunRecord& run) {
   tell_bus([&](OperatorService& service) { service.state_changed(run); });

@@ -26,7 +26,9 @@ class Service : public Operations, public RunObserver {
 
   void resume_unfinished();  // after a crash or restart
   void reload();             // runs in progress keep what they began with
-  void prepare_to_stop();    // nothing is begun any more; runs in progress stay resumable
+  // Nothing is begun any more, every INS goes back to its default session, runs in progress stay resumable. `done` comes
+  // when that is so, after 2 s at the latest.
+  void stop(std::function<void()> done);
 
  private:
   // One configured INS. The port and the run exist from the first run on.
@@ -36,6 +38,8 @@ class Service : public Operations, public RunObserver {
     std::unique_ptr<EstimateWorker> estimators;
     std::unique_ptr<CalibrationRun> run;
     bool active() const { return run && !is_final(run->record().state); }
+    bool ending() const { return run && !active() && !run->over(); }
+    bool busy() const { return active() || ending(); }
   };
 
   Service(EventLoop& loop, Config config, std::string config_file, StateLock lock, std::unique_ptr<RunStore> store);
@@ -66,6 +70,7 @@ class Service : public Operations, public RunObserver {
   std::vector<std::string> instruments() const override;
   const RunProgress* progress(const std::string& ins) const override;
   const RunRecord* record(const std::string& ins) const override;
+  Standing standing(const std::string& ins) const override;
 
   void on_state(const RunRecord& run) override;
   void on_progress(const RunRecord& run) override;
@@ -84,6 +89,7 @@ class Service : public Operations, public RunObserver {
   std::unique_ptr<BusPump> bus_;
   unsigned publish_count_ = 0;
   bool stopping_ = false;
+  std::size_t suspending_ = 0;  // runs
 };
 
 }  // namespace selfcal

@@ -11,6 +11,8 @@
 #include "daemon/store/database_copies.hpp"
 #include "daemon/store/recording_store.hpp"
 #include "daemon/store/run_documents.hpp"
+#include "protocol/can/socket.hpp"
+#include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/operator_api/names.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
 
@@ -72,6 +74,9 @@ Granted<RunId> Service::launch(Session& session, RunRecord record, const std::st
   }
   if (stopping_) {
     return refuse(operator_api::error_unavailable, "the daemon is stopping");
+  }
+  if (session.ending()) {
+    session.run->report_end_at_once();
   }
   const auto least = static_cast<std::uint64_t>(config_.free_space_mib) * mebibyte;
   if (auto room = require_space(config_.state_directory, least, "a run (free_space_mib)"); !room) {
@@ -273,6 +278,9 @@ Granted<std::string> Service::restore_database(const std::string& name) {
                   fmt::format("busy, run {} by user {} since {}", run.id, run.user, run.started_utc));
   }
   for (auto& [ins, other] : sessions_) {
+    if (other.ending()) {
+      other.run->report_end_at_once();
+    }
     other.run.reset();  // ended ones look into the store still
   }
   store_.reset();
@@ -308,6 +316,35 @@ const RunProgress* Service::progress(const std::string& ins) const {
 const RunRecord* Service::record(const std::string& ins) const {
   const Session* chosen = session(ins);
   return chosen == nullptr || !chosen->run ? nullptr : &chosen->run->record();
+}
+
+Standing Service::standing(const std::string& ins) const {
+  Standing standing;
+  if (const Session* chosen = session(ins)) {
+    can::SocketOptions options;
+    options.interface = chosen->config.interface;
+    options.fd = chosen->config.fd;
+    const auto socket = can::Socket::open(options);
+    standing.bus = socket ? "up" : socket.error().message;
+  }
+  const auto runs = store_->runs_of_serial("");
+  if (!runs) {
+    return standing;
+  }
+  for (const RunRecord& run : *runs) {
+    if (run.ins != ins || !wrote_its_set(run)) {
+      continue;
+    }
+    standing.serial = run.serial;
+    standing.last_calibration = run.id;
+    standing.last_calibration_utc = run.ended_utc;
+    standing.last_calibration_kind = run.rollback ? "rollback" : run.amends != 0 ? "amendment" : "calibration";
+  }
+  if (const auto set = store_->set(standing.last_calibration, SetRole::written); set && *set) {
+    const auto coefficients = ins::decode_coefficients(**set);
+    standing.set_version = coefficients ? coefficients->version : 0;
+  }
+  return standing;
 }
 
 }  // namespace selfcal

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
+#include "daemon/host/journal.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/services.hpp"
 
@@ -58,9 +60,15 @@ void CanPort::open() {
     return down(socket.error());
   }
   socket_ = std::move(*socket);
+  if (socket_->receive_buffer_granted() < options.receive_buffer_bytes && !std::exchange(small_buffer_said_, true)) {
+    journal::write(
+        journal::Level::info,
+        fmt::format("{}: a receive buffer of {} bytes is granted, {} were asked for (net.core.rmem_max): frames "
+                    "may be lost while the machine is busy",
+                    config_.interface, socket_->receive_buffer_granted(), options.receive_buffer_bytes));
+  }
   trouble_.clear();
   io_ = std::make_unique<EventLoop::Io>(loop_, socket_->fd(), EPOLLIN, [this](unsigned) { on_readable(); });
-  client_.keep_session(true, loop_.now());
   schedule();
 }
 
@@ -89,6 +97,7 @@ void CanPort::reopen() {
   }
   socket_.reset();
   client_.cancel();
+  client_.keep_session(false, loop_.now());
   if (done_) {
     answer(tl::unexpected(link_error("connection opened anew")));
   }
@@ -97,13 +106,24 @@ void CanPort::reopen() {
 
 std::uint64_t CanPort::lost_frames() const { return lost_before_ + (socket_ ? socket_->lost_frames() : 0); }
 
-void CanPort::request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) {
+void CanPort::keep_session(bool keep) {
+  client_.keep_session(keep && trouble_.empty(), loop_.now());
+  schedule();
+}
+
+void CanPort::take_timings(const uds::SessionTimings& stated) {
+  client_.set_timings(uds::with_stated(timings(config_), stated));
+}
+
+void CanPort::request(std::span<const std::uint8_t> payload, std::size_t longest_answer,
+                      std::function<void(Answer<Bytes>)> done) {
   done_ = std::move(done);
   service_ = payload.front();
+  longest_answer_ = longest_answer;
   if (!trouble_.empty()) {
     return answer(tl::unexpected(link_error(trouble_)));
   }
-  if (!client_.request(payload, loop_.now())) {
+  if (!client_.request(payload, loop_.now(), longest_answer)) {
     return answer(tl::unexpected(
         PortError{PortError::Kind::protocol, 0,
                   fmt::format("{}: a request of {} bytes cannot be sent", config_.interface, payload.size())}));
@@ -247,6 +267,7 @@ void CanPort::deliver(const uds::Outcome& outcome) {
     return;
   }
   if (outcome.kind == uds::Outcome::Kind::positive) {
+    listener_.reset();
     return done(Bytes(outcome.response.begin(), outcome.response.end()));
   }
   done(tl::unexpected(explain(outcome)));
@@ -257,14 +278,32 @@ PortError CanPort::link_error(const std::string& what) const {
   return {PortError::Kind::link, 0, named ? what : fmt::format("{}: {}", config_.interface, what)};
 }
 
-PortError CanPort::explain(const uds::Outcome& outcome) const {
+// From the second one in a row on with what was heard on the bus in between.
+std::string CanPort::no_answer(const uds::Outcome& outcome) {
+  std::string text = fmt::format("no answer to {} within {} s", uds::service_name(service_),
+                                 std::chrono::duration<double>(client_.timings().p2).count());
+  if (outcome.passed_over > 0) {
+    text += fmt::format(" ({} answers to other requests came)", outcome.passed_over);
+  }
+  if (!listener_) {
+    listener_.emplace(config_);
+    return text;
+  }
+  const std::string why = listener_->why_silent();
+  return why.empty() ? text : fmt::format("{}: {}", text, why);
+}
+
+PortError CanPort::explain(const uds::Outcome& outcome) {
   const std::string_view service = uds::service_name(service_);
   switch (outcome.kind) {
     case uds::Outcome::Kind::negative:
       return {PortError::Kind::negative, outcome.nrc,
               fmt::format("{}: INS refused {}: {}", config_.interface, service, uds::describe_nrc(outcome.nrc))};
-    case uds::Outcome::Kind::timeout:
-      return link_error(fmt::format("no answer to {} within {} s", service, config_.request_timeout_s));
+    case uds::Outcome::Kind::timeout: return link_error(no_answer(outcome));
+    case uds::Outcome::Kind::too_long:
+      return {PortError::Kind::protocol, 0,
+              fmt::format("{}: the answer to {} announces {} bytes, {} are the most it can have", config_.interface,
+                          service, outcome.announced, longest_answer_)};
     case uds::Outcome::Kind::transport:
       return link_error(fmt::format("{}: transfer broken off: {}", service, isotp::name(outcome.why)));
     default:

@@ -11,10 +11,29 @@
 namespace selfcal {
 namespace {
 
+using namespace std::chrono_literals;
+
+// Longest answers, service and identifier included. The longest record is that of the coefficients, with 263 bytes.
+constexpr std::size_t longest_record = 512;
+constexpr std::size_t longest_other = 128;
+// Where a second tester is on the bus the answer to its question may come first.
+constexpr int attempts = 4;
+// busyRepeatRequest: ISO 14229-1 has the client repeat the request.
+constexpr int busy_repeats = 10;
+constexpr auto busy_pause = 100ms;
+// A block of less than this would make one page cost a hundred round trips and more.
+constexpr std::size_t least_block_data = 32;
+
+bool is_busy(const PortError& error) {
+  return error.kind == PortError::Kind::negative &&
+         error.nrc == static_cast<std::uint8_t>(uds::Nrc::busy_repeat_request);
+}
+
 // One request under way; breaking off the task forgets it.
 class Exchange {
  public:
-  Exchange(InsPort& port, Bytes payload) : port_(port), payload_(std::move(payload)) {}
+  Exchange(InsPort& port, const Bytes& payload, std::size_t longest_answer)
+      : port_(port), payload_(payload), longest_answer_(longest_answer) {}
   Exchange(const Exchange&) = delete;
   Exchange& operator=(const Exchange&) = delete;
   ~Exchange() {
@@ -26,7 +45,7 @@ class Exchange {
   bool await_ready() const noexcept { return false; }
   void await_suspend(std::coroutine_handle<> task) {
     waiting_ = true;
-    port_.request(payload_, [this, task](Answer<Bytes> answer) {
+    port_.request(payload_, longest_answer_, [this, task](Answer<Bytes> answer) {
       waiting_ = false;
       answer_ = std::move(answer);
       task.resume();
@@ -36,7 +55,8 @@ class Exchange {
 
  private:
   InsPort& port_;
-  Bytes payload_;
+  const Bytes& payload_;
+  std::size_t longest_answer_;
   Answer<Bytes> answer_;
   bool waiting_ = false;
 };
@@ -67,17 +87,29 @@ std::string text(const Bytes& bytes) {
 
 }  // namespace
 
-Task<Answer<Bytes>> InsClient::ask(Bytes payload) {
-  Exchange exchange(port_, std::move(payload));
-  co_return co_await exchange;
+Task<Answer<Bytes>> InsClient::ask(Bytes payload, std::size_t longest_answer) {
+  for (int busy = 0;; ++busy) {
+    tally_.asked(payload);
+    Exchange exchange(port_, payload, longest_answer);
+    Answer<Bytes> answer = co_await exchange;
+    if (answer) {
+      co_return answer;
+    }
+    if (!is_busy(answer.error()) || busy == busy_repeats) {
+      tally_.failed(payload, answer.error().message);
+      co_return answer;
+    }
+    co_await Sleep(timers_, busy_pause);
+  }
 }
 
 Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
-  // Where a second tester is on the bus the answer to its question may come first.
-  constexpr int attempts = 4;
   for (int attempt = 1;; ++attempt) {
-    const Answer<Bytes> response = co_await ask(uds::read_request(did));
+    const Answer<Bytes> response = co_await ask(uds::read_request(did), longest_record);
     if (!response) {
+      if (response.error().kind == PortError::Kind::protocol && attempt < attempts) {
+        continue;
+      }
       co_return tl::unexpected(response.error());
     }
     const auto record = uds::read_read_response(*response, did);
@@ -91,7 +123,7 @@ Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
 }
 
 Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
-  const Answer<Bytes> response = co_await ask(uds::write_request(did, record));
+  const Answer<Bytes> response = co_await ask(uds::write_request(did, record), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -102,7 +134,7 @@ Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
 }
 
 Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t routine, Bytes option) {
-  const Answer<Bytes> response = co_await ask(uds::routine_request(action, routine, option));
+  const Answer<Bytes> response = co_await ask(uds::routine_request(action, routine, option), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -130,14 +162,18 @@ Task<Answer<InsClient::Identity>> InsClient::identify() {
 }
 
 Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
-  Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended));
+  session_asked_for_ = true;
+  Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
-  if (auto well = uds::read_session_response(*response, uds::Session::extended); !well) {
-    co_return senseless(port_, well.error());
+  const auto timings = uds::read_session_response(*response, uds::Session::extended);
+  if (!timings) {
+    co_return senseless(port_, timings.error());
   }
-  response = co_await ask(uds::seed_request());
+  port_.take_timings(*timings);
+  port_.keep_session(true);
+  response = co_await ask(uds::seed_request(), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -152,7 +188,7 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   if (!secret) {
     co_return senseless(port_, secret.error());
   }
-  response = co_await ask(uds::key_request(*secret));
+  response = co_await ask(uds::key_request(*secret), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -183,7 +219,7 @@ Task<Answer<ins::SiteRecord>> InsClient::read_site() {
 }
 
 Task<Answer<Done>> InsClient::reset() {
-  const Answer<Bytes> response = co_await ask(uds::reset_request(uds::ResetType::hard));
+  const Answer<Bytes> response = co_await ask(uds::reset_request(uds::ResetType::hard), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -193,36 +229,54 @@ Task<Answer<Done>> InsClient::reset() {
   co_return Done{};
 }
 
-Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
-  const std::size_t wanted = std::size_t{count} * flash::page_bytes;
-  Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)));
-  if (!response) {
-    co_return tl::unexpected(response.error());
-  }
-  if (const auto longest = uds::read_upload_response(*response); !longest) {
-    co_return senseless(port_, longest.error());
-  }
-  Bytes data;
-  data.reserve(wanted);
-  std::uint32_t whole = 0;
-  for (std::uint8_t block = 1; data.size() < wanted; ++block) {
-    response = co_await ask(uds::transfer_request(block));
+// Asked again where the answer makes no sense: the block counter tells the INS that it is the same block.
+Task<Answer<Bytes>> InsClient::next_block(std::uint8_t block, std::uint32_t longest) {
+  for (int attempt = 1;; ++attempt) {
+    const Answer<Bytes> response = co_await ask(uds::transfer_request(block), longest);
     if (!response) {
+      if (response.error().kind == PortError::Kind::protocol && attempt < attempts) {
+        continue;
+      }
       co_return tl::unexpected(response.error());
     }
     const auto part = uds::read_transfer_response(*response, block);
     if (!part) {
       co_return senseless(port_, part.error());
     }
-    if (part->empty() || data.size() + part->size() > wanted) {
-      co_return senseless(port_, {ErrorKind::device, "transferData: more or less data than was asked for"});
+    co_return Bytes(part->begin(), part->end());
+  }
+}
+
+Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
+  const std::size_t wanted = std::size_t{count} * flash::page_bytes;
+  Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)), longest_other);
+  if (!response) {
+    co_return tl::unexpected(response.error());
+  }
+  const auto longest = uds::read_upload_response(*response);
+  if (!longest) {
+    co_return senseless(port_, longest.error());
+  }
+  Bytes data;
+  data.reserve(wanted);
+  std::uint32_t whole = 0;
+  for (std::uint8_t block = 1; data.size() < wanted; ++block) {
+    const Answer<Bytes> part = co_await next_block(block, *longest);
+    if (!part) {
+      co_return tl::unexpected(part.error());
+    }
+    const std::size_t left = wanted - data.size();
+    if (part->size() > left || part->size() < std::min(least_block_data, left)) {
+      co_return senseless(
+          port_, {ErrorKind::device, fmt::format("TransferData: a block of {} bytes, {} to {} expected", part->size(),
+                                                 std::min(least_block_data, left), left)});
     }
     data.insert(data.end(), part->begin(), part->end());
     for (; (whole + 1) * flash::page_bytes <= data.size(); ++whole) {
       on_page(first + whole, std::span(data).subspan(whole * flash::page_bytes, flash::page_bytes));
     }
   }
-  response = co_await ask(uds::transfer_exit_request());
+  response = co_await ask(uds::transfer_exit_request(), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }

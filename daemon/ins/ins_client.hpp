@@ -8,6 +8,7 @@
 #include "daemon/host/task.hpp"
 #include "daemon/host/timers.hpp"
 #include "daemon/ins/ins_port.hpp"
+#include "daemon/ins/request_tally.hpp"
 #include "daemon/ins/unlock_key.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
@@ -18,14 +19,18 @@ namespace selfcal {
 
 class InsClient {
  public:
-  explicit InsClient(InsPort& port) : port_(port) {}
+  InsClient(Timers& timers, InsPort& port) : timers_(timers), port_(port) {}
+
+  // Whether a session other than the default one was asked for: it is to be ended (session_end.hpp).
+  bool session_asked_for() const { return session_asked_for_; }
+  RequestTally& tally() { return tally_; }
 
   struct Identity {
     std::string serial;
     std::string software;
   };
   Task<Answer<Identity>> identify();
-  Task<Answer<Done>> unlock(UnlockKey key);  // extended session, then SecurityAccess
+  Task<Answer<Done>> unlock(UnlockKey key);  // extended session, kept by TesterPresent, then SecurityAccess
   Task<Answer<ins::StateRecord>> read_state();
   Task<Answer<ins::DirectoryRecord>> read_directory();
   Task<Answer<ins::SampleFormatRecord>> read_sample_format();
@@ -40,9 +45,13 @@ class InsClient {
   Task<Answer<Done>> upload(std::uint32_t first, std::uint32_t count, OnPage on_page);
 
  private:
-  Task<Answer<Bytes>> ask(Bytes payload);
+  Task<Answer<Bytes>> ask(Bytes payload, std::size_t longest_answer);
+  Task<Answer<Bytes>> next_block(std::uint8_t block, std::uint32_t longest);
 
+  Timers& timers_;
   InsPort& port_;
+  RequestTally tally_;
+  bool session_asked_for_ = false;
 };
 
 }  // namespace selfcal

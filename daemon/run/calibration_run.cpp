@@ -35,7 +35,10 @@ CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule sc
       key_(key),
       record_(std::move(record)),
       folder_(std::move(folder)),
-      client_(context_.port) {
+      client_(context_.timers, context_.port),
+      session_end_(context_.timers, context_.port),
+      budget_(context_.timers, config_, [this](double waited_s) { budget_spent(waited_s); }),
+      running_(context_.timers, context_.estimators, config_.running_estimate_s) {
   progress_.run = record_.id;
   progress_.state = record_.state;
   progress_.positions = static_cast<int>(schedule_.positions.size());
@@ -50,13 +53,19 @@ CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule sc
 CalibrationRun::~CalibrationRun() {
   context_.port.on_status = {};
   context_.port.on_bus_event = {};
+  context_.port.keep_session(false);
   context_.timers.cancel(event_timer_);
   context_.estimators.cancel();
 }
 
-void CalibrationRun::begin() { post(Event::begin); }
+void CalibrationRun::begin() {
+  budget_.begin(record_.state);
+  post(Event::begin);
+}
 
 void CalibrationRun::resume() {
+  commit_asked_ = record_.state == State::committing;  // perhaps, by the daemon that is gone
+  budget_.begin(record_.state);
   remember("resume", fmt::format("the daemon was restarted while {}", words(record_.state)));
   if (const auto kept = context_.store.set(record_.id, SetRole::written); kept && *kept) {
     new_set_ = **kept;
@@ -71,7 +80,7 @@ void CalibrationRun::resume() {
 }
 
 void CalibrationRun::abort(const std::string& reason) {
-  if (record_.abort_wanted || is_final(record_.state)) {
+  if (record_.abort_wanted || suspended_ || is_final(record_.state)) {
     return;
   }
   const Transition* row =
@@ -106,6 +115,9 @@ void CalibrationRun::post(Event event) {
 }
 
 void CalibrationRun::fire(Event event) {
+  if (suspended_) {
+    return;
+  }
   const Transition* row = find_transition(record_.state, event, [this](Guard guard) { return holds(guard); });
   if (row == nullptr) {
     return;  // late: the state it belongs to has been left
@@ -123,8 +135,41 @@ void CalibrationRun::fire(Event event) {
     remember("state", fmt::format("{}: {}", name(row->next), words(row->next)));
   }
   progress_.state = row->next;
-  context_.observer.on_state(record_);
+  if (budget_.enter(row->next)) {
+    client_.tally().forget();
+  }
+  if (!is_final(row->next)) {  // else it is told when the INS is out of its session
+    context_.observer.on_state(record_);
+  }
   perform(row->action);
+}
+
+void CalibrationRun::progressed() {
+  budget_.progressed();
+  client_.tally().forget();
+}
+
+void CalibrationRun::budget_spent(double waited_s) {
+  const std::string asked = client_.tally().words();
+  fail_with(fmt::format("{}: no progress in {:.0f} s while {}{}{}; {}", config_.interface, waited_s,
+                        words(record_.state), asked.empty() ? "" : ": ", asked, what_the_ins_holds()));
+  pending_.reset();
+  context_.timers.cancel(event_timer_);
+  event_timer_ = 0;
+  fire(Event::step_failed);
+}
+
+std::string CalibrationRun::what_the_ins_holds() const {
+  if (!new_set_.empty() && in_force_ == new_set_) {
+    return "the new set is in force";
+  }
+  if (budget_.main_path() >= State::resetting) {
+    return "the new set is committed, and in force after the next power-on of the INS";
+  }
+  if (budget_.main_path() == State::committing && commit_asked_) {
+    return "the commit was asked for and not confirmed: the old set or the new one is in force after the next power-on";
+  }
+  return "the old set is in force";
 }
 
 // Without a record of it nothing more is begun; the gimbal is stopped if it may turn.
@@ -133,6 +178,7 @@ void CalibrationRun::storage_failed(const Error& error, State from) {
   fail_with(error.message);
   record_.state = gimbal_may_turn(from) ? State::stopping : from;
   if (record_.state == State::stopping) {
+    budget_.enter(State::stopping);
     return perform(Action::stop_gimbal);
   }
   fire(Event::step_failed);
@@ -162,7 +208,7 @@ void CalibrationRun::perform(Action action) {
     case Action::none: return;
     case Action::estimate: return estimate();
     case Action::judge: return judge();
-    case Action::conclude: return conclude();
+    case Action::conclude: return end_session();
     default: break;
   }
   if (action == Action::recover_link && progress_.link_up) {
@@ -213,6 +259,10 @@ void CalibrationRun::settle(const Step& step) {
   if (step.error().kind == PortError::Kind::link) {
     return post(Event::link_lost);
   }
+  if (step.error().kind == PortError::Kind::local) {
+    fail_with(step.error().message);
+    return post(Event::step_failed);
+  }
   last_nrc_ = step.error().kind == PortError::Kind::negative ? step.error().nrc : -1;
   if (session_lost(last_nrc_)) {
     return post(Event::link_lost);
@@ -241,10 +291,51 @@ void CalibrationRun::fail_with(const std::string& reason, ErrorKind kind) {
   remember("error", reason);
 }
 
-void CalibrationRun::conclude() {
+// Whatever the end: the INS is left locked, in its default session, and nobody keeps another one alive.
+void CalibrationRun::end_session() {
   task_ = {};
   context_.estimators.cancel();
-  running_estimator_.reset();
+  if (!client_.session_asked_for()) {
+    return conclude();
+  }
+  session_end_.begin([this](const std::string& trouble) {
+    if (!trouble.empty()) {
+      remember("session", fmt::format("the INS did not confirm its default session ({}): it goes back to it by itself, "
+                                      "5 s after the last TesterPresent (S3)",
+                                      trouble));
+    }
+    conclude();
+  });
+}
+
+void CalibrationRun::suspend(std::function<void()> done) {
+  if (session_end_.under_way()) {
+    after_end_ = std::move(done);
+    return;
+  }
+  suspended_ = true;
+  task_ = {};
+  context_.timers.cancel(event_timer_);
+  event_timer_ = 0;
+  context_.estimators.cancel();
+  remember("daemon",
+           fmt::format("the daemon stops while {}; the run goes on when it starts again", words(record_.state)));
+  if (!client_.session_asked_for()) {
+    return done();
+  }
+  session_end_.begin([done = std::move(done)](const std::string&) { done(); });
+}
+
+void CalibrationRun::report_end_at_once() {
+  if (is_final(record_.state) && !over_) {
+    session_end_.abandon();
+    conclude();
+  }
+}
+
+void CalibrationRun::conclude() {
+  over_ = true;
+  running_.end();
   sum_up_bus_events();
   // Of no use any more: the recording is kept, or the run will not be resumed.
   pages_.reset();
@@ -257,7 +348,11 @@ void CalibrationRun::conclude() {
                                         : fmt::format("{}: {}", words(record_.state), record_.reason),
                  fields);
   report_progress(true);
+  context_.observer.on_state(record_);
   context_.observer.on_finished(record_);
+  if (after_end_) {
+    std::exchange(after_end_, {})();
+  }
 }
 
 void CalibrationRun::remember(const std::string& kind, const std::string& text) {
@@ -318,6 +413,15 @@ void CalibrationRun::sum_up_bus_events() {
   if (!text.empty()) {
     remember("bus", fmt::format("{}: error frames in this run: {}", config_.interface, text));
   }
+}
+
+tl::unexpected<PortError> CalibrationRun::senseless(const std::string& message) const {
+  return tl::unexpected<PortError>(
+      PortError{PortError::Kind::protocol, 0, fmt::format("{}: {}", config_.interface, message)});
+}
+
+tl::unexpected<PortError> CalibrationRun::local_trouble(const Error& error) const {
+  return tl::unexpected<PortError>(PortError{PortError::Kind::local, 0, error.message});
 }
 
 std::chrono::nanoseconds CalibrationRun::ins_time(double seconds) const {

@@ -12,6 +12,9 @@
 #include "daemon/host/task.hpp"
 #include "daemon/host/timers.hpp"
 #include "daemon/ins/ins_client.hpp"
+#include "daemon/ins/session_end.hpp"
+#include "daemon/run/budget_watch.hpp"
+#include "daemon/run/running_estimates.hpp"
 #include "daemon/run/transition_table.hpp"
 #include "daemon/store/page_file.hpp"
 #include "daemon/store/run_store.hpp"
@@ -71,11 +74,21 @@ class CalibrationRun {
   void begin();   // a new run
   void resume();  // after a restart of the daemon
   void abort(const std::string& reason);
+  // The daemon stops: the INS goes back to its default session, the run stays as it is and can be resumed.
+  void suspend(std::function<void()> done);
+  // Its end has been reported. A run whose state is final before that is taking the INS out of its session.
+  bool over() const { return over_; }
+  // Reports the end of such a run now: the next run needs the INS, and a session of its own.
+  void report_end_at_once();
   const RunRecord& record() const { return record_; }
   const RunProgress& progress() const { return progress_; }
 
  private:
   using Step = Answer<Event>;
+
+  void progressed();  // the budget of the state begins anew
+  void budget_spent(double waited_s);
+  std::string what_the_ins_holds() const;
 
   void post(Event event);
   void fire(Event event);
@@ -84,6 +97,7 @@ class CalibrationRun {
   Task<Step> step(Action action);
   Task<Done> run_step(Action action);
   void settle(const Step& step);
+  void end_session();
   void conclude();
   void remember(const std::string& kind, const std::string& text);
   void fail_with(const std::string& reason, ErrorKind kind = ErrorKind::device);
@@ -117,8 +131,17 @@ class CalibrationRun {
 
   // Parts of steps.
   Task<Answer<Done>> check_serial();
-  Task<Answer<Done>> take_stock();  // the INS's state and the set in force
+  // The INS's state and the set in force.
+  Task<Answer<Done>> take_stock();
+  Task<Answer<Done>> confirm_identity(
+      std::string before);  // the same INS, not switched off since: before it is changed
+  Answer<Done> check_power_cycles(std::uint32_t found, std::string_view when);
   Task<Answer<Done>> look_for_data();
+  Task<Answer<ins::DirectoryRecord>> read_checked_directory();
+  Answer<Done> check_ring(const ins::DirectoryRecord& directory);
+  Task<Answer<Done>> learn_pages_written();
+  Task<Answer<Done>> await_completion();
+  Task<Answer<Done>> check_erased();
   Task<Answer<Done>> check_space();
   Task<Answer<Done>> poll_state();
   Task<Answer<Done>> open_pages();
@@ -126,12 +149,14 @@ class CalibrationRun {
   Task<Answer<Done>> bring_to_rest();
   Task<Answer<Done>> stop_check();  // whoever began it; without one nothing is done
   Task<Answer<Done>> await_state(ins::State unwanted, double limit_s, std::string what);
+  tl::unexpected<PortError> senseless(const std::string& message) const;  // begins it with the interface
+  tl::unexpected<PortError> local_trouble(const Error& error) const;      // disk or database, not the INS
   void note_bad_page(std::uint32_t page, const std::string& why);
   void estimate();
   std::filesystem::path amended_recording() const;
   void judge();
   void estimate_meanwhile();
-  void on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s);
+  void on_running_estimate(const Expected<RunningEstimate>& answer, double data_s, bool first_met);
   bool may_end_early() const;
   void show_estimate(const ParameterVector& value, const ParameterVector& sigma);
   void foresee_finish();
@@ -150,10 +175,12 @@ class CalibrationRun {
   RunRecord record_;
   std::filesystem::path folder_;
   InsClient client_;
+  SessionEnd session_end_;
   RunProgress progress_;
 
   Task<Done> task_;
   Timers::Id event_timer_ = 0;
+  BudgetWatch budget_;
   std::optional<Event> pending_;
   std::optional<PageFile> pages_;
   struct BusEventCount {
@@ -161,16 +188,19 @@ class CalibrationRun {
     SteadyTime said_at{};
   };
   std::map<can::BusEvent, BusEventCount> bus_events_;
-  std::map<std::uint32_t, int> bad_pages_;  // page, how often it came wrong
+  struct BadPage {
+    int times = 0;
+    std::string why;
+  };
+  std::map<std::uint32_t, BadPage> bad_pages_;
   std::optional<Error> storage_error_;
+  ins::SampleFormatRecord format_;
+  std::uint32_t pages_known_ = 0;              // written, by the directory
+  std::optional<std::uint32_t> power_cycles_;  // as this run knows them
   std::optional<Estimate> estimate_;
   std::vector<std::string> objections_;
   ins::StateRecord stock_;  // the INS as it was found after recovery
-  std::shared_ptr<RunningEstimator> running_estimator_;
-  std::optional<RunningEstimate> running_;
-  bool running_busy_ = false;
-  double running_begun_s_ = 0.0;  // of data, when the last one was begun
-  SteadyTime running_not_before_{};
+  RunningEstimates running_;
   double page_s_ = 0.0;  // of data in a full page
   bool out_of_reach_said_ = false;
   Bytes in_force_;  // coefficient records, as on the bus
@@ -183,8 +213,12 @@ class CalibrationRun {
   int last_nrc_ = -1;
   int sessions_lost_ = 0;
   bool data_complete_ = false;  // the FLASH holds all of the last rotation, whatever the INS has done since
+  bool commit_asked_ = false;
   bool failed_ = false;
   bool storage_lost_ = false;
+  bool over_ = false;
+  bool suspended_ = false;
+  std::function<void()> after_end_;  // of a run that ends while the daemon stops
 };
 
 }  // namespace selfcal

@@ -7,6 +7,7 @@
 
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/run/calibration_run.hpp"
+#include "daemon/run/ins_checks.hpp"
 #include "daemon/store/recording_store.hpp"
 #include "protocol/byte_order.hpp"
 
@@ -19,11 +20,8 @@ constexpr int reads_of_a_bad_page = 5;
 constexpr std::uint32_t pages_per_upload = 64;  // what a lost link costs at most
 constexpr double stop_limit_s = 30.0;           // of the INS's clock
 constexpr auto status_silence = 1s;             // then the INS is asked
-constexpr auto recovery_interval = 300ms;
-
-tl::unexpected<PortError> senseless(std::string message) {
-  return tl::unexpected<PortError>(PortError{PortError::Kind::protocol, 0, std::move(message)});
-}
+constexpr auto completion_interval = 200ms;
+constexpr int completion_looks = 25;  // the last page is programmed in far less than 5 s
 
 ins::ScheduleRecord schedule_record(const Schedule& schedule) {
   ins::ScheduleRecord record;
@@ -53,84 +51,46 @@ std::uint32_t new_rotation_number() {
   return std::uniform_int_distribution<std::uint32_t>(1)(device);
 }
 
-bool holds_whole_rotation(const ins::DirectoryRecord& directory) {
-  return directory.complete && directory.pages_expected > 0 && directory.pages_written == directory.pages_expected;
-}
-
 }  // namespace
 
-Task<Answer<Done>> CalibrationRun::check_serial() {
-  const auto identity = co_await client_.identify();
-  if (!identity) {
-    co_return tl::unexpected(identity.error());
-  }
-  if (!record_.serial.empty() && record_.serial != identity->serial) {
-    co_return senseless(fmt::format("{}: INS {} answers, but run {} belongs to INS {}", config_.interface,
-                                    identity->serial, record_.id, record_.serial));
-  }
-  record_.serial = identity->serial;
-  record_.ins_software = identity->software;
-  co_return Done{};
-}
-
-Task<Answer<Done>> CalibrationRun::take_stock() {
-  const auto state = co_await client_.read_state();
-  if (!state) {
-    co_return tl::unexpected(state.error());
-  }
-  stock_ = *state;
-  auto set = co_await client_.read_record(ins::did::coefficients_in_force);
-  if (!set) {
-    co_return tl::unexpected(set.error());
-  }
-  in_force_ = std::move(*set);
-  co_return Done{};
-}
-
-Task<Answer<Done>> CalibrationRun::look_for_data() {
+// Of this run's rotation, and in agreement with format and schedule.
+Task<Answer<ins::DirectoryRecord>> CalibrationRun::read_checked_directory() {
   const auto directory = co_await client_.read_directory();
   if (!directory) {
     co_return tl::unexpected(directory.error());
   }
-  data_complete_ = holds_whole_rotation(*directory);
+  if (directory->run_id != record_.rotation) {
+    co_return senseless(fmt::format("the INS holds data of rotation {}, not {}", directory->run_id, record_.rotation));
+  }
+  if (const Complaint complaint = check_directory(*directory, format_, schedule_)) {
+    co_return senseless(*complaint);
+  }
+  if (auto all_there = check_ring(*directory); !all_there) {
+    co_return tl::unexpected(all_there.error());
+  }
+  pages_known_ = directory->pages_written;
+  co_return *directory;
+}
+
+// The ring of the INS may have lost what was not pulled yet.
+Answer<Done> CalibrationRun::check_ring(const ins::DirectoryRecord& directory) {
+  if (!pages_) {
+    return Done{};
+  }
+  const auto wanted = pages_->missing(directory.pages_written, 1);
+  if (wanted.count > 0 && wanted.first < directory.first_page) {
+    return senseless(fmt::format("page {} is lost: the ring of the INS holds pages {} to {}", wanted.first,
+                                 directory.first_page, directory.pages_written - 1));
+  }
+  return Done{};
+}
+
+Task<Answer<Done>> CalibrationRun::learn_pages_written() {
+  const auto directory = co_await read_checked_directory();
+  if (!directory) {
+    co_return tl::unexpected(directory.error());
+  }
   co_return Done{};
-}
-
-Task<CalibrationRun::Step> CalibrationRun::identify() {
-  if (auto known = co_await check_serial(); !known) {
-    co_return tl::unexpected(known.error());
-  }
-  if (auto taken = co_await take_stock(); !taken) {
-    co_return tl::unexpected(taken.error());
-  }
-  if (stock_.state == ins::State::rotating) {
-    co_return senseless(
-        fmt::format("{}: INS {}: the gimbal turns already, and not for this run", config_.interface, record_.serial));
-  }
-  if (const auto set = ins::decode_coefficients(in_force_); !set) {
-    co_return senseless(fmt::format("{}: {}", config_.interface, set.error().message));
-  }
-  if (auto kept = context_.store.store_set(record_.id, SetRole::previous, in_force_); !kept) {
-    co_return senseless(kept.error().message);
-  }
-  remember("ins", fmt::format("INS {}, software {}, coefficients version {} in force", record_.serial,
-                              record_.ins_software, stock_.coefficients_version));
-  co_return Event::identified;
-}
-
-Task<CalibrationRun::Step> CalibrationRun::unlock() {
-  const auto unlocked = co_await client_.unlock(key_);
-  if (!unlocked) {
-    co_return tl::unexpected(unlocked.error());
-  }
-  // This run has begun none: left by a service that is gone, or by another tester. The INS would refuse to rotate.
-  if (stock_.state == ins::State::checking) {
-    warn("the INS is in a navigation check that is not this run's: it is ended first");
-  }
-  if (auto ended = co_await stop_check(); !ended) {
-    co_return tl::unexpected(ended.error());
-  }
-  co_return Event::unlocked;
 }
 
 // Before anything turns: a full disk must not end a run in the middle.
@@ -139,11 +99,12 @@ Task<Answer<Done>> CalibrationRun::check_space() {
   if (!format) {
     co_return tl::unexpected(format.error());
   }
+  format_ = *format;
   const auto samples = static_cast<std::uint64_t>(std::ceil(schedule_.duration_s() * format->sample_rate_hz));
   const std::string what_for =
       fmt::format("a run of {:.0f} s at {} Hz", schedule_.duration_s(), format->sample_rate_hz);
   if (auto room = require_space(folder_, bytes_of_a_run(samples), what_for); !room) {
-    co_return senseless(room.error().message);
+    co_return local_trouble(room.error());
   }
   co_return Done{};
 }
@@ -179,21 +140,16 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
   if (!format) {
     co_return tl::unexpected(format.error());
   }
-  if (format->page_bytes != flash::page_bytes) {
-    co_return senseless(
-        fmt::format("{}: pages of {} bytes, {} expected", config_.interface, format->page_bytes, flash::page_bytes));
-  }
+  format_ = *format;
+  page_s_ = format->samples_per_page / format->sample_rate_hz;
+  budget_.learn_page(page_s_);
   const auto site = co_await client_.read_site();
   if (!site) {
     co_return tl::unexpected(site.error());
   }
-  const auto directory = co_await client_.read_directory();
+  const auto directory = co_await read_checked_directory();
   if (!directory) {
     co_return tl::unexpected(directory.error());
-  }
-  if (directory->run_id != record_.rotation) {
-    co_return senseless(fmt::format("{}: the INS holds data of rotation {}, not {}", config_.interface,
-                                    directory->run_id, record_.rotation));
   }
   progress_.pages_expected = directory->pages_expected;
   if (record_.early_end_s >= 0) {
@@ -204,40 +160,47 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
   context.site = *site;
   context.pages = directory->complete ? directory->pages_written : directory->pages_expected;
   if (auto kept = write_page_context(folder_, context); !kept) {
-    co_return senseless(kept.error().message);
+    co_return local_trouble(kept.error());
   }
   if (!pages_) {
     auto pages = PageFile::open(page_path(folder_), record_.rotation);
     if (!pages) {
-      co_return senseless(pages.error().message);
+      co_return local_trouble(pages.error());
     }
     pages_ = std::move(*pages);
     const std::uint64_t samples = std::uint64_t{directory->pages_expected} * format->samples_per_page;
     if (auto kept = pages_->reserve(bytes_of_a_run(samples)); !kept) {
-      co_return senseless(kept.error().message);
+      co_return local_trouble(kept.error());
     }
   }
-  if (const auto wanted = pages_->missing(directory->pages_written, 1);
-      wanted.count > 0 && wanted.first < directory->first_page) {
-    co_return senseless(fmt::format("{}: page {} is lost: the ring of the INS holds pages {} to {}", config_.interface,
-                                    wanted.first, directory->first_page, directory->pages_written - 1));
+  if (auto all_there = check_ring(*directory); !all_there) {
+    co_return tl::unexpected(all_there.error());
   }
   progress_.pages_pulled = pages_->count();
-  page_s_ = format->samples_per_page / format->sample_rate_hz;
   co_return Done{};
 }
 
 Task<Answer<Done>> CalibrationRun::poll_state() {
-  const auto state = co_await client_.read_state();
+  auto state = co_await client_.read_state();
   if (!state) {
     co_return tl::unexpected(state.error());
   }
-  const auto directory = co_await client_.read_directory();
+  const auto directory = co_await read_checked_directory();
   if (!directory) {
     co_return tl::unexpected(directory.error());
   }
+  if (directory->complete && state->state == ins::State::rotating) {  // it may have ended between the two answers
+    state = co_await client_.read_state();
+    if (!state) {
+      co_return tl::unexpected(state.error());
+    }
+  }
+  if (directory->complete && state->state == ins::State::rotating) {
+    co_return senseless(fmt::format("directory: complete with {} of {} pages, while the INS says that it is rotating",
+                                    directory->pages_written, directory->pages_expected));
+  }
   stock_ = *state;
-  data_complete_ = directory->run_id == record_.rotation && holds_whole_rotation(*directory);
+  data_complete_ = holds_whole_rotation(*directory);
   progress_.ins.state = state->state;
   progress_.ins.pages_written = directory->pages_written;
   report_progress();
@@ -274,16 +237,22 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
       if (progress_.ins.state == ins::State::complete || data_complete_) {
         co_return Event::rotation_ended;
       }
-      co_return senseless(fmt::format("{}: the rotation ended before its time, at position {} of {}: the INS is {}{}",
-                                      config_.interface, position, progress_.positions, ins::name(progress_.ins.state),
+      co_return senseless(fmt::format("the rotation ended before its time, at position {} of {}: the INS is {}{}",
+                                      position, progress_.positions, ins::name(progress_.ins.state),
                                       words_of_faults(stock_.faults)));
     }
     estimate_meanwhile();
     if (may_end_early()) {
       co_return Event::tolerances_met;
     }
-    if (pages_->missing(progress_.ins.pages_written, 1).count > 0) {
-      if (auto pulled = co_await pull(progress_.ins.pages_written); !pulled) {
+    // A status frame says that there may be more; the directory says how much there is.
+    if (progress_.ins.pages_written > pages_known_) {
+      if (auto learnt = co_await learn_pages_written(); !learnt) {
+        co_return tl::unexpected(learnt.error());
+      }
+    }
+    if (pages_->missing(pages_known_, 1).count > 0) {
+      if (auto pulled = co_await pull(pages_known_); !pulled) {
         co_return tl::unexpected(pulled.error());
       }
     } else {
@@ -292,18 +261,41 @@ Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
   }
 }
 
+// The gimbal is at rest: the directory must say that no more pages come and, unless the end was early, that all are there.
+Task<Answer<Done>> CalibrationRun::await_completion() {
+  for (int look = 1;; ++look) {
+    const auto directory = co_await read_checked_directory();
+    if (!directory) {
+      co_return tl::unexpected(directory.error());
+    }
+    const bool all = record_.early_end_s >= 0 || directory->pages_written >= directory->pages_expected;
+    if (directory->complete && all) {
+      co_return Done{};
+    }
+    if (look == completion_looks) {
+      co_return senseless(fmt::format("directory: {} with {} of {} pages, though the rotation is over",
+                                      directory->complete ? "complete" : "not complete", directory->pages_written,
+                                      directory->pages_expected));
+    }
+    co_await Sleep(context_.timers, completion_interval);
+  }
+}
+
 Task<CalibrationRun::Step> CalibrationRun::pull_last_pages() {
   if (auto opened = co_await open_pages(); !opened) {
     co_return tl::unexpected(opened.error());
   }
-  const std::uint32_t end = progress_.ins.pages_written;
+  if (auto complete = co_await await_completion(); !complete) {
+    co_return tl::unexpected(complete.error());
+  }
+  const std::uint32_t end = pages_known_;
   while (pages_->missing(end, 1).count > 0) {
     if (auto pulled = co_await pull(end); !pulled) {
       co_return tl::unexpected(pulled.error());
     }
   }
   if (end == 0) {
-    co_return senseless(fmt::format("{}: the INS stored no data", config_.interface));
+    co_return senseless("the INS stored no data");
   }
   remember("data", fmt::format("{} pages pulled, {} fetched again for a wrong CRC, {} frames lost", end,
                                progress_.pages_refetched, context_.port.lost_frames()));
@@ -321,6 +313,9 @@ Task<Answer<Done>> CalibrationRun::pull(std::uint32_t end) {
                                         if (stored && !stored->empty()) {
                                           note_bad_page(page, *stored);
                                         }
+                                        if (pages_->count() > progress_.pages_pulled) {
+                                          progressed();
+                                        }
                                         progress_.pages_pulled = pages_->count();
                                         report_progress();
                                       });
@@ -328,19 +323,20 @@ Task<Answer<Done>> CalibrationRun::pull(std::uint32_t end) {
     co_return tl::unexpected(done.error());
   }
   if (storage_error_) {
-    co_return senseless(storage_error_->message);
+    co_return local_trouble(*storage_error_);
   }
-  for (const auto& [page, times] : bad_pages_) {
-    if (times >= reads_of_a_bad_page && !pages_->has(page)) {
-      co_return senseless(fmt::format("{}: page {}: wrong CRC in {} readings: the data are incomplete",
-                                      config_.interface, page, times));
+  for (const auto& [page, bad] : bad_pages_) {
+    if (bad.times >= reads_of_a_bad_page && !pages_->has(page)) {
+      co_return senseless(fmt::format("page {}: {} in {} readings: the data are incomplete", page, bad.why, bad.times));
     }
   }
   co_return Done{};
 }
 
 void CalibrationRun::note_bad_page(std::uint32_t page, const std::string& why) {
-  if (++bad_pages_[page] == 1) {
+  BadPage& bad = bad_pages_[page];
+  bad.why = why;
+  if (++bad.times == 1) {
     warn(fmt::format("page {}: {}: fetched again", page, why));
   }
   ++progress_.pages_refetched;
@@ -358,7 +354,7 @@ Task<Answer<Done>> CalibrationRun::await_state(ins::State unwanted, double limit
       co_return Done{};
     }
     if (context_.timers.now() > end) {
-      co_return senseless(fmt::format("{}: {} after {:.0f} s", config_.interface, what, limit_s));
+      co_return senseless(fmt::format("{} after {:.0f} s", what, limit_s));
     }
     co_await Sleep(context_.timers, ins_time(0.5));
   }
@@ -385,41 +381,6 @@ Task<CalibrationRun::Step> CalibrationRun::stop_gimbal() {
     co_return tl::unexpected(rests.error());
   }
   co_return Event::gimbal_stopped;
-}
-
-// Until the INS answers again and is unlocked, or the time is over.
-Task<CalibrationRun::Step> CalibrationRun::recover_link() {
-  const auto limit = std::chrono::duration_cast<SteadyTime>(std::chrono::duration<double>(config_.lost_after_s));
-  while (true) {
-    context_.port.reopen();
-    auto back = co_await check_serial();
-    if (back) {
-      back = co_await client_.unlock(key_);
-    }
-    if (back) {
-      back = co_await take_stock();
-    }
-    if (back) {
-      back = co_await look_for_data();
-    }
-    if (back) {
-      if (!progress_.link_up) {
-        progress_.link_up = true;
-        remember("link", fmt::format("link is back; the INS is {}", ins::name(stock_.state)));
-      }
-      co_return Event::recovered;
-    }
-    if (back.error().kind != PortError::Kind::link) {
-      co_return tl::unexpected(back.error());
-    }
-    link_trouble_ = back.error().message;
-    if (context_.timers.now() - lost_at_ > limit) {
-      fail_with(fmt::format("link lost for more than {} s while {}: {}", config_.lost_after_s, words(record_.state),
-                            link_trouble_));
-      co_return Event::link_gone;
-    }
-    co_await Sleep(context_.timers, recovery_interval);
-  }
 }
 
 }  // namespace selfcal

@@ -1,6 +1,7 @@
 // What the actions of the table do from the estimate to the proof that the INS uses the new set.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 
 #include "daemon/estimate/amendment_job.hpp"
@@ -8,6 +9,7 @@
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/host/wall_clock.hpp"
 #include "daemon/run/calibration_run.hpp"
+#include "daemon/run/ins_checks.hpp"
 #include "daemon/store/parameter_trend.hpp"
 #include "protocol/byte_order.hpp"
 
@@ -20,10 +22,6 @@ constexpr double reset_limit_s = 60.0;       // of the INS's clock
 constexpr auto reset_patience = 5s;          // of ours, beyond that
 constexpr double drift_margin_s = 60.0;      // beyond the length of the drift check, of the INS's clock
 constexpr double check_stop_limit_s = 30.0;  // of the INS's clock, after it agreed to stop its check
-
-tl::unexpected<PortError> senseless(std::string message) {
-  return tl::unexpected<PortError>(PortError{PortError::Kind::protocol, 0, std::move(message)});
-}
 
 // A routine that cannot be stopped ends by itself; any other refusal is a failure, or a lost session.
 bool cannot_be_stopped(const PortError& error) {
@@ -46,7 +44,7 @@ int exit_status(State state, int failure) {
 
 void CalibrationRun::estimate() {
   task_ = {};
-  running_busy_ = false;  // what still runs is dropped
+  running_.drop_current();
   context_.estimators.start(
       record_.amends == 0
           ? estimate_job({folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_})
@@ -62,6 +60,7 @@ std::filesystem::path CalibrationRun::amended_recording() const {
 }
 
 void CalibrationRun::on_estimate_progress(const CalibrationProgress& progress) {
+  progressed();
   progress_.pass = progress.pass;
   progress_.pass_fraction = progress.fraction;
   progress_.running = false;
@@ -149,6 +148,13 @@ Expected<void> CalibrationRun::make_new_set() {
   fresh.date_s = std::time(nullptr);
   fresh.author = fmt::format("selfcal run {} {}", record_.id, record_.user).substr(0, ins::author_bytes);
   fresh.value = merged_with_in_force(measured, in_force->value);
+  if (const Complaint complaint =
+          check_coefficients(fresh.value, "the set to be written, where the one in force stays")) {
+    if (!record_.dry_run && (objections_.empty() || !record_.force_reason.empty())) {
+      return fail(ErrorKind::device, fmt::format("{}: {}", config_.interface, *complaint));
+    }
+    remember("gate", *complaint);
+  }
   const auto bytes = ins::encode(fresh);
   new_set_.assign(bytes.begin(), bytes.end());
   return context_.store.store_set(record_.id, SetRole::written, new_set_);
@@ -178,6 +184,11 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
   if (!before) {
     co_return tl::unexpected(before.error());
   }
+  if (before->power_cycles != power_cycles_.value_or(before->power_cycles)) {
+    co_return tl::unexpected<PortError>(
+        PortError{PortError::Kind::link, 0, config_.interface + ": the INS restarted before its navigation check"});
+  }
+  power_cycles_ = before->power_cycles;
   // A daemon that was restarted meanwhile finds its own check going on; the INS would refuse another one.
   if (before->state != ins::State::checking) {
     const auto begun =
@@ -192,7 +203,7 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
     if (!state) {
       co_return tl::unexpected(state.error());
     }
-    if (state->power_cycles != before->power_cycles) {  // the same as a link that was away
+    if (state->power_cycles != *power_cycles_) {  // the same as a link that was away
       co_return tl::unexpected<PortError>(PortError{
           PortError::Kind::link, 0, config_.interface + ": the INS restarted in the middle of its navigation check"});
     }
@@ -202,7 +213,10 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
     }
     const auto drift = ins::decode_navigation_result(*answer);
     if (!drift) {
-      co_return senseless(fmt::format("{}: {}", config_.interface, drift.error().message));
+      co_return senseless(drift.error().message);
+    }
+    if (const Complaint complaint = check_navigation(*drift, request.duration_s)) {
+      co_return senseless(*complaint);
     }
     if (drift->done) {
       record_.*figure = drift->max_horizontal_m;
@@ -211,7 +225,7 @@ Task<CalibrationRun::Step> CalibrationRun::measure_drift(double RunRecord::*figu
       break;
     }
     if (context_.timers.now() > end) {
-      co_return senseless(config_.interface + ": the navigation check does not end");
+      co_return senseless("the navigation check does not end");
     }
     co_await Sleep(context_.timers, ins_time(2.0));
   }
@@ -237,6 +251,7 @@ Task<Answer<Done>> CalibrationRun::stop_check() {
       co_return tl::unexpected(stopped.error());
     }
     limit_s = config_.drift_check_s + drift_margin_s;
+    budget_.extend(ins_time(limit_s));
     warn(fmt::format("{}: the end of the navigation check is waited for, {:.0f} s of the INS's clock at most",
                      stopped.error().message, limit_s));
   }
@@ -257,15 +272,21 @@ Task<CalibrationRun::Step> CalibrationRun::end_check() {
 Task<CalibrationRun::Step> CalibrationRun::erase_inactive_slot() {
   const auto kept = context_.store.set(record_.id, SetRole::written);
   if (!kept) {
-    co_return senseless(kept.error().message);
+    co_return local_trouble(kept.error());
   }
   auto wanted = *kept ? ins::decode_coefficients(**kept)
                       : Expected<ins::Coefficients>(fail(ErrorKind::internal, "the set to be written was not kept"));
   if (!wanted) {
-    co_return senseless(wanted.error().message);
+    co_return local_trouble(wanted.error());
+  }
+  if (auto same = co_await confirm_identity("the inactive slot is erased"); !same) {
+    co_return tl::unexpected(same.error());
   }
   if (auto taken = co_await take_stock(); !taken) {
     co_return tl::unexpected(taken.error());
+  }
+  if (const Complaint complaint = check_coefficients(wanted->value, "the set to be written")) {
+    co_return senseless(*complaint);
   }
   // The INS takes the newest: a set that is put back needs a version above the one in force.
   if (wanted->version <= stock_.coefficients_version) {
@@ -274,16 +295,43 @@ Task<CalibrationRun::Step> CalibrationRun::erase_inactive_slot() {
   const auto bytes = ins::encode(*wanted);
   new_set_.assign(bytes.begin(), bytes.end());
   if (auto stored = context_.store.store_set(record_.id, SetRole::written, new_set_); !stored) {
-    co_return senseless(stored.error().message);
+    co_return local_trouble(stored.error());
   }
   const auto erased = co_await client_.routine(uds::RoutineAction::start, ins::routine::erase_inactive, {});
   if (!erased) {
     co_return tl::unexpected(erased.error());
   }
+  if (auto empty = co_await check_erased(); !empty) {
+    co_return tl::unexpected(empty.error());
+  }
   co_return Event::slot_erased;
 }
 
+// An erased slot reads as nothing (conditionsNotCorrect, requestOutOfRange) or as erased FLASH.
+Task<Answer<Done>> CalibrationRun::check_erased() {
+  const auto slot = co_await client_.read_record(ins::did::coefficients_inactive);
+  if (!slot) {
+    const bool nothing = slot.error().kind == PortError::Kind::negative &&
+                         (slot.error().nrc == static_cast<std::uint8_t>(uds::Nrc::conditions_not_correct) ||
+                          slot.error().nrc == static_cast<std::uint8_t>(uds::Nrc::request_out_of_range));
+    if (!nothing) {
+      co_return tl::unexpected(slot.error());
+    }
+    co_return Done{};
+  }
+  if (!std::all_of(slot->begin(), slot->end(), [](std::uint8_t byte) { return byte == 0xFF; })) {
+    const auto set = ins::decode_coefficients(*slot);
+    co_return senseless(fmt::format(
+        "the inactive slot was to be erased and still holds {}; {}",
+        set ? fmt::format("version {}", set->version) : fmt::format("{} bytes", slot->size()), what_the_ins_holds()));
+  }
+  co_return Done{};
+}
+
 Task<CalibrationRun::Step> CalibrationRun::write_set() {
+  if (auto same = co_await confirm_identity("the set is written"); !same) {
+    co_return tl::unexpected(same.error());
+  }
   const auto written = co_await client_.write_record(ins::did::coefficients_inactive, new_set_);
   if (!written) {
     co_return tl::unexpected(written.error());
@@ -297,19 +345,23 @@ Task<CalibrationRun::Step> CalibrationRun::read_back() {
     co_return tl::unexpected(slot.error());
   }
   if (auto stored = context_.store.store_set(record_.id, SetRole::read_back, *slot); !stored) {
-    co_return senseless(stored.error().message);
+    co_return local_trouble(stored.error());
   }
   if (*slot != new_set_) {
-    co_return senseless(config_.interface + ": the coefficients read back are not those written");
+    co_return senseless("the coefficients read back are not those written");
   }
   co_return Event::set_verified;
 }
 
 Task<CalibrationRun::Step> CalibrationRun::commit() {
+  if (auto same = co_await confirm_identity("the set is committed"); !same) {
+    co_return tl::unexpected(same.error());
+  }
   ins::CoefficientsBytes bytes;
   std::copy(new_set_.begin(), new_set_.end(), bytes.begin());
   Bytes crc(4);
   ByteWriter(crc).put(ins::stored_crc(bytes));
+  commit_asked_ = true;
   const auto done =
       co_await client_.routine(uds::RoutineAction::start, ins::routine::commit_coefficients, std::move(crc));
   if (!done) {
@@ -327,12 +379,14 @@ Task<CalibrationRun::Step> CalibrationRun::reset_ins() {
   if (auto asked = co_await client_.reset(); !asked) {
     co_return tl::unexpected(asked.error());
   }
+  std::uint32_t after = 0;
   const SteadyTime end = context_.timers.now() + ins_time(reset_limit_s) + reset_patience;
   while (true) {
     co_await Sleep(context_.timers, 20ms);
     const auto state = co_await client_.read_state();
     const bool up = state && state->state != ins::State::starting && state->power_cycles != before->power_cycles;
     if (up) {
+      after = state->power_cycles;
       break;
     }
     if (context_.timers.now() < end) {
@@ -341,7 +395,7 @@ Task<CalibrationRun::Step> CalibrationRun::reset_ins() {
     if (!state) {
       co_return tl::unexpected(state.error());
     }
-    co_return senseless(fmt::format("{}: the INS did not restart within {} s", config_.interface, reset_limit_s));
+    co_return senseless(fmt::format("the INS did not restart within {} s", reset_limit_s));
   }
   if (auto known = co_await check_serial(); !known) {
     co_return tl::unexpected(known.error());
@@ -349,6 +403,16 @@ Task<CalibrationRun::Step> CalibrationRun::reset_ins() {
   if (auto unlocked = co_await client_.unlock(key_); !unlocked) {
     co_return tl::unexpected(unlocked.error());
   }
+  const std::uint32_t restarts = after - before->power_cycles;
+  if (after < before->power_cycles) {
+    co_return senseless(fmt::format("the power-cycle counter went back from {} to {} upon a reset; {}",
+                                    before->power_cycles, after, what_the_ins_holds()));
+  }
+  if (restarts > 1) {
+    warn(fmt::format("{}: one reset counted as {} power cycles, {} to {}", config_.interface, restarts,
+                     before->power_cycles, after));
+  }
+  power_cycles_ = after;
   co_return Event::ins_restarted;
 }
 
@@ -357,9 +421,8 @@ Task<CalibrationRun::Step> CalibrationRun::read_in_force() {
     co_return tl::unexpected(taken.error());
   }
   if (in_force_ != new_set_) {
-    co_return senseless(
-        fmt::format("{}: after the power cycle the INS uses version {} (CRC {:08X}), not the set written",
-                    config_.interface, stock_.coefficients_version, stock_.coefficients_crc));
+    co_return senseless(fmt::format("after the power cycle the INS uses version {} (CRC {:08X}), not the set written",
+                                    stock_.coefficients_version, stock_.coefficients_crc));
   }
   remember("ins", fmt::format("coefficients version {} in force after the power cycle", stock_.coefficients_version));
   co_return Event::set_confirmed;
@@ -375,6 +438,8 @@ void CalibrationRun::close_record() {
   }
   if (record_.state == State::completed && !record_.abort_wanted) {
     record_.reason.clear();
+  } else if (!record_.serial.empty()) {
+    remember("ins", what_the_ins_holds());
   }
   if (record_.state == State::refused) {
     record_.reason = fmt::format("not written: {}", objections_.front());

@@ -8,10 +8,6 @@
 namespace selfcal {
 namespace {
 
-using namespace std::chrono_literals;
-
-// An estimate may take this part of one processor at most, whatever the pace of the data.
-constexpr double pause_per_work = 4.0;
 // From the rotation's clock, so that the gimbal still stands when the stop arrives: what the last status frame may be
 // old, and a round trip on the operator's clock.
 constexpr double status_age_s = 1.0;
@@ -45,52 +41,34 @@ void CalibrationRun::show_estimate(const ParameterVector& value, const Parameter
 
 // Of what has arrived without a gap, whenever so much more has.
 void CalibrationRun::estimate_meanwhile() {
-  if (config_.running_estimate_s <= 0 || running_busy_) {
-    return;
-  }
-  const std::uint32_t pages = pages_->missing(progress_.pages_expected, 1).first;
-  const double data_s = pages * page_s_;
-  const SteadyTime now = context_.timers.now();
-  if (data_s < least_running_data_s || data_s < running_begun_s_ + config_.running_estimate_s) {
-    return;
-  }
-  if (now < running_not_before_) {
-    return;
-  }
-  if (!running_estimator_) {
-    running_estimator_ = std::make_shared<RunningEstimator>(
-        EstimateRequest{folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_});
-  }
-  running_busy_ = true;
-  running_begun_s_ = data_s;
-  context_.estimators.start_running(
-      running_job(running_estimator_, pages),
-      [this](const Expected<RunningEstimate>& answer, double cpu_s) { on_running_estimate(answer, cpu_s); });
+  running_.pages_arrived(
+      pages_->missing(progress_.pages_expected, 1).first, page_s_,
+      [this] {
+        return std::make_shared<RunningEstimator>(
+            EstimateRequest{folder_, record_.rotation, record_.serial, record_.started_utc, schedule_, config_});
+      },
+      [this](const Expected<RunningEstimate>& answer, double data_s, bool first_met) {
+        on_running_estimate(answer, data_s, first_met);
+      });
 }
 
-void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer, double cpu_s) {
-  running_busy_ = false;
-  running_not_before_ =
-      context_.timers.now() + std::chrono::nanoseconds(static_cast<std::int64_t>(pause_per_work * cpu_s * 1e9));
+void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer, double data_s, bool first_met) {
   if (!answer) {  // too little as yet; what is wrong with the data the final estimate will say
-    remember("estimate",
-             fmt::format("after {:.0f} s of data: no estimate yet: {}", running_begun_s_, answer.error().message));
+    remember("estimate", fmt::format("after {:.0f} s of data: no estimate yet: {}", data_s, answer.error().message));
     return;
   }
-  const bool first_met = answer->met && !(running_ && running_->met);
-  running_ = *answer;
   progress_.running = true;
-  progress_.data_s = running_->data_s;
-  progress_.met_at_s = running_->forecast.met_at_s;
-  show_estimate(running_->value, running_->sigma);
+  progress_.data_s = answer->data_s;
+  progress_.met_at_s = answer->forecast.met_at_s;
+  show_estimate(answer->value, answer->sigma);
   foresee_finish();
   if (first_met) {
     remember("estimate",
-             fmt::format("after {:.0f} s of data every parameter is determined to its tolerance", running_->data_s));
+             fmt::format("after {:.0f} s of data every parameter is determined to its tolerance", answer->data_s));
   }
-  const auto& missing = running_->forecast.out_of_reach;
+  const auto& missing = answer->forecast.out_of_reach;
   // Early on the noise is known too badly to alarm anybody.
-  if (!missing.empty() && !out_of_reach_said_ && running_->data_s > 0.25 * schedule_.duration_s()) {
+  if (!missing.empty() && !out_of_reach_said_ && answer->data_s > 0.25 * schedule_.duration_s()) {
     out_of_reach_said_ = true;
     warn(
         fmt::format("this schedule will not determine {} to tolerance in this installation", fmt::join(missing, ", ")));
@@ -115,7 +93,7 @@ void CalibrationRun::foresee_finish() {
 // Where the gimbal stands at a position of the schedule, by its own word and by the clock. A gimbal that was never
 // heard of is not stopped before its time.
 bool CalibrationRun::may_end_early() const {
-  if (!record_.stop_when_met || !running_ || !running_->met) {
+  if (!record_.stop_when_met || !running_.latest() || !running_.latest()->met) {
     return false;
   }
   const double heard_s = std::chrono::duration<double>(context_.timers.now() - status_at_).count();
@@ -128,7 +106,7 @@ bool CalibrationRun::may_end_early() const {
 
 Task<CalibrationRun::Step> CalibrationRun::end_rotation_early() {
   if (record_.early_end_s < 0) {
-    record_.early_end_s = running_ ? running_->data_s : 0.0;  // until the last page tells
+    record_.early_end_s = running_.latest() ? running_.latest()->data_s : 0.0;  // until the last page tells
     remember("estimate", fmt::format("rotation ended early at position {} of {}, {:.0f} s before its time: every "
                                      "tolerance is met",
                                      progress_.ins.position, progress_.positions, progress_.ins.time_left_s));

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/run/transition_table.hpp"
+#include "daemon/store/run_state.hpp"
 #include "protocol/error.hpp"
 
 struct sqlite3;

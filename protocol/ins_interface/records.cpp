@@ -7,11 +7,13 @@
 #include <cstdlib>
 
 #include "protocol/byte_order.hpp"
+#include "protocol/flash/page.hpp"
 
 namespace selfcal::ins {
 namespace {
 
 constexpr std::int32_t full_turn_mdeg = 360'000;
+constexpr double half_way_round_m = 2.1e7;  // the Earth: no two places are farther apart
 
 template <typename... Fields>
 Bytes pack(const Fields&... fields) {
@@ -38,6 +40,23 @@ std::uint8_t code(E value) {
 }
 bool is_state(std::uint8_t value) { return value <= code(State::checking); }
 bool is_slot(std::uint8_t value) { return value <= code(Slot::b); }
+
+struct FieldRange {
+  std::string_view field;
+  double value, least, most;
+};
+
+// Rates: from one sample in two seconds, at which a rotation is hardly seen, to beyond the fastest inertial sensors.
+// Scales: a count below the noise of any sensor by orders of magnitude would overflow 32 bits within a sample at full
+// rate, or be coarser than a whole calibration.
+std::array<FieldRange, 6> sample_format_ranges(const SampleFormatRecord& r) {
+  return {{{"sample rate in Hz", r.sample_rate_hz, 0.5, 20e3},
+           {"angle per count in rad", r.delta_theta_lsb_rad, 1e-13, 1e-3},
+           {"velocity per count in m/s", r.delta_v_lsb_mps, 1e-11, 1e-1},
+           {"gimbal angle per count in rad", r.gimbal_lsb_rad, 1e-9, 0.1},
+           {"bytes of a page", static_cast<double>(r.page_bytes), flash::page_bytes, flash::page_bytes},
+           {"samples of a page", static_cast<double>(r.samples_per_page), 1.0, flash::samples_per_page}}};
+}
 
 }  // namespace
 
@@ -127,8 +146,8 @@ Expected<SiteRecord> decode_site(ByteView bytes) {
   if (!(std::abs(r.longitude_deg) <= 360.0)) {
     return wrong("site", "longitude", r.longitude_deg);
   }
-  if (!std::isfinite(r.height_m)) {
-    return wrong("site", "height", r.height_m);
+  if (!(r.height_m >= -1000.0 && r.height_m <= 20000.0)) {
+    return wrong("site", "height in m", r.height_m);
   }
   return r;
 }
@@ -152,6 +171,9 @@ Expected<DirectoryRecord> decode_directory(ByteView bytes) {
   const auto complete = in.get<std::uint8_t>();
   if (r.first_page > r.pages_written) {
     return wrong("directory", fmt::format("first page beyond the {} written; it", r.pages_written), r.first_page);
+  }
+  if (r.pages_written == 0 && r.samples != 0) {
+    return wrong("directory", "number of samples in no page", r.samples);
   }
   if (complete > 1) {
     return wrong("directory", "completeness", complete);
@@ -177,9 +199,10 @@ Expected<SampleFormatRecord> decode_sample_format(ByteView bytes) {
   r.gimbal_lsb_rad = in.get_double();
   r.page_bytes = in.get<std::uint32_t>();
   r.samples_per_page = in.get<std::uint16_t>();
-  for (const double value : {r.sample_rate_hz, r.delta_theta_lsb_rad, r.delta_v_lsb_mps, r.gimbal_lsb_rad}) {
-    if (!std::isfinite(value) || value <= 0.0) {
-      return wrong("sample format", "a rate or scale", value);
+  for (const auto& [field, value, least, most] : sample_format_ranges(r)) {
+    if (!(value >= least && value <= most)) {  // written so that NaN fails too
+      return fail(ErrorKind::bad_input, fmt::format("sample format record: {} is {:g}, must lie between {:g} and {:g}",
+                                                    field, value, least, most));
     }
   }
   return r;
@@ -239,9 +262,15 @@ Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes) {
   r.done = done == 1;
   for (double* value : {&r.elapsed_s, &r.north_m, &r.east_m, &r.max_horizontal_m}) {
     *value = in.get_double();
-    if (!std::isfinite(*value)) {
-      return wrong("navigation check", "a figure", *value);
+    if (!(std::abs(*value) <= half_way_round_m)) {  // written so that NaN fails too
+      return wrong("navigation check", "a time or distance", *value);
     }
+  }
+  if (r.elapsed_s < 0.0) {
+    return wrong("navigation check", "time passed in s", r.elapsed_s);
+  }
+  if (r.max_horizontal_m < 0.0) {
+    return wrong("navigation check", "largest distance in m", r.max_horizontal_m);
   }
   return r;
 }

@@ -27,7 +27,13 @@ MAY_INCLUDE = {
     "protocol/uds": [*BYTES, "protocol/isotp", "protocol/ins_interface"],
     # A fault of the estimator must not be repeated in the truth that it is measured against.
     "sim_ins": ["protocol", "estimator/geometry"],
-    "daemon": ["protocol", "estimator"],
+    # The rooms of the daemon: host <- ins, store <- estimate <- run <- what stands in daemon/ itself.
+    "daemon/host": ["protocol", "estimator/geometry"],
+    "daemon/ins": ["daemon/host", "protocol", "estimator/geometry"],
+    "daemon/store": ["daemon/host", "protocol", "estimator/geometry"],
+    "daemon/estimate": ["daemon/host", "daemon/store", "protocol", "estimator"],
+    "daemon/run": ["daemon/host", "daemon/ins", "daemon/store", "daemon/estimate", "protocol", "estimator"],
+    "daemon": ["daemon", "protocol", "estimator"],
     "tools": ["daemon", "protocol", "estimator", "sim_ins"],
     "tests": ["tools", "daemon", "protocol", "estimator", "sim_ins"],
 }

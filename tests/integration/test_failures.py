@@ -93,6 +93,43 @@ class Failures(case.OnBench):
         self.assertEqual(done.returncode, case.DEVICE_TROUBLE)
         self.assert_one_line(done.stderr, unit.interface)
 
+    def no_link(self, unit, *words):
+        done = unit.selfcal("run", unit.name, check=False)
+        self.assertEqual(done.returncode, case.DEVICE_TROUBLE, done.stderr)
+        self.assert_one_line(done.stderr, *words)
+
+    def short_patience(self):
+        return {"request_timeout_s": 0.3, "lost_after_s": 2.0}
+
+    def test_no_link_with_the_ins_switched_off(self):
+        unit = self.bench(ins=self.short_patience())
+        unit.start_daemon()
+        self.no_link(unit, "no frame at all is on the bus")
+
+    def test_no_link_with_a_wrong_request_id(self):
+        unit = self.bench(ins=self.short_patience() | {"request_id": 0x641}).start()
+        self.no_link(unit, "the ins is alive", "does not answer 0x641", "check request_id")
+
+    def test_no_link_classic_against_fd(self):
+        unit = self.bench(ins=self.short_patience(), sim_options=["--fd"]).start()
+        self.no_link(unit, "as can fd, and fd = false is configured")
+
+    def test_no_link_fd_against_classic(self):
+        unit = self.bench(ins=self.short_patience() | {"fd": True}).start()
+        self.no_link(unit, "the ins is alive", "fd = true is configured")
+
+    def test_no_link_without_the_interface(self):
+        unit = self.bench(ins=self.short_patience() | {"interface": "absent7"})
+        unit.start_daemon()
+        self.no_link(unit, "absent7", "no such device")
+
+    def test_no_link_with_the_interface_down(self):
+        unit = self.bench(ins=self.short_patience())
+        self.addCleanup(link, unit.interface, "up")
+        link(unit.interface, "down")
+        unit.start_daemon()
+        self.no_link(unit, unit.interface, "is down")
+
     def test_no_service(self):
         unit = self.bench()
         done = unit.selfcal("run", unit.name, check=False)

@@ -17,7 +17,10 @@ namespace selfcal::testing_support {
 
 using namespace std::chrono_literals;
 
-// Answers after ten seconds, with bias 1 m/s^2 so that the set written can be recognised.
+// Of every parameter, in SI: possible for each, so that the set written can be recognised.
+inline constexpr double new_value = 1e-6;
+
+// Answers after ten seconds.
 class FakeEstimators : public Estimators {
  public:
   explicit FakeEstimators(Timers& timers) : timers_(timers) {}
@@ -33,7 +36,7 @@ class FakeEstimators : public Estimators {
 
   static Estimate good() {
     Estimate estimate;
-    estimate.result.value.setConstant(1.0);
+    estimate.result.value.setConstant(new_value);
     estimate.result.sigma.setConstant(0.1);
     estimate.result.determined.fill(true);
     estimate.result.plausible.fill(true);

@@ -10,13 +10,14 @@ using namespace std::chrono_literals;
 using testing::HasSubstr;
 using testing_support::CalibrationRunTest;
 using testing_support::FakeIns;
+using testing_support::new_value;
 
 TEST_F(CalibrationRunTest, RunsFromIdentificationToTheProofThatTheSetIsInForce) {
   begin();
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(run_->record().exit_status, 0);
   EXPECT_EQ(ins_.in_force().version, 1u);
-  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+  EXPECT_EQ(ins_.in_force().value[0], new_value);
   EXPECT_EQ(ins_.starts, 1);
   EXPECT_EQ(ins_.pages_read.size(), FakeIns::pages);
   EXPECT_EQ(run_->record().drift_old_m, 500.0);
@@ -54,7 +55,7 @@ TEST_F(CalibrationRunTest, TheGateRefusesAndAReasonOpensIt) {
   EXPECT_EQ(end(), State::completed) << reason();
   // What was not determined stays as it was.
   EXPECT_EQ(ins_.in_force().value[0], 0.0);
-  EXPECT_EQ(ins_.in_force().value[1], 1.0);
+  EXPECT_EQ(ins_.in_force().value[1], new_value);
 }
 
 // The operator may overrule the limit of a type of INS, and then reads what was overruled. What no sensor can have is
@@ -68,7 +69,7 @@ TEST_F(CalibrationRunTest, AReasonNamesWhatItOverrulesAndPushesNothingImpossible
   begin(forced);
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(ins_.in_force().value[6], 0.0);
-  EXPECT_EQ(ins_.in_force().value[3], 1.0);
+  EXPECT_EQ(ins_.in_force().value[3], new_value);
   for (const char* words :
        {"gyro_drift_x implausible: 0.3 deg/h, limit 0.1", "accel_scale_pos_x = 7000 ppm", "after repair"}) {
     EXPECT_THAT(observer_.warnings, testing::Contains(HasSubstr(words)));
@@ -263,7 +264,7 @@ TEST_F(CalibrationRunTest, AmendmentEstimatesAgainAndWritesWithoutTurning) {
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(ins_.starts, 0);
   EXPECT_EQ(estimators_.jobs, 1);
-  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+  EXPECT_EQ(ins_.in_force().value[0], new_value);
   EXPECT_GE(run_->record().drift_new_m, 0.0);
   const auto events = *store_->events(run_->record().id);
   EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const EventRecord& event) {
@@ -316,7 +317,7 @@ TEST_P(EachState, ADaemonThatIsKilledGoesOn) {
   restart_daemon();
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(ins_.second_starts, 0);
-  EXPECT_EQ(ins_.in_force().value[0], 1.0);
+  EXPECT_EQ(ins_.in_force().value[0], new_value);
 }
 
 // The INS is gone for good: the run ends in the stated time, and the link is said to be why.

@@ -35,7 +35,9 @@ void FakeIns::send_status(double schedule_s) {
   status_timer_ = timers_.after(100ms, [this] { send_status(schedule_s_); });
 }
 
-double FakeIns::check_elapsed() const { return std::chrono::duration<double>(timers_.now() - *check_started_).count(); }
+double FakeIns::check_elapsed() const {
+  return std::min(check_s, std::chrono::duration<double>(timers_.now() - *check_started_).count());
+}
 
 double FakeIns::since_start() const { return std::chrono::duration<double>(timers_.now() - started_).count(); }
 
@@ -60,8 +62,23 @@ std::uint32_t FakeIns::pages_written() {
                   static_cast<std::uint32_t>((stopped_s_ < 0 ? since_start() : stopped_s_) / rotation_s * pages));
 }
 
+bool FakeIns::session_expired() const { return (dead || !session_kept_) && timers_.now() - alive_at_ > 5s; }
+
+void FakeIns::keep_session(bool keep) {
+  if (!dead && session_kept_ && !session_expired()) {
+    alive_at_ = timers_.now();
+  }
+  session_kept_ = keep;
+}
+
+Answer<Bytes> FakeIns::change_session(std::uint8_t wanted) {
+  unlocked_ = false;
+  extended_ = wanted == static_cast<std::uint8_t>(uds::Session::extended);
+  return uds::session_response(static_cast<uds::Session>(wanted), {50ms, 5s});
+}
+
 void FakeIns::power_cycle() {
-  turning_ = unlocked_ = false;
+  turning_ = unlocked_ = extended_ = false;
   resting_ = ins::State::idle;
   check_started_.reset();
   inactive_.clear();
@@ -71,7 +88,7 @@ void FakeIns::power_cycle() {
 
 void FakeIns::cancel() { timers_.cancel(timer_); }
 
-void FakeIns::request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) {
+void FakeIns::request(std::span<const std::uint8_t> payload, std::size_t, std::function<void(Answer<Bytes>)> done) {
   const Bytes bytes(payload.begin(), payload.end());
   if (dead) {
     timer_ = timers_.after(1s, [done] {
@@ -79,7 +96,24 @@ void FakeIns::request(std::span<const std::uint8_t> payload, std::function<void(
     });
     return;
   }
-  timer_ = timers_.after(1ms, [this, bytes, done] { done(respond(bytes)); });
+  if (ignores && ignores(bytes)) {
+    alive_at_ = timers_.now();
+    timer_ = timers_.after(given_up_after, [done] {
+      done(tl::unexpected(PortError{PortError::Kind::link, 0, "fake0: no answer within 1 s"}));
+    });
+    return;
+  }
+  timer_ = timers_.after(1ms, [this, bytes, done] {
+    if (session_expired()) {
+      unlocked_ = extended_ = false;
+    }
+    alive_at_ = timers_.now();
+    auto answer = respond(bytes);
+    if (alter) {
+      alter(bytes, answer);
+    }
+    done(std::move(answer));
+  });
 }
 
 tl::unexpected<PortError> FakeIns::no(std::uint8_t nrc) {
@@ -99,6 +133,16 @@ Bytes FakeIns::page(std::uint32_t number) {
   }
   pages_read.push_back(number);
   return {bytes.begin(), bytes.end()};
+}
+
+Bytes FakeIns::next_block() {
+  if (upload_rest_.empty()) {
+    upload_rest_ = page(upload_page_++);
+  }
+  const auto count = static_cast<std::ptrdiff_t>(std::min<std::size_t>(block_bytes, upload_rest_.size()));
+  const Bytes block(upload_rest_.begin(), upload_rest_.begin() + count);
+  upload_rest_.erase(upload_rest_.begin(), upload_rest_.begin() + count);
+  return block;
 }
 
 Answer<Bytes> FakeIns::read(std::uint16_t did) {
@@ -166,7 +210,9 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
       if (state() == ins::State::checking) {
         return no(0x22);
       }
-      inactive_.assign(ins::coefficients_bytes, 0xFF);
+      if (erases) {
+        inactive_.assign(ins::coefficients_bytes, 0xFF);
+      }
       break;
     case ins::routine::commit_coefficients:
       if (const auto set = ins::decode_coefficients(inactive_); set && !ignores_commit) {
@@ -204,8 +250,11 @@ Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
   }
   ByteReader reader(request.subspan(1));
   switch (request[0]) {
-    case uds::service::session_control: return uds::session_response(uds::Session::extended, {50ms, 5s});
+    case uds::service::session_control: return change_session(request[1]);
     case uds::service::security_access: {
+      if (!extended_) {
+        return no(0x7F);
+      }
       if (reader.get<std::uint8_t>() == uds::security_seed_level) {
         return uds::seed_response(seed_);
       }
@@ -247,11 +296,12 @@ Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
         return no(0x31);
       }
       upload_page_ = range->first_page;
+      upload_rest_.clear();
       return uds::upload_response(flash::page_bytes + uds::transfer_overhead);
     }
     case uds::service::transfer_data: {
       Bytes out;
-      uds::transfer_response(request[1], page(upload_page_++), out);
+      uds::transfer_response(request[1], next_block(), out);
       return out;
     }
     case uds::service::transfer_exit: return uds::transfer_exit_response();

@@ -10,6 +10,7 @@
 
 #include "daemon/ins/ins_port.hpp"
 #include "daemon/ins/unlock_key.hpp"
+#include "protocol/flash/page.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/ins_interface/records.hpp"
 #include "tests/unit/daemon/simulated_timers.hpp"
@@ -21,16 +22,23 @@ class FakeIns : public InsPort {
   explicit FakeIns(Timers& timers);
   ~FakeIns() override;
 
-  void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) override;
+  void request(std::span<const std::uint8_t> payload, std::size_t longest_answer,
+               std::function<void(Answer<Bytes>)> done) override;
   void cancel() override;
   void reopen() override {}
   std::uint64_t lost_frames() const override { return 0; }
   std::string_view interface() const override { return "fake0"; }
+  void keep_session(bool keep) override;
+  void take_timings(const uds::SessionTimings& stated) override { timings_taken = stated; }
 
   void power_cycle();  // RAM is lost; the newest valid slot comes into force
   ins::State state();
   std::uint32_t pages_written();
   const ins::Coefficients& in_force() const { return slots_.at(in_force_); }
+  // Five seconds (S3) after the last request or TesterPresent the session is over and the INS is locked.
+  bool in_default_session() const { return !extended_ || session_expired(); }
+  bool unlocked() const { return unlocked_ && !in_default_session(); }
+  bool session_kept() const { return session_kept_; }
 
   // Faults
   bool dead = false;                       // no answer to anything
@@ -41,6 +49,14 @@ class FakeIns : public InsPort {
   std::uint32_t ring = pages;                      // so many of the newest pages are kept
   bool gimbal_sticks = false;                      // the rotation fails half-way
   std::optional<std::uint8_t> refuses_check_stop;  // with this NRC
+
+  // Somebody in the middle: sees each request and the INS's answer, and may change the answer.
+  std::function<void(std::span<const std::uint8_t> request, Answer<Bytes>& answer)> alter;
+  // Requests that are never answered; everything else is.
+  std::function<bool(std::span<const std::uint8_t> request)> ignores;
+  std::chrono::nanoseconds given_up_after = std::chrono::seconds(1);  // by the port, upon such a request
+  bool erases = true;                                                 // else it agrees, and does nothing
+  std::uint32_t block_bytes = flash::page_bytes;                      // of data in a TransferData
 
   void begin_check() { check_started_ = timers_.now(); }  // as another tester would
 
@@ -60,19 +76,26 @@ class FakeIns : public InsPort {
   int stops = 0;
   int check_stops = 0;
   std::vector<std::uint32_t> pages_read;
+  std::optional<uds::SessionTimings> timings_taken;
 
  private:
+  bool session_expired() const;
+  Answer<Bytes> change_session(std::uint8_t wanted);
   Answer<Bytes> respond(std::span<const std::uint8_t> request);
   Answer<Bytes> respond_to_routine(std::span<const std::uint8_t> request);
   Answer<Bytes> read(std::uint16_t did);
   tl::unexpected<PortError> no(std::uint8_t nrc);
   Bytes page(std::uint32_t number);
+  Bytes next_block();
   double since_start() const;
   double check_elapsed() const;
 
   Timers& timers_;
   Timers::Id timer_ = 0;
   bool unlocked_ = false;
+  bool extended_ = false;
+  bool session_kept_ = false;  // by TesterPresent
+  SteadyTime alive_at_{};      // the last request, or the end of TesterPresent
   std::array<std::uint8_t, 16> seed_{9, 9, 9};
   ins::State resting_ = ins::State::idle;
   bool turning_ = false;
@@ -84,6 +107,7 @@ class FakeIns : public InsPort {
   Bytes inactive_;  // as written, not committed yet
   std::optional<SteadyTime> check_started_;
   std::uint32_t upload_page_ = 0;
+  Bytes upload_rest_;  // of the page that is being uploaded
   Timers::Id status_timer_ = 0;
   double schedule_s_ = 0.0;
   double stopped_s_ = -1.0;  // into the rotation

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "protocol/uds/services.hpp"
+#include "tests/unit/daemon/simulated_timers.hpp"
 
 namespace selfcal {
 namespace {
@@ -14,13 +15,15 @@ namespace {
 // callback comes from run(), as the loop's would.
 class TersePort : public InsPort {
  public:
-  void request(std::span<const std::uint8_t> payload, std::function<void(Answer<Bytes>)> done) override {
+  void request(std::span<const std::uint8_t> payload, std::size_t, std::function<void(Answer<Bytes>)> done) override {
     answer_ = Bytes{static_cast<std::uint8_t>(payload[0] + uds::positive_offset),
                     payload.size() > 1 ? payload[1] : std::uint8_t{0}};
     done_ = std::move(done);
   }
   void cancel() override { done_ = nullptr; }
   void reopen() override {}
+  void keep_session(bool) override {}
+  void take_timings(const uds::SessionTimings&) override {}
   std::uint64_t lost_frames() const override { return 0; }
   std::string_view interface() const override { return "can7"; }
 
@@ -50,7 +53,8 @@ std::string complaint(TersePort& port, Task<Answer<T>> dialogue) {
 
 TEST(InsClient, SenselessAnswersNameTheInterface) {
   TersePort port;
-  InsClient client(port);
+  testing_support::SimulatedTimers timers;
+  InsClient client(timers, port);
   const std::string lines[] = {
       complaint(port, client.identify()),
       complaint(port, client.read_state()),

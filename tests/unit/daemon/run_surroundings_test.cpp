@@ -61,9 +61,10 @@ TEST_F(RunSurroundingsTest, ManyErrorFramesAreFewLinesAndASum) {
   EXPECT_THAT(texts("bus").back(), HasSubstr("error frames in this run: 501"));
 }
 
-// 1e9 Hz for the 49 min of a schedule are petabytes: no disk has them.
+// 20 kHz for eleven days in each of the 19 positions are petabytes: no disk has them.
 TEST_F(RunSurroundingsTest, ADiskTooSmallForTheRunIsSeenBeforeAnythingTurns) {
-  ins_.sample_rate_hz = 1e9;
+  ins_.sample_rate_hz = 20e3;
+  schedule_.dwell_s.assign(schedule_.positions.size(), 1e6);
   begin();
   EXPECT_EQ(end(), State::failed);
   EXPECT_THAT(reason(), HasSubstr("MiB free, a run of"));

@@ -150,6 +150,26 @@ TEST(Records, BadValuesAreNamed) {
   EXPECT_THAT(decode_site(encode(SiteRecord{90.5, 0, 0})).error().message, HasSubstr("latitude is 90.5"));
   EXPECT_FALSE(decode_site(encode(SiteRecord{nan, 0, 0})));
   EXPECT_FALSE(decode_sample_format(encode(SampleFormatRecord{0.0, 1, 1, 1, 4096, 145})));
+  const auto of_format = [](const SampleFormatRecord& record) {
+    const auto read = decode_sample_format(encode(record));
+    return read ? std::string("taken") : read.error().message;
+  };
+  EXPECT_EQ(of_format({200.0, 1e-9, 1e-7, 1e-4, 4096, 145}), "taken");
+  EXPECT_THAT(of_format({1e-300, 1e-9, 1e-7, 1e-4, 4096, 145}), HasSubstr("sample rate in Hz is 1e-300"));
+  EXPECT_THAT(of_format({nan, 1e-9, 1e-7, 1e-4, 4096, 145}), HasSubstr("sample rate in Hz is nan"));
+  EXPECT_THAT(of_format({200.0, 1e-9, 1e-7, 1e-4, 4096, 0}), HasSubstr("samples of a page is 0"));
+  EXPECT_THAT(of_format({200.0, 1e-9, 1e-7, 1e-4, 4096, 146}), HasSubstr("samples of a page is 146"));
+  EXPECT_THAT(of_format({200.0, 1e-9, 1e-7, 1e-4, 512, 10}), HasSubstr("bytes of a page is 512"));
+  const auto of_check = [](const NavigationCheckRecord& record) {
+    const auto read = decode_navigation_result(encode(record));
+    return read ? std::string("taken") : read.error().message;
+  };
+  EXPECT_EQ(of_check({true, 3600, -1.5, 2.5, 3.0}), "taken");
+  EXPECT_THAT(of_check({true, 3600, 0, 0, 1e308}), HasSubstr("is 1e+308"));
+  EXPECT_THAT(of_check({true, 3600, 0, 0, -5}), HasSubstr("largest distance in m is -5"));
+  EXPECT_THAT(of_check({true, -1, 0, 0, 0}), HasSubstr("time passed in s is -1"));
+  EXPECT_THAT(decode_site(encode(SiteRecord{0, 0, 1e9})).error().message, HasSubstr("height in m is 1000000000"));
+  EXPECT_FALSE(decode_directory(encode(DirectoryRecord{5, 0, 0, 20, 7, false})));
   EXPECT_FALSE(decode_directory(encode(DirectoryRecord{5, 11, 10, 20, 0, false})));
   Bytes state = encode(StateRecord{});
   state[0] = 7;

@@ -1,0 +1,84 @@
+#include "daemon/run/ins_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/passes/calibration.hpp"
+
+namespace selfcal {
+namespace {
+
+// A gimbal may be slower or faster from one position to the next than the schedule has it, by far less than this part of
+// the whole time; and the last page is a part of one.
+constexpr double pages_slack = 0.1;
+constexpr double pages_rounding = 2.0;
+// A part of a second at either end of the check.
+constexpr double check_slack_s = 2.0;
+// Free fall, which no platform at rest exceeds.
+constexpr double gravity_mps2 = 9.81;
+
+}  // namespace
+
+double pages_of(const Schedule& schedule, const ins::SampleFormatRecord& format) {
+  return std::ceil(schedule.duration_s() * format.sample_rate_hz / format.samples_per_page);
+}
+
+bool holds_whole_rotation(const ins::DirectoryRecord& directory) {
+  return directory.complete && directory.pages_expected > 0 && directory.pages_written == directory.pages_expected;
+}
+
+Complaint check_directory(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
+                          const Schedule& schedule) {
+  const double pages = pages_of(schedule, format);
+  const double most = pages * (1.0 + pages_slack) + pages_rounding;
+  const double least = pages * (1.0 - pages_slack) - pages_rounding;
+  const std::string of_schedule = fmt::format("the schedule of {:.0f} s at {:g} Hz has {:.0f}", schedule.duration_s(),
+                                              format.sample_rate_hz, pages);
+  if (directory.pages_expected > most || directory.pages_expected < std::max(least, 1.0)) {
+    return fmt::format("directory: {} pages expected, {}", directory.pages_expected, of_schedule);
+  }
+  if (directory.pages_written > most) {
+    return fmt::format("directory: {} pages written, {}", directory.pages_written, of_schedule);
+  }
+  const std::uint64_t full = std::uint64_t{directory.pages_written} * format.samples_per_page;
+  const std::uint64_t but_last = directory.pages_written == 0 ? 0 : full - format.samples_per_page + 1;
+  if (directory.samples > full || directory.samples < but_last) {
+    return fmt::format("directory: {} samples in {} pages of {}", directory.samples, directory.pages_written,
+                       format.samples_per_page);
+  }
+  return std::nullopt;
+}
+
+Complaint check_coefficients(const std::array<double, sensor_parameter_count>& value, std::string_view whose) {
+  const ParameterVector limit = plausible_limit();
+  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
+    const SensorParameter& parameter = sensor_parameters[i];
+    const double most = limit(static_cast<Eigen::Index>(i));
+    if (!(std::abs(value[i]) <= most)) {
+      return fmt::format("{}: {} = {:g} {}, physically possible are {:g} at most", whose, parameter.name,
+                         value[i] / parameter.si_per_unit, parameter.unit, most / parameter.si_per_unit);
+    }
+  }
+  return std::nullopt;
+}
+
+Complaint check_navigation(const ins::NavigationCheckRecord& answer, double asked_s) {
+  if (answer.elapsed_s > asked_s + check_slack_s || (answer.done && answer.elapsed_s < asked_s - check_slack_s)) {
+    return fmt::format("navigation check: {} after {:g} s, {:g} s were asked for", answer.done ? "done" : "going on",
+                       answer.elapsed_s, asked_s);
+  }
+  const double farthest_m = 0.5 * gravity_mps2 * asked_s * asked_s;
+  const double end_m = std::hypot(answer.north_m, answer.east_m);
+  if (answer.max_horizontal_m > farthest_m) {
+    return fmt::format("navigation check: {:g} m away at most, free fall takes {:g} m in {:g} s",
+                       answer.max_horizontal_m, farthest_m, asked_s);
+  }
+  if (answer.done && end_m > answer.max_horizontal_m * (1.0 + 1e-6) + 1e-3) {
+    return fmt::format("navigation check: {:g} m away in the end, {:g} m at most", end_m, answer.max_horizontal_m);
+  }
+  return std::nullopt;
+}
+
+}  // namespace selfcal

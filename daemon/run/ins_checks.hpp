@@ -1,0 +1,35 @@
+// What an INS says of its data and of itself, held against the schedule and against what else it says. Each complaint
+// names the value and what it contradicts; none begins with the interface. What a single record can tell by itself is
+// checked where its bytes are read (protocol/ins_interface).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "estimator/geometry/schedule.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/ins_interface/records.hpp"
+
+namespace selfcal {
+
+using Complaint = std::optional<std::string>;  // nothing: it fits
+
+// Pages of the whole schedule at this format.
+double pages_of(const Schedule& schedule, const ins::SampleFormatRecord& format);
+
+// Everything of the rotation lies in the FLASH.
+bool holds_whole_rotation(const ins::DirectoryRecord& directory);
+
+// Samples against pages, pages against the schedule.
+Complaint check_directory(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
+                          const Schedule& schedule);
+
+// The first value (SI, order of sensor_parameters) outside what is physically possible.
+Complaint check_coefficients(const std::array<double, sensor_parameter_count>& value, std::string_view whose);
+
+// A navigation check of `asked_s` that says it is done, or is under way.
+Complaint check_navigation(const ins::NavigationCheckRecord& answer, double asked_s);
+
+}  // namespace selfcal
