@@ -24,7 +24,7 @@ constexpr std::array schedule_fields{RecordField{"positions", F::u8, 1, "number 
                                      RecordField{"dwell_ms", F::u32, 1, "at each position", true}};
 constexpr std::array site_fields{RecordField{"latitude_deg", F::f64, 1, "WGS-84, -90 to 90"},
                                  RecordField{"longitude_deg", F::f64, 1, "-360 to 360"},
-                                 RecordField{"height_m", F::f64, 1, "above the ellipsoid"}};
+                                 RecordField{"height_m", F::f64, 1, "above the ellipsoid, -1000 to 20,000"}};
 constexpr std::array directory_fields{
     RecordField{"run_id", F::u32, 1, "latest run"},
     RecordField{"first_page", F::u32, 1, "older ones were overwritten by the ring"},
@@ -33,12 +33,12 @@ constexpr std::array directory_fields{
     RecordField{"samples", F::u64, 1, "written so far"},
     RecordField{"complete", F::u8, 1, "1: no more will come"}};
 constexpr std::array sample_format_fields{
-    RecordField{"sample_rate_hz", F::f64, 1, "of the IMU"},
-    RecordField{"delta_theta_lsb_rad", F::f64, 1, "rad per count of an angle increment"},
-    RecordField{"delta_v_lsb_mps", F::f64, 1, "m/s per count of a velocity increment"},
-    RecordField{"gimbal_lsb_rad", F::f64, 1, "rad per count of a gimbal read-out"},
-    RecordField{"page_bytes", F::u32, 1, "bytes of a page"},
-    RecordField{"samples_per_page", F::u16, 1, "samples of a full page"}};
+    RecordField{"sample_rate_hz", F::f64, 1, "of the IMU, 0.5 to 20,000"},
+    RecordField{"delta_theta_lsb_rad", F::f64, 1, "rad per count of an angle increment, 1e-13 to 1e-3"},
+    RecordField{"delta_v_lsb_mps", F::f64, 1, "m/s per count of a velocity increment, 1e-11 to 0.1"},
+    RecordField{"gimbal_lsb_rad", F::f64, 1, "rad per count of a gimbal read-out, 1e-9 to 0.1"},
+    RecordField{"page_bytes", F::u32, 1, "bytes of a page, 4096"},
+    RecordField{"samples_per_page", F::u16, 1, "samples of a full page, 1 to 145"}};
 constexpr std::array run_fields{RecordField{"state", F::u8, 1, "as in StateRecord"},
                                 RecordField{"faults", F::u8, 1, "as in StateRecord"},
                                 RecordField{"position", F::u8, 1, "1 is the first; 0: not in a schedule"},

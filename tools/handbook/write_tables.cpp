@@ -206,7 +206,7 @@ a count is worth. Sample *i* of the run ends at (i + 1) / rate.
   text += fmt::format("| S3 | {} | without a request: default session, locked |\n", milliseconds(server.s3));
   text += fmt::format(
       "| P2 (tester) | {} | to the first frame of the answer, bus delay included; key `request_timeout_s` sets it for "
-      "an INS |\n",
+      "an INS, and it grows where the INS states that it takes longer |\n",
       milliseconds(client.p2));
   text += fmt::format("| response-pending | {} | altogether, for one request |\n", milliseconds(client.pending_limit));
   text += fmt::format("| TesterPresent | {} | interval |\n", milliseconds(client.tester_present));
