@@ -36,6 +36,29 @@ void add_differences(const std::vector<Six>& integral, std::size_t m, Six& sum, 
   }
 }
 
+// Of the variance over m samples from one dwell of `points` integrals, overlapping estimator: the lesser of those for
+// white noise (white FM) and for a rate random walk (random-walk FM).
+double freedom_of(double points, double m) {
+  const double white = (1.5 * (points - 1.0) / m - 2.0 * (points - 2.0) / points) * 4.0 * m * m / (4.0 * m * m + 5.0);
+  const double n = points - 1.0;
+  const double walk = (points - 2.0) / m * (n * n - 3.0 * m * n + 4.0 * m * m) / ((points - 3.0) * (points - 3.0));
+  return std::max(1.0, std::min(white, walk));
+}
+
+// Of the mean over all differences: each dwell weighs as many as it has.
+double pooled_freedom(const std::vector<std::vector<Six>>& integrals, std::size_t m) {
+  double count = 0.0;
+  double variance = 0.0;
+  for (const auto& integral : integrals) {
+    if (integral.size() > 2 * m) {
+      const auto differences = static_cast<double>(integral.size() - 2 * m);
+      count += differences;
+      variance += differences * differences / freedom_of(static_cast<double>(integral.size()), static_cast<double>(m));
+    }
+  }
+  return variance > 0.0 ? count * count / variance : 0.0;
+}
+
 std::vector<std::size_t> cluster_lengths(std::size_t longest) {
   std::vector<std::size_t> lengths;
   for (double step = 0.0;; step += 1.0) {
@@ -74,6 +97,7 @@ std::vector<AllanPoint> allan_deviation(const Recording& recording, const std::v
     for (double& value : point.deviation) {
       value = std::sqrt(value / (2.0 * static_cast<double>(point.differences))) / point.tau_s;
     }
+    point.freedom = pooled_freedom(integrals, m);
     points.push_back(point);
   }
   return points;
