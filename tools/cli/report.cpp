@@ -13,6 +13,7 @@
 #include "daemon/host/wall_clock.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"
+#include "protocol/recording/file_hash.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/diagnose_output.hpp"
@@ -26,6 +27,7 @@
 #include "tools/report/page.hpp"
 #include "tools/report/plan_document.hpp"
 #include "tools/report/run_document.hpp"
+#include "tools/report/run_words.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -94,7 +96,10 @@ Expected<Json> recording_document(const std::string& file, const ReportArguments
     }
     document["diagnosis"] = std::move(*diagnosed);
   }
-  return document;
+  return sha256_of_file(file).map([&](const std::string& hash) {
+    document["input"] = {{"name", std::filesystem::path(file).filename().string()}, {"sha256", hash}};
+    return std::move(document);
+  });
 }
 
 // From the daemon, or from a file that holds what it said.
@@ -168,6 +173,7 @@ Expected<Json> page_of(const std::string& subject, const ReportArguments& argume
       return made;
     }
     document = std::move(*made);
+    document["summary"] = report::page_summary(document);
     utc = document.value("start_time_utc", std::string());
   }
   if (!arguments.past.empty() || (live && !serial.empty())) {
@@ -221,9 +227,16 @@ Expected<Json> fleet_page(const ReportArguments& arguments) {
   return report::fleet_document(histories, arguments.fleet_options);
 }
 
+// Which program made the page, and when.
+Expected<void> write_page_of_now(Json document, const std::filesystem::path& file) {
+  document["program"] = {{"name", "selfcal"}, {"version", SELFCAL_VERSION}};
+  document["made_utc"] = utc_now();
+  return report::write_page(document, file);
+}
+
 Expected<int> page_written(const ReportArguments& arguments) {
   return (arguments.fleet ? fleet_page(arguments) : page_of(arguments.subjects.front(), arguments))
-      .and_then([&](const Json& document) { return report::write_page(document, arguments.output); })
+      .and_then([&](const Json& document) { return write_page_of_now(document, arguments.output); })
       .map([] { return 0; });
 }
 
@@ -250,7 +263,7 @@ Expected<int> write_report(ReportArguments arguments) {
 
 Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& schedules, const Installation& installation,
                                const std::filesystem::path& file) {
-  return report::write_page(report::plan_document(schedules, installation), file);
+  return write_page_of_now(report::plan_document(schedules, installation), file);
 }
 
 CommandRun configure(CLI::App& app) {

@@ -9,7 +9,7 @@
 #include "daemon/estimate/result_json.hpp"
 #include "estimator/diagnosis/signature_pass.hpp"
 #include "estimator/geometry/units.hpp"
-#include "tools/report/allan_deviation.hpp"
+#include "tools/report/noise_document.hpp"
 #include "tools/report/page.hpp"
 
 namespace selfcal::report {
@@ -42,24 +42,6 @@ Json gimbal_json(const Recording& recording) {
     inner.push_back(rounded(recording.gimbal_inner_rad[row] / units::degree));
   }
   return {{"time_s", std::move(time)}, {"outer_deg", std::move(outer)}, {"inner_deg", std::move(inner)}};
-}
-
-Json allan_json(const Recording& recording) {
-  std::vector<double> first_temperature;
-  const ImuData data = imu_view(recording, first_temperature);
-  Json tau = Json::array();
-  std::array<Json, 6> columns;
-  columns.fill(Json::array());
-  for (const AllanPoint& point : allan_deviation(recording, find_segments(data))) {
-    tau.push_back(rounded(point.tau_s));
-    for (std::size_t axis = 0; axis < columns.size(); ++axis) {
-      const double unit = axis < 3 ? units::degree_per_hour : units::micro_g;
-      columns[axis].push_back(rounded(point.deviation[axis] / unit));
-    }
-  }
-  return {{"tau_s", std::move(tau)},
-          {"gyro_deg_per_h", {columns[0], columns[1], columns[2]}},
-          {"accel_ug", {columns[3], columns[4], columns[5]}}};
 }
 
 // Innovations of a forward pass at the answer, over their predicted sigma: unit variance where nothing is left out.
@@ -95,7 +77,7 @@ nlohmann::ordered_json calibration_document(const CalibrationResult& result, con
   document["kind"] = "calibration";
   round_curves(document);
   document["gimbal"] = gimbal_json(recording);
-  document["allan"] = allan_json(recording);
+  document["allan"] = noise_document(recording);
   document["innovations"] = innovations_json(result, recording);
   return document;
 }

@@ -111,6 +111,28 @@ void add_turns(const diagnosis::SignaturePass& pass, std::vector<Cell>& cells) {
   }
 }
 
+// Bias of each axis in each whole dwell.
+Json dwells_json(const diagnosis::SignaturePass& pass, const diagnosis::SignatureRows& rows,
+                 const Eigen::VectorXd& explained) {
+  Json position = Json::array(), axis = Json::array();
+  Json bias = Json::array(), sigma = Json::array(), signature = Json::array();
+  Eigen::Index next = pass.first_map_column();
+  for (const LocatedColumn& m : pass.map()) {
+    const auto column = rows.columns.col(next++);
+    const double information = column.squaredNorm();
+    if (m.kind != LocatedColumn::Kind::dwell || information < visible) {
+      continue;
+    }
+    const double unit = diagnosis::map_unit(m.axis) / (m.axis < 3 ? units::degree_per_hour : units::micro_g);
+    position.push_back(m.index + 1);
+    axis.push_back(m.axis);
+    bias.push_back(rounded(unit * column.dot(rows.residual) / information));
+    sigma.push_back(rounded(unit / std::sqrt(information)));
+    signature.push_back(rounded(unit * column.dot(explained) / information));
+  }
+  return {{"position", position}, {"axis", axis}, {"bias", bias}, {"sigma", sigma}, {"signature", signature}};
+}
+
 }  // namespace
 
 Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d) {
@@ -144,6 +166,7 @@ Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d) {
     signature.push_back(rounded(cell.unit * column.dot(explained) / information));
   }
   return {{"edges_s", edges_s},
+          {"dwells", dwells_json(pass, rows, explained)},
           {"cells",
            {{"position", position},
             {"axis", axis},

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "tools/report/run_words.hpp"
+
 namespace selfcal::report {
 namespace {
 
@@ -40,6 +42,24 @@ Json last_before(const Json& values, const std::string& utc) {
   return last;
 }
 
+std::string hash_of(const Json& document) {
+  const Json input = value_or_null(document, "input");
+  return input.is_object() ? input.value("sha256", std::string()) : std::string();
+}
+
+// The curves belong to the numbers only where both are of the same file.
+void warn_of_another_file(Json& document, const Json& result, const std::optional<Json>& recomputed) {
+  if (!recomputed || !result.is_object()) {
+    return;
+  }
+  const std::string then = hash_of(result);
+  const std::string now = hash_of(*recomputed);
+  if (!then.empty() && !now.empty() && then != now) {
+    document["warnings"].push_back(
+        fmt::format("the recording is not the one of the run: SHA-256 {} then, {} now", then, now));
+  }
+}
+
 }  // namespace
 
 Expected<Json> read_run(const std::string& text, const std::string& source) {
@@ -55,15 +75,20 @@ Json run_page_document(const Json& run, const std::optional<Json>& recomputed) {
   const Json result = value_or_null(run, "result");
   if (result.is_object()) {
     for (const auto& [key, value] : result.items()) {
-      // The passes of the recomputation have the curves; all else is what the operator was told.
-      if (key != "passes" || !recomputed) {
+      // The recomputation has the curves of the passes and the maps of the diagnosis; all else is what the operator was
+      // told.
+      const bool drawn = (key == "passes" || key == "diagnosis") && document.contains(key);
+      if (!drawn) {
         document[key] = value;
       }
     }
   }
+  warn_of_another_file(document, result, recomputed);
   document["kind"] = "calibration";
   document["run"] = run;
   document["run"].erase("result");
+  document["summary"] = page_summary(document);
+  document["force"] = force_of_run(document["run"]);
   return document;
 }
 

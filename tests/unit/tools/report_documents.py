@@ -1,5 +1,5 @@
 """What the daemon says of a run and of three units, made from an estimate: report_documents.py ESTIMATE.json RECORDING
-writes run.json, failed.json (a run that broke off) and history-SN-000{1,2,3}.json, in the formats of `selfcal show --json`
+writes run.json, failed.json (a run that broke off), replaced.json (a run whose set another run replaced) and history-SN-000{1,2,3}.json, in the formats of `selfcal show --json`
 and `selfcal history --json`.
 
 SN-0002's accel_bias_z moves by 9 sigma a year, its limit two years ahead; the other values stand still to the millionth of
@@ -52,6 +52,8 @@ run |= {"events": [{"utc": run["started_utc"], "kind": "transition", "text": "co
                          "in_force": True},
         "result": estimate}
 json.dump(run, open("run.json", "w"))
+force = {"now": False, "known": True, "from_utc": run["ended_utc"], "until_utc": "2026-04-01T09:00:00Z", "ended_by_run": 201}
+json.dump(run | {"in_force": force, "coefficients": run["coefficients"] | {"in_force": False}}, open("replaced.json", "w"))
 none = {"previous": None, "proposed": None, "read_back": None, "pushed": None, "in_force": False}
 run |= {"state": "failed", "exit_status": 4, "reason": "the link to the INS is gone", "result": None, "coefficients": none,
         "recording": "gone.h5", "drift_before_m": None, "drift_after_m": None}

@@ -2,14 +2,16 @@
 'use strict';
 
 const axisColours = ['x', 'y', 'z'];
+const angleSteps = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720];
+const numberOrNull = (value) => (Number.isFinite(value) ? value : null);
 const axisDashes = [undefined, [8, 4], [2, 3]];   // told apart without colour too
 
 // The virtual time of the passes laid end to end, in minutes, with a gap (null) between passes.
 function passAxis(report) {
   const axis = {minutes: [], passOf: [], epochOf: [], marks: []};
   let offset = 0;
-  report.passes.forEach((pass, number) => {
-    if (pass.epoch_s.length === 0) {
+  listOf(report.passes).forEach((pass, number) => {
+    if (listOf(pass.epoch_s).length === 0) {
       return;
     }
     const begin = Math.min(...pass.epoch_s);
@@ -32,13 +34,14 @@ function passAxis(report) {
   return axis;
 }
 
-// Wide enough for the 3 sigma band over the later part of each pass. Every pass starts from ignorance, where the band
-// is thousands of times wider: shown whole, the end would be a flat line.
-function convergenceRange(sigmas, final, sigma) {
-  const sorted = sigmas.filter((value) => value !== null).sort((a, b) => a - b);
-  const later = sorted.length > 0 ? sorted[Math.floor(0.3 * (sorted.length - 1))] : 0;
-  const half = Math.max(8 * sigma, 4 * later, 1e-12);
-  return [final - half, final + half];
+// What the answer is measured from: the estimate less the answer, linear within a sigma of it and logarithmic beyond,
+// so that the first minutes and the last are both seen.
+function convergenceScale(parameter, moves, sigmas) {
+  const smallest = Math.min(...sigmas.filter((value) => value > 0));
+  const linear = parameter.sigma > 0 ? parameter.sigma : Number.isFinite(smallest) ? smallest : 1;
+  const sizes = moves.map((move, row) => Math.abs(move) + 3 * (sigmas[row] ?? 0)).filter(Number.isFinite);
+  const half = Math.max(10 * linear, ...sizes.map((size) => 1.3 * size));
+  return {asinh: linear, range: [-half, half]};
 }
 
 function showConvergence(report) {
@@ -46,37 +49,45 @@ function showConvergence(report) {
   const axis = passAxis(report);
   report.parameters.forEach((parameter, index) => later(() => {
     const pick = (key) => axis.passOf.map(
-        (pass, row) => (pass === null ? null : report.passes[pass][key][axis.epochOf[row]][index]));
+        (pass, row) => (pass === null ? null : numberOrNull(report.passes[pass][key]?.[axis.epochOf[row]]?.[index])));
     const values = pick('epoch_values');
     const sigmas = pick('epoch_sigmas');
-    const range = convergenceRange(sigmas, parameter.value, parameter.sigma);
-    // Drawn once the band has come near the picture: before that the estimate is noise a thousand times its height.
-    const near = (list) => list.map((value, row) => (sigmas[row] !== null && 3 * sigmas[row] < range[1] - range[0] ? value : null));
-    const at = (sign) => values.map((value, row) => (value === null ? null : value + sign * 3 * sigmas[row]));
+    if (!Number.isFinite(parameter.value) || !values.some(Number.isFinite)) {
+      return;
+    }
+    const at = (sign) => values.map((value, row) => (value === null || sigmas[row] === null ? null : value + sign * 3 * sigmas[row]));
+    const less = (list) => list.map((value) => (value === null ? null : value - parameter.value));
+    const line = (label, list, more) => ({label, colour: 'x', values: list, shown: less(list), ...more});
     addPlot(place, {
       id: 'convergence-' + parameter.name,
-      title: parameter.name,
+      title: `${parameter.name}: ${withSigma(parameter.value, parameter.sigma)} ${unitSymbol(parameter.unit)}`,
       x: {label: 'time worked through', unit: 'min', values: axis.minutes},
-      y: {label: 'estimate', unit: parameter.unit, range},
-      series: [{label: 'estimate', colour: 'x', values, shown: near(values)},
-               {label: '+3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(1), shown: near(at(1))},
-               {label: '−3 σ', colour: 'x', thin: true, dash: [3, 3], values: at(-1), shown: near(at(-1))}],
+      y: {label: 'estimate − answer', unit: parameter.unit, ...convergenceScale(parameter, less(values), sigmas)},
+      series: [line('estimate', values), line('+3 σ', at(1), {thin: true, dash: [3, 3]}),
+               line('−3 σ', at(-1), {thin: true, dash: [3, 3]})],
       band: [2, 3],
       marks: axis.marks,
+      level: 0,
     });
   }));
 }
 
+// One time axis for the plots of the recording, so that they stand under each other.
+const wholeTime = (report) => (report.duration_s > 0 ? [0, report.duration_s / 60] : undefined);
+
 function showNis(report) {
   const middle = (segment) => (segment.start_s + segment.end_s) / 120;
-  const counted = report.segments.filter((segment) => segment.epochs > 0);
+  const counted = listOf(report.segments).filter((segment) => segment.epochs > 0 && Number.isFinite(segment.nis_mean));
+  if (counted.length === 0) {
+    return;
+  }
   const values = (kind) => counted.map((segment) => (segment.kind === kind ? segment.nis_mean : null));
   const top = Math.max(2, 1.15 * Math.max(...counted.map((segment) => segment.nis_mean)));
   addPlot(document.getElementById('nis-plot'), {
     id: 'nis',
-    title: 'Normalised innovation squared, each dwell and rotation (1 expected)',
-    x: {label: 'time', unit: 'min', values: counted.map(middle)},
-    y: {label: 'NIS per degree of freedom', unit: '1', range: [0, top]},
+    title: 'Normalised innovation squared (NIS) of each dwell and rotation, per degree of freedom (1 expected)',
+    x: {label: 'time', unit: 'min', values: counted.map(middle), range: wholeTime(report)},
+    y: {label: 'mean NIS', unit: '1', range: [0, top]},
     series: [{label: 'dwell', colour: 'x', points: true, values: values('dwell')},
              {label: 'rotation', colour: 'y', points: true, values: values('rotation')}],
     level: 1,
@@ -85,13 +96,16 @@ function showNis(report) {
 
 // A thousand points a line: the mean of each stretch would hide what the picture is for, so every k-th is shown.
 function showInnovations(report) {
-  const all = report.innovations;
+  const all = objectOf(report.innovations);
+  if (listOf(all.time_s).length === 0) {
+    return;
+  }
   const step = Math.ceil(all.time_s.length / 1500);
   const thin = (list) => list.filter((_, k) => k % step === 0);
   addPlot(document.getElementById('innovation-plot'), {
     id: 'innovations',
     title: 'Innovations of the last answer over their predicted σ (unit variance expected; dotted: ±3 σ)',
-    x: {label: 'time', unit: 'min', values: thin(all.time_s).map((at) => at / 60)},
+    x: {label: 'time', unit: 'min', values: thin(all.time_s).map((at) => at / 60), range: wholeTime(report)},
     y: {label: 'innovation / σ', unit: '1'},
     series: ['north', 'up', 'east'].map((axis, k) => ({label: axis, colour: axisColours[k], points: true, small: true,
                                                       values: thin(all[axis])})),
@@ -100,32 +114,17 @@ function showInnovations(report) {
 }
 
 function showGimbal(report) {
-  const gimbal = report.gimbal;
+  const gimbal = objectOf(report.gimbal);
+  if (listOf(gimbal.time_s).length === 0) {
+    return;
+  }
   addPlot(document.getElementById('gimbal-plot'), {
     id: 'gimbal',
     title: 'Gimbal angles',
-    x: {label: 'time', unit: 'min', values: gimbal.time_s.map((at) => at / 60)},
-    y: {label: 'read-out', unit: 'deg'},
+    x: {label: 'time', unit: 'min', values: gimbal.time_s.map((at) => at / 60), range: wholeTime(report)},
+    y: {label: 'read-out', unit: 'deg', steps: angleSteps},
     series: [{label: 'outer', colour: 'x', values: gimbal.outer_deg},
              {label: 'inner', colour: 'y', dash: [6, 3], values: gimbal.inner_deg}],
   });
 }
 
-function showAllan(report) {
-  const place = document.getElementById('allan-plots');
-  const allan = report.allan;
-  if (allan.tau_s.length === 0) {
-    place.append(element('p', {}, 'No dwell was long enough for an Allan deviation.'));
-    return;
-  }
-  const add = (id, title, unit, columns) => addPlot(place, {
-    id,
-    title,
-    height: 280,
-    x: {label: 'averaging time', unit: 's', log: true, values: allan.tau_s},
-    y: {label: 'Allan deviation', unit, log: true},
-    series: columns.map((values, k) => ({label: axisColours[k], colour: axisColours[k], dash: axisDashes[k], values})),
-  });
-  add('allan-gyro', 'Gyros', 'deg/h', allan.gyro_deg_per_h);
-  add('allan-accel', 'Accelerometers', 'ug', allan.accel_ug);
-}

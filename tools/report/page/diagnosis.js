@@ -5,72 +5,141 @@ const verdictWords = {
   'adequate': '✔ The 24-parameter model explains the recording.',
   'named': '✘ The recording holds physics that the 24-parameter model leaves out; it is named below.',
   'none of the above': '✘ The recording and the model differ, and nothing in the catalogue explains it.',
-  'not enough information': '? The recording hints at an effect but does not hold enough information to name it.',
+  'not enough information': '○ The recording hints at an effect but does not hold enough information to name it.',
   'data fault': '✘ The data themselves are faulty; nothing else is concluded from them.',
 };
 
-// p of a single test may lie far below the smallest double.
-function probabilityText(evidence) {
-  return evidence.log10_p > -4 ? significant(10 ** evidence.log10_p, 2) : `10^${evidence.log10_p.toFixed(0)}`;
+// A power of ten as people write it: p of a single test may lie far below the smallest double.
+function powerOfTen(power) {
+  return '10' + String(Math.round(power)).replace(/[-0-9]/g, (sign) => (sign === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[sign]));
 }
 
+function probabilityText(log10) {
+  if (!Number.isFinite(log10)) {
+    return '–';
+  }
+  return log10 > -4 ? significant(10 ** log10, 2) : powerOfTen(log10);
+}
+
+// A coefficient below 3 sigma is grey: it is fitted with the others and says nothing by itself.
+function coefficientsOf(finding) {
+  const parts = listOf(finding.parameters).map((p) => element('span',
+      {class: Math.abs(p.value) < insignificant * p.sigma ? 'faint' : ''},
+      `${textOf(p.name)} ${withSigma(p.value, p.sigma)} ${unitSymbol(p.unit)}`));
+  return element('span', {}, ...parts.flatMap((part, k) => (k === 0 ? [part] : ['; ', part])));
+}
+
+const evidenceOf = (finding) => objectOf(finding.evidence);
+
 function findingsTable(findings, id) {
-  const sizes = (finding) => finding.parameters.map(
-      (p) => `${p.name} ${withSigma(p.value, p.sigma)} ${unitSymbol(p.unit)}`).join('; ');
   return table([
-    {title: 'effect', cells: findings.map((f) => f.effect), class: 'left'},
-    {title: 'equation', cells: findings.map((f) => f.equation), class: 'words'},
-    {title: 'size ± σ', cells: findings.map(sizes), class: 'words'},
+    {title: 'effect', cells: findings.map((f) => textOf(f.effect)), class: 'left'},
+    {title: 'equation', cells: findings.map((f) => textOf(f.equation)), class: 'words'},
+    {title: 'size ± σ', cells: findings.map(coefficientsOf), class: 'words'},
     {title: 'significance (σ)', cells: findings.map((f) => significant(f.significance, 3))},
-    {title: 'p without it', cells: findings.map((f) => probabilityText(f.evidence))},
-    {title: 'fall of BIC', cells: findings.map((f) => (f.stochastic ? '–' : significant(f.evidence.delta_bic, 4)))},
-    {title: 'held-out gain (ln likelihood)', cells: findings.map((f) => (f.stochastic ? '–' : significant(f.evidence.held_out_gain, 4)))},
-    {title: 'cannot be told from', cells: findings.map((f) => f.equivalent.join(', ') || '–'), class: 'words'},
-    {title: 'run next', cells: findings.map((f) => f.experiment || '–'), class: 'words'},
+    {title: 'p without it', cells: findings.map((f) => probabilityText(evidenceOf(f).log10_p))},
+    {title: 'fall of BIC', cells: findings.map((f) => (f.stochastic ? '–' : significant(evidenceOf(f).delta_bic, 4)))},
+    {title: 'held-out gain (ln likelihood)', cells: findings.map((f) => (f.stochastic ? '–' : significant(evidenceOf(f).held_out_gain, 4)))},
+    {title: 'cannot be told from', cells: findings.map((f) => listOf(f.equivalent).join(', ') || '–'), class: 'words'},
+    {title: 'run next', cells: findings.map((f) => textOf(f.experiment) || '–'), class: 'words'},
   ], {id});
 }
 
+// Strongest first; those that chance makes too are grey.
 function placesTable(places) {
+  const sorted = [...places].sort((a, b) => (b.significance ?? 0) - (a.significance ?? 0));
   return table([
-    {title: 'where', cells: places.map((l) => l.words), class: 'left'},
-    {title: 'bias', cells: places.map((l) => significant(l.bias, 3))},
-    {title: 'unit', cells: places.map((l) => unitSymbol(l.unit)), class: 'left'},
-    {title: 'significance (σ)', cells: places.map((l) => significant(l.significance, 3))},
-  ]);
+    {title: 'where', cells: sorted.map((l) => textOf(l.words)), class: 'left'},
+    {title: 'bias', cells: sorted.map((l) => significant(l.bias, 3))},
+    {title: 'unit', cells: sorted.map((l) => unitSymbol(l.unit)), class: 'left'},
+    {title: 'significance (σ)', cells: sorted.map((l) => significant(l.significance, 3))},
+  ], {}, sorted.map((l) => Math.abs(l.significance) < insignificant));
 }
 
-function adequacyTable(adequacy) {
-  const rows = [adequacy.before, adequacy.after];
+function adequacyTable(adequacy, named) {
+  const rows = [objectOf(adequacy.before), ...(named ? [objectOf(adequacy.after)] : [])];
   return table([
-    {title: 'model', cells: ['24 parameters', 'with the named effects'], class: 'left'},
+    {title: 'model', cells: ['24 parameters', 'with the named effects'].slice(0, rows.length), class: 'left'},
     {title: 'NIS (1 expected)', cells: rows.map((a) => significant(a.nis, 4))},
     {title: 'largest misfit (σ)', cells: rows.map((a) => significant(a.largest_located_sigma, 3))},
-    {title: 'whiteness log10 p', cells: rows.map((a) => significant(a.whiteness_log10_p, 3))},
+    {title: 'innovations white? (p)', cells: rows.map((a) => probabilityText(a.whiteness_log10_p))},
     {title: 'misfit (χ² beyond its degrees of freedom)', cells: rows.map((a) => significant(a.misfit, 4))},
-    {title: 'accepted', cells: rows.map((a) => (a.accepted ? '✔ yes' : '✘ no'))},
+    {title: 'recording explained', cells: rows.map((a) => (a.accepted ? element('span', {class: 'good'}, '✔ yes')
+                                                                   : element('span', {class: 'bad'}, '✘ no')))},
   ], {id: 'adequacy'});
 }
 
-function correctedTable(parameters) {
-  const moved = parameters.map((p) => ({...p, move: p.value - p.value_without}))
-      .filter((p) => Math.abs(p.move) > p.sigma_without);
-  return [`${moved.length} of the 24 moved by more than their σ`, table([
-    {title: 'parameter', cells: moved.map((p) => p.name), class: 'left'},
-    {title: '24 alone', cells: moved.map((p) => withSigma(p.value_without, p.sigma_without))},
-    {title: 'with the effects', cells: moved.map((p) => withSigma(p.value, p.sigma))},
-    {title: 'difference', cells: moved.map((p) => significant(p.move, 3))},
-    {title: 'unit', cells: moved.map((p) => unitSymbol(p.unit)), class: 'left'},
-    {title: 'difference (σ)', cells: moved.map((p) => significant(p.move / p.sigma_without, 3))},
-  ])];
+// What the omission did to the 24; the numbers stand in their own table.
+function correctionWords(parameters) {
+  const size = (p) => Math.abs(p.value - p.value_without) / p.sigma_without;
+  const moved = parameters.filter((p) => size(p) > insignificant).sort((a, b) => size(b) - size(a));
+  if (moved.length === 0) {
+    return 'None of the 24 is moved by more than 3 σ.';
+  }
+  const one = (p) => `${p.name} ${withSigma(p.value_without, p.sigma_without)} → ${withSigma(p.value, p.sigma)} ${unitSymbol(p.unit)} `
+      + `(${signed((p.value - p.value_without) / p.sigma_without, 1)} σ)`;
+  return `${moved.length} of the 24 ${moved.length === 1 ? 'is' : 'are'} moved by more than 3 σ, most of all ${moved.slice(0, 3).map(one).join('; ')}. `
+      + 'All corrected values stand in the table of the 24.';
+}
+
+// Bias of each axis in each dwell, in which the 24 are projected out: the shape of what nothing in the catalogue explains.
+function addDwellPlots(place, map) {
+  const dwells = objectOf(map?.dwells);
+  const count = Math.max(0, ...listOf(dwells.position));
+  if (count === 0) {
+    return;
+  }
+  const left = dwells.bias.map((bias, k) => bias - (dwells.signature[k] ?? 0));
+  [['gyros', 0, 'deg/h'], ['accelerometers', 3, 'ug']].forEach(([name, first, unit]) => {
+    // Beside each other, so that the bars of the three axes do not hide one another.
+    const slots = [...Array(3 * count).keys()];
+    const row = new Map(dwells.position.map((position, k) => [`${position} ${dwells.axis[k]}`, k]));
+    const at = (slot) => row.get(`${Math.floor(slot / 3) + 1} ${first + slot % 3}`);
+    const strong = (k) => Math.abs(left[k]) >= insignificant * dwells.sigma[k];
+    const pick = (list, wanted) => slots.map((slot) => (at(slot) !== undefined && wanted(slot, at(slot)) ? numberOrNull(list[at(slot)]) : null));
+    const series = (label, colour, wanted) => ({label, colour, points: true, values: pick(left, wanted), errors: pick(dwells.sigma, wanted)});
+    addPlot(place, {
+      id: `dwell-bias-${name}`,
+      title: `Bias of the ${name} in each dwell, ±1 σ`,
+      height: 260,
+      x: {label: 'position', unit: 'number', values: slots.map((slot) => Math.floor(slot / 3) + 1 + 0.2 * (slot % 3 - 1)),
+          steps: [1, 2, 5, 10, 20, 50]},
+      y: {label: 'bias', unit},
+      series: [...axisColours.map((axis, k) => series(axis, axis, (slot, cell) => slot % 3 === k && strong(cell))),
+               series('below 3 σ', 'faint', (slot, cell) => !strong(cell))],
+      level: 0,
+    });
+  });
+}
+
+// The dead end that is none: what the pictures tell apart, and what to record next.
+function adviceForUnexplained(adequacy) {
+  const nis = objectOf(adequacy?.after).nis ?? objectOf(adequacy?.before).nis;
+  const advice = [
+    'Do not use the 24: their σ holds for a model that this recording contradicts.',
+    'See the bias in each dwell below. What returns at the same gimbal position belongs to the sensors or the gimbal; what '
+        + 'grows with time to warm-up or ageing; what appears once to the site (people, wind, a moved base).',
+    'Record the same schedule again and report it too: what repeats in the plots below is physics of the unit, what does '
+        + 'not repeat is a disturbance, and a calibration without it may pass.',
+    'If the base may have moved, record on a still base; if the unit was cold, after it has warmed up.',
+  ];
+  if (Number.isFinite(nis) && nis < 1.1) {
+    advice.splice(1, 0, `A mean NIS of ${significant(nis, 3)} does not contradict this: the mean hides a misfit that a few `
+        + 'dwells hold, for the 24 take up most of it.');
+  }
+  return element('ul', {id: 'advice'}, ...advice.map((words) => element('li', {}, words)));
 }
 
 // The two axes that the signature moves most, in all their cells.
 function addSignaturePlots(place, map, findings) {
-  const cells = map.cells;
+  const cells = objectOf(map?.cells);
+  if (listOf(cells.axis).length === 0) {
+    return;
+  }
   const power = [0, 0, 0, 0, 0, 0];
   cells.axis.forEach((axis, k) => { power[axis] += (cells.signature[k] / cells.sigma[k]) ** 2; });
   // An accelerometer's error shows in the gyros' cells too, through the position; the named sensors come first.
-  const named = (axis) => (findings.some((f) => f.effect.startsWith(axis < 3 ? 'gyro' : 'accel')) ? 1 : 0);
+  const named = (axis) => (findings.some((f) => textOf(f.effect).startsWith(axis < 3 ? 'gyro' : 'accel')) ? 1 : 0);
   const seen = power.map((value, axis) => ({value, axis})).filter(({value}) => value > 25)
       .sort((a, b) => named(b.axis) - named(a.axis) || b.value - a.value).slice(0, 2);
   for (const {axis} of seen) {
@@ -79,13 +148,57 @@ function addSignaturePlots(place, map, findings) {
     const pick = (list) => rows.map((k) => list[k]);
     addPlot(place, {
       id: 'signature-' + axis,
-      title: `${sensorNames[axis]}: bias per position and time since the turn`,
+      title: `${sensorNames[axis]}: bias in each stretch of time after a turn`,
       height: 280,
       x: {label: 'time', unit: 'min', values: pick(cells.middle_s).map((at) => at / 60)},
       y: {label: 'bias', unit: axis < 3 ? 'deg/h' : 'ug'},
       series: [{label: 'recording, ±1 σ', colour: 'x', points: true, values: pick(cells.bias), errors: pick(cells.sigma)},
                {label: 'signature of the named effects', colour: 'y', dash: [6, 3], values: pick(cells.signature)}],
     });
+  }
+}
+
+function showMisfitMaps(map) {
+  const cells = objectOf(map?.cells);
+  if (listOf(cells.bias).length === 0) {
+    return;
+  }
+  const maps = document.getElementById('misfit-maps');
+  addMisfitMap(maps, map, 'misfit-before', 'Misfit of the 24 alone', cells.bias);
+  if (cells.signature.some((value) => value !== 0)) {
+    addMisfitMap(maps, map, 'misfit-after', 'What the named effects leave', cells.bias.map((value, k) => value - cells.signature[k]));
+  }
+}
+
+function showDiagnosisTables(d) {
+  const place = document.getElementById('diagnosis-tables');
+  const add = (title, ...content) => place.append(element('h3', {}, title), ...content);
+  const findings = listOf(d.findings);
+  const rejected = listOf(d.rejected);
+  const suspected = listOf(d.suspected);
+  add(findings.length > 0 ? 'Before and after' : 'Recording against model', adequacyTable(objectOf(d.adequacy), findings.length > 0));
+  if (d.unexplained) {
+    add('What to do', adviceForUnexplained(d.adequacy));
+  }
+  if (findings.length > 0) {
+    add('Effects left out, best first', findingsTable(findings, 'findings'));
+    add('What the omission did to the 24', element('p', {class: 'note', id: 'corrections'}, correctionWords(listOf(d.parameters))));
+  }
+  if (suspected.length > 0) {
+    add('Too weak to name; it would show with', element('ul', {}, ...suspected.map(
+        (f) => element('li', {}, `${textOf(f.effect)} (${significant(f.significance, 2)} σ): ${textOf(f.experiment) || 'a longer recording'}`))));
+  }
+  if (rejected.length > 0) {
+    add('Fitted best, but rejected by what remains', findingsTable(rejected, 'rejected'));
+  }
+  if (listOf(d.located).length > 0) {
+    add('Largest misfits of the 24 alone, each place tested on its own', placesTable(d.located));
+  }
+  if (d.unexplained && listOf(d.remaining).length > 0) {
+    add('What remains', placesTable(d.remaining));
+  }
+  if (listOf(d.undetectable_here).length > 0) {
+    place.append(element('p', {class: 'note'}, 'Not detectable here at typical size: ' + d.undetectable_here.map(textOf).join(', ') + '.'));
   }
 }
 
@@ -96,43 +209,17 @@ function showDiagnosis(report) {
     return;
   }
   document.getElementById('diagnosis-words').textContent =
-      `${verdictWords[d.verdict] || d.verdict} False alarms: ${significant(100 * d.false_alarm_rate, 2)} % of recordings.`;
-  const place = document.getElementById('diagnosis-tables');
-  const add = (title, ...content) => place.append(element('h3', {}, title), ...content);
-  if (d.data_faults.length > 0) {
-    add('Faults of the data', element('ul', {}, ...d.data_faults.map(
-        (f) => element('li', {class: 'bad'}, `${f.words} (first at sample ${f.first_sample}, ${f.count} in all)`))));
+      `${verdictWords[d.verdict] || textOf(d.verdict)} False alarms: ${significant(100 * d.false_alarm_rate, 2)} % of recordings.`;
+  const faults = listOf(d.data_faults);
+  if (faults.length > 0) {
+    document.getElementById('diagnosis-tables').append(element('h3', {}, 'Faults of the data'), element('ul', {}, ...faults.map(
+        (f) => element('li', {class: 'bad'}, `${textOf(f.words)} (first at sample ${textOf(f.first_sample)}, ${textOf(f.count)} in all)`))));
     return;
   }
-  add('Before and after', adequacyTable(d.adequacy));
-  if (d.findings.length > 0) {
-    add('Effects left out, best first', findingsTable(d.findings, 'findings'));
+  showDiagnosisTables(d);
+  if (d.unexplained || d.verdict === 'not enough information') {
+    addDwellPlots(document.getElementById('dwell-plots'), d.map);
   }
-  if (d.suspected.length > 0) {
-    add('Too weak to name; it would show with', element('ul', {}, ...d.suspected.map(
-        (f) => element('li', {}, `${f.effect} (${significant(f.significance, 2)} σ): ${f.experiment}`))));
-  }
-  if (d.rejected.length > 0) {
-    add('Fitted best, but rejected by what remains', findingsTable(d.rejected, 'rejected'));
-  }
-  if (d.findings.length > 0) {
-    const [words, corrected] = correctedTable(d.parameters);
-    add('What the omission did to the 24', element('p', {class: 'note'}, words + '.'), corrected);
-  }
-  if (d.located.length > 0) {
-    add('Largest misfits, each place tested on its own', placesTable(d.located));
-  }
-  if (d.unexplained && d.remaining.length > 0) {
-    add('What remains', placesTable(d.remaining));
-  }
-  if (d.undetectable_here.length > 0) {
-    place.append(element('p', {class: 'note'}, 'Not detectable here at typical size: ' + d.undetectable_here.join(', ') + '.'));
-  }
-  addSignaturePlots(document.getElementById('signature-plots'), d.map, d.findings);
-  const maps = document.getElementById('misfit-maps');
-  addMisfitMap(maps, d.map, 'misfit-before', 'Misfit of the 24 alone', d.map.cells.bias);
-  if (d.map.cells.signature.some((value) => value !== 0)) {
-    addMisfitMap(maps, d.map, 'misfit-after', 'What the named effects leave',
-                 d.map.cells.bias.map((value, k) => value - d.map.cells.signature[k]));
-  }
+  addSignaturePlots(document.getElementById('signature-plots'), d.map, listOf(d.findings));
+  showMisfitMaps(d.map);
 }

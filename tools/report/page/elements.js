@@ -31,7 +31,7 @@ function unitSymbol(unit) {
 
 // The shortest text with `digits` significant digits.
 function significant(value, digits = 4) {
-  if (value === null || !Number.isFinite(value)) {
+  if (!Number.isFinite(value)) {
     return '–';
   }
   if (value === 0) {
@@ -45,14 +45,19 @@ function significant(value, digits = 4) {
   return value.toFixed(Math.min(decimals, 12));
 }
 
-// As toFixed, without a minus before zero.
+// As toFixed, without a minus before zero; a dash for what is no number.
 function fixed(value, decimals) {
-  return value.toFixed(decimals).replace(/^-(0(?:\.0*)?)$/, '$1');
+  return Number.isFinite(value) ? value.toFixed(decimals).replace(/^-(0(?:\.0*)?)$/, '$1') : '–';
 }
+
+// A document may lack what it should have: lists then are empty, texts are.
+const listOf = (value) => (Array.isArray(value) ? value : []);
+const textOf = (value) => (typeof value === 'string' ? value : typeof value === 'number' ? String(value) : '');
+const objectOf = (value) => (value && typeof value === 'object' && !Array.isArray(value) ? value : {});
 
 // Decimals that show two significant digits of sigma: value and sigma are then cut at the same place.
 function decimalsFor(sigma) {
-  if (!(sigma > 0)) {
+  if (!(sigma > 0) || !Number.isFinite(sigma)) {
     return 6;
   }
   return Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
@@ -77,8 +82,8 @@ function cssColour(name) {
   return knownColours.get(name);
 }
 
-// columns: [{title, cells}], cells being texts or elements.
-function table(columns, attributes = {}) {
+// columns: [{title, cells, class}], cells being texts or elements; faint: for each row whether it is grey.
+function table(columns, attributes = {}, faint = []) {
   const head = element('tr');
   for (const column of columns) {
     head.append(element('th', {scope: 'col', class: column.class || ''}, column.title));
@@ -89,6 +94,9 @@ function table(columns, attributes = {}) {
     const line = element('tr');
     for (const column of columns) {
       line.append(element('td', {class: column.class || ''}, column.cells[row] ?? ''));
+    }
+    if (faint[row]) {
+      line.className = 'faint';
     }
     body.append(line);
   }

@@ -99,13 +99,13 @@ function showFleet(report) {
   const due = report.units.filter((u) => u.due_in_days === null || u.due_in_days < 0);
   const drifting = report.units.filter((u) => u.parameters.some((p) => p.drifts));
   const passing = report.units.filter(limitOf);
-  const verdict = document.getElementById('verdict');
   const list = (units) => (units.length === 0 ? '' : ` (${units.map((u) => u.serial).join(', ')})`);
-  verdict.textContent = `${due.length === 0 ? '✔' : '✘'} ${due.length} of ${report.units.length} units are due${list(due)}; `
-      + `${drifting.length} drift${list(drifting)}; ${passing.length} will pass a limit within 20 years${list(passing)}.`;
-  verdict.className = due.length === 0 ? 'yes' : 'no';
+  showBanner({standing: due.length === 0 ? 'good' : 'bad',
+              verdict: `${due.length} of ${report.units.length} units are due${list(due)}; ${drifting.length} drift${list(drifting)}; `
+                  + `${passing.length} will pass a limit within 20 years${list(passing)}.`});
   fillFacts([['As of', report.as_of_utc], ['Interval', `${significant(report.interval_days, 4)} days`],
              ['Units', String(report.units.length)]]);
+  showOrigin(report);
   showUnits(report);
   showDrifts(report);
   showTrends(report);

@@ -2,16 +2,18 @@
 'use strict';
 
 function showCalibration(report) {
-  document.title = `Self-calibration of ${report.serial || report.run?.serial || 'an INS'}`;
-  const sections = [showVerdict, showRun, showHistory];
-  if (report.parameters) {
-    sections.push(showFacts, showParameters, showConsistency, showUndetermined);
+  document.title = `Self-calibration of ${textOf(report.serial) || textOf(objectOf(report.run).serial) || 'an INS'}`;
+  const known = listOf(report.parameters).length > 0;
+  const sections = [showVerdict, ...(known ? [showFacts] : []), showOrigin, showRun, showHistory];
+  if (known) {
+    sections.push(showParameters, showConsistency, showUndetermined);
   } else {
+    delete report.parameters;
     ['parameters', 'consistency', 'noise', 'correlation'].forEach(hideSection);
   }
   sections.push(showDiagnosis);
   // What only the recording itself can tell.
-  if (report.gimbal) {
+  if (report.gimbal && known) {
     sections.push(showPasses, showConvergence, showNis, showInnovations, showGimbal, showSegments, showAllan, showCorrelation);
   } else {
     ['convergence', 'schedule', 'noise'].forEach(hideSection);
@@ -28,15 +30,20 @@ function showCalibration(report) {
     }
     document.documentElement.dataset.ready = 'true';
   };
-  ({calibration: showCalibration, plan: showPlan, fleet: showFleet})[report.kind](report);
+  // A part that the document does not allow says so, and the others stand.
+  whenBroken = (error) => document.querySelector('main').append(
+      element('p', {class: 'bad missing-part'}, `A part of this page is missing, for the document lacks what it needs: ${error.message}`));
+  later(() => ({calibration: showCalibration, plan: showPlan, fleet: showFleet})[report.kind](report));
+  setPaperMargins(report);
   workOn();
   document.getElementById('save-json').addEventListener(
       'click', () => saveBlob('report.json', 'application/json', JSON.stringify(report)));
 
-  // Canvases do not follow style sheets: drawn anew for another colour scheme, width or paper.
+  // Canvases do not follow style sheets: drawn anew for another colour scheme or paper.
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redrawPlots);
   const onPaper = (paper) => {
     document.documentElement.classList.toggle('print', paper);
+    setPaperMargins(report);
     finishWork();
     redrawPlots();
   };
@@ -44,9 +51,4 @@ function showCalibration(report) {
   addEventListener('beforeprint', () => onPaper(true));
   addEventListener('afterprint', () => onPaper(false));
   matchMedia('print').addEventListener('change', (event) => onPaper(event.matches));
-  let pending = 0;
-  addEventListener('resize', () => {
-    clearTimeout(pending);
-    pending = setTimeout(redrawPlots, 150);
-  });
 })();

@@ -4,13 +4,14 @@
 const planColours = ['x', 'y'];
 const planDashes = [undefined, [7, 4]];
 
-function planVerdict(plans) {
-  return plans.map((plan) => {
+function planSummary(plans) {
+  const words = plans.map((plan) => {
     const missed = plan.parameters.filter((p) => !p.determined).map((p) => p.name);
     const minutes = significant(plan.duration_s / 60, 3);
-    return missed.length === 0 ? `✔ ${plan.name} meets every tolerance in ${minutes} min.`
-        : `✘ ${plan.name} (${minutes} min) leaves ${missed.length} of ${plan.parameters.length} beyond tolerance: ${missed.join(', ')}.`;
-  }).join(' ');
+    return missed.length === 0 ? `${plan.name} meets every tolerance in ${minutes} min.`
+        : `${plan.name} (${minutes} min) leaves ${missed.length} of ${plan.parameters.length} beyond tolerance: ${missed.join(', ')}.`;
+  });
+  return {standing: plans[0].meets_tolerances ? 'good' : 'bad', verdict: words.join(' ')};
 }
 
 function showAccuracy(plans) {
@@ -43,7 +44,7 @@ function showTimelines(plans) {
       id: 'timeline-' + number,
       title: `${plan.name}: ${plan.positions.length} positions, ${significant(plan.duration_s / 60, 3)} min`,
       x: {label: 'time', unit: 'min', values: plan.track.time_s.map((at) => at / 60), range: [0, longest]},
-      y: {label: 'gimbal angle', unit: 'deg'},
+      y: {label: 'gimbal angle', unit: 'deg', steps: angleSteps},
       series: [{label: 'outer', colour: 'x', values: plan.track.outer_deg},
                {label: 'inner', colour: 'y', dash: [6, 3], values: plan.track.inner_deg}],
     });
@@ -85,9 +86,7 @@ function showForecasts(plans) {
 function showPlan(report) {
   document.title = 'Calibration plan';
   const plans = report.plans;
-  const verdict = document.getElementById('verdict');
-  verdict.textContent = planVerdict(plans);
-  verdict.className = plans[0].meets_tolerances ? 'yes' : 'no';
+  showBanner(planSummary(plans));
   const at = report.installation;
   fillFacts([
     ['Base', `roll ${fixed(at.roll_deg, 2)}°, pitch ${fixed(at.pitch_deg, 2)}°, heading ${fixed(at.heading_deg, 2)}°`],
@@ -96,6 +95,7 @@ function showPlan(report) {
     ['Velocity random walk', `${significant(at.accel_vrw_ug_per_sqrt_hz, 3)} µg/√Hz`],
     ['Known position', `${significant(at.position_sigma_m, 3)} m at 1 Hz`],
   ]);
+  showOrigin(report);
   later(() => showAccuracy(plans), () => showTimelines(plans),
         ...plans.map((plan, number) => () => addSphere(document.getElementById('sphere-plots'), plan, number)),
         () => showForecasts(plans));

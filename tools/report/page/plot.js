@@ -1,6 +1,8 @@
 // One plot: a figure with title, legend, uPlot canvas, read-out, saving, and its numbers as a table.
 //
-// spec: {id, title, height, x: {label, unit, values, log}, y: {label, unit, log, range: [low, high]},
+// spec: {id, title, height, x: {label, unit, values, log}, y: {label, unit, log, asinh, steps, range: [low, high]},
+//        (asinh: linear up to this value on either side of zero and logarithmic beyond; steps: the steps that the ticks
+//        may have)
 //        series: [{label, colour, values, shown, errors, dash, points, marks, thin, spanGaps}] (shown: what is drawn, where
 //        not all values; errors: half a bar; points: no line, small: small ones; marks: points on the line),
 //        band: [upper, lower] (series numbers), marks: [x, ...] (dotted vertical lines),
@@ -8,56 +10,17 @@
 'use strict';
 
 const livePlots = [];
+const narrowest = 240;
+const widthOf = (host) => Math.max(narrowest, host.clientWidth);
+const widths = new ResizeObserver((changes) => {
+  const hosts = new Set(changes.map((change) => change.target));
+  livePlots.filter((state) => hosts.has(state.host)).forEach((state) => state.fit());
+});
 
 // Four rows of plots fit a sheet.
 function plotHeight(spec) {
   const onPaper = document.documentElement.classList.contains('print');
   return Math.round((spec.height || 230) * (onPaper ? 0.86 : 1));
-}
-
-function axisTitle(axis) {
-  return axis.unit ? `${axis.label} (${unitSymbol(axis.unit)})` : axis.label;
-}
-
-function axisOptions(spec, which, ticks) {
-  const axis = spec[which];
-  return {
-    scale: which,
-    label: axisTitle(axis),
-    labelSize: 18,
-    labelFont: '12px system-ui, sans-serif',
-    font: '11px system-ui, sans-serif',
-    size: which === 'y' ? 62 : 34,
-    stroke: cssColour('text'),
-    grid: {stroke: cssColour('rule'), width: 1},
-    ticks: {stroke: cssColour('rule'), width: 1},
-    values: (plot, splits) => {
-      const decimals = decimalsOfStep(splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1);
-      const labels = splits.map((at) => {
-        if (at === null) return '';
-        return axis.log ? logLabel(at) : at.toFixed(decimals);
-      });
-      ticks[which] = splits.map((at, k) => ({at, label: labels[k]})).filter((tick) => tick.at !== null);
-      return labels;
-    },
-  };
-}
-
-// The fewest decimals that write every multiple of the step exactly (2.5 takes one).
-function decimalsOfStep(step) {
-  for (let decimals = 0; decimals < 9; ++decimals) {
-    const scaled = step * 10 ** decimals;
-    if (Math.abs(scaled - Math.round(scaled)) < 1e-6 * scaled) {
-      return decimals;
-    }
-  }
-  return 9;
-}
-
-// Powers of ten only: uPlot offers all nine of a decade.
-function logLabel(at) {
-  const power = Math.log10(at);
-  return Math.abs(power - Math.round(power)) < 1e-9 ? String(+at.toPrecision(1)) : '';
 }
 
 function drawMarks(spec, plot) {
@@ -88,7 +51,7 @@ function levelsOf(spec) {
 // [[x, low, high], ...] of the bars of a series.
 function errorBars(spec, series) {
   return (series.errors ?? []).map((half, row) => [spec.x.values[row], series.values[row] - half, series.values[row] + half])
-      .filter((bar, row) => series.errors[row] !== null && series.values[row] !== null);
+      .filter((bar, row) => Number.isFinite(series.errors[row]) && Number.isFinite(series.values[row]));
 }
 
 function drawErrors(spec, plot) {
@@ -120,7 +83,10 @@ function paddedRange(spec, which) {
   const values = which === 'x' ? spec.x.values
       : spec.series.flatMap((series) => [...(series.shown ?? series.values), ...errorBars(spec, series).flatMap((bar) => bar.slice(1))])
           .concat(levelsOf(spec));
-  const finite = values.filter((value) => value !== null && Number.isFinite(value));
+  const finite = values.filter((value) => Number.isFinite(value));
+  if (finite.length === 0) {
+    return undefined;
+  }
   const low = Math.min(...finite);
   const high = Math.max(...finite);
   const room = high > low ? 0.05 * (high - low) : Math.max(1e-9, 0.05 * Math.abs(high), which === 'x' ? 0.05 : 0);
@@ -146,7 +112,8 @@ function plotOptions(spec, width, ticks, readout) {
   const scale = (which) => {
     const axis = spec[which];
     const range = axis.range ?? (bars ? paddedRange(spec, which) : undefined);
-    return {time: false, distr: axis.log ? 3 : 1, ...(range ? {range: (plot, low, high) => zoomed(plot, low, high, range, which)} : {})};
+    const kind = axis.log ? {distr: 3} : axis.asinh ? {distr: 4, asinh: axis.asinh} : {distr: 1};
+    return {time: false, ...kind, ...(range ? {range: (plot, low, high) => zoomed(plot, low, high, range, which)} : {})};
   };
   return {
     width,
@@ -179,7 +146,7 @@ function showReadout(spec, plot, readout) {
   }
   const parts = [`${spec.x.label} ${significant(spec.x.values[row])} ${unitSymbol(spec.x.unit || '')}`];
   for (const series of spec.series) {
-    if (series.values[row] !== null) {
+    if (Number.isFinite(series.values[row])) {
       parts.push(`${series.label} ${significant(series.values[row], 5)} ${unitSymbol(spec.y.unit || '')}`);
     }
   }
@@ -252,7 +219,13 @@ function addPlot(parent, spec) {
     }
     host.style.minHeight = `${plotHeight(spec)}px`;
     const data = [spec.x.values, ...spec.series.map((series) => series.shown || series.values)];
-    state.plot = new uPlot(plotOptions(spec, Math.max(240, host.clientWidth), state.ticks, readout), data, host);
+    state.plot = new uPlot(plotOptions(spec, widthOf(host), state.ticks, readout), data, host);
+  };
+  // The frame is as wide as its neighbours and the window leave it, whenever they change.
+  state.fit = () => {
+    if (state.plot && state.plot.width !== widthOf(host)) {
+      state.plot.setSize({width: widthOf(host), height: plotHeight(spec)});
+    }
   };
   // A plot that was taken away meanwhile is not drawn.
   state.drawOnce = () => {
@@ -262,9 +235,10 @@ function addPlot(parent, spec) {
   };
   addKeys(host, state);
   livePlots.push(state);
+  widths.observe(host);
   if (livePlots.length === 1 && performance.getEntriesByName('first-plot').length === 0) {
-    state.drawOnce();
-    letPaint('first-plot');
+    // Next, once the frames beside it stand.
+    sooner(state.drawOnce, () => letPaint('first-plot'));
   } else {
     later(state.drawOnce);
   }
@@ -274,6 +248,7 @@ function addPlot(parent, spec) {
 function dropPlots(place) {
   for (let k = livePlots.length - 1; k >= 0; --k) {
     if (place.contains(livePlots[k].host)) {
+      widths.unobserve(livePlots[k].host);
       livePlots[k].plot?.destroy();
       livePlots.splice(k, 1);
     }

@@ -6,27 +6,33 @@ function hideSection(id) {
   document.querySelector(`nav a[href="#${id}"]`)?.remove();
 }
 
-function setCells(set, decimals) {
-  return set ? set.parameters.map((p, k) => p.value.toFixed(decimals[k])) : decimals.map(() => '–');
-}
+const setValue = (set, name) => listOf(set?.parameters).find((p) => p.name === name)?.value;
 
-// Beside each other, what stood in the INS, what was sent and what it gave back.
+// Each coefficient before the run and after it, in the sigma of the new value where that is known; and what the INS gave
+// back.
 function coefficientTable(sets, parameters) {
   const known = sets.previous || sets.proposed;
-  const decimals = known.parameters.map((_, k) => decimalsFor(parameters?.[k]?.sigma) + 1);
-  const same = known.parameters.map((_, k) => {
+  const names = listOf(known.parameters).map((p) => textOf(p.name));
+  const sigmas = names.map((name) => listOf(parameters).find((p) => p.name === name)?.sigma);
+  const decimals = sigmas.map((sigma) => Math.min(6, decimalsFor(sigma) + 1));
+  const cells = (set) => names.map((name, k) => fixed(setValue(set, name), decimals[k]));
+  const change = names.map((name) => setValue(sets.proposed, name) - setValue(sets.previous, name));
+  const changeCell = (text, k) => element('span', {class: Math.abs(change[k]) < insignificant * sigmas[k] ? 'faint' : ''}, text);
+  const same = names.map((name) => {
     if (!sets.pushed || !sets.read_back) {
       return '–';
     }
-    return sets.pushed.parameters[k].value === sets.read_back.parameters[k].value ? '✔ equal'
-        : element('span', {class: 'bad'}, '✘ differs');
+    return setValue(sets.pushed, name) === setValue(sets.read_back, name) ? '✔ equal' : element('span', {class: 'bad'}, '✘ differs');
   });
   return table([
-    {title: 'parameter', cells: known.parameters.map((p) => p.name), class: 'left'},
-    {title: 'unit', cells: known.parameters.map((p) => unitSymbol(p.unit)), class: 'left'},
-    {title: 'found in the INS', cells: setCells(sets.previous, decimals)},
-    {title: sets.pushed ? 'pushed' : 'proposed, not sent', cells: setCells(sets.proposed, decimals)},
-    {title: 'read back', cells: setCells(sets.read_back, decimals)},
+    {title: 'parameter', cells: names, class: 'left'},
+    {title: 'unit', cells: listOf(known.parameters).map((p) => unitSymbol(p.unit)), class: 'left'},
+    {title: 'before: found in the INS', cells: cells(sets.previous)},
+    {title: sets.pushed ? 'after: pushed' : 'after: proposed, not sent', cells: cells(sets.proposed)},
+    {title: 'change', cells: change.map((value, k) => changeCell(signed(value, decimals[k]), k))},
+    ...(sigmas.some((sigma) => sigma > 0) ? [{title: 'change in σ of the new value',
+      cells: change.map((value, k) => changeCell(signed(value / sigmas[k], 1), k))}] : []),
+    {title: 'read back', cells: cells(sets.read_back)},
     {title: 'pushed = read back', cells: same, class: 'left'},
   ], {id: 'coefficients'});
 }
@@ -54,39 +60,42 @@ function showDrift(run) {
     columns: [{title: 'set', values: ['old', 'new']}, {title: 'drift (m)', values}]});
 }
 
+function setWords(set) {
+  return set ? `version ${textOf(set.version)} of ${textOf(set.date_utc)} by ${textOf(set.author)}` : 'none';
+}
+
 function showRun(report) {
   const run = report.run;
   if (!run) {
     hideSection('run');
     return;
   }
-  const parts = [`Run ${run.run} of ${run.ins}, by ${run.user}, schedule ${run.schedule}, ${run.started_utc} to ${run.ended_utc || 'now'}: ${run.state}`];
-  if (run.reason) parts.push(`: ${run.reason}`);
-  if (run.force_reason) parts.push(`; forced: ${run.force_reason}`);
+  const parts = [`Run ${textOf(run.run)} of ${textOf(run.ins)}, ${textOf(run.kind) || 'calibration'} by ${textOf(run.user)}, schedule ${textOf(run.schedule) || '–'}, `
+      + `${textOf(run.started_utc)} to ${textOf(run.ended_utc) || 'now'}: ${textOf(run.state)}`];
+  if (run.reason) parts.push(`: ${textOf(run.reason)}`);
+  if (run.force_reason) parts.push(`; forced: ${textOf(run.force_reason)}`);
   if (driftKnown(run)) {
     parts.push(`; drift ${significant(run.drift_before_m, 4)} m before, ${significant(run.drift_after_m, 4)} m after`);
   }
   document.getElementById('run-words').textContent = parts.join('') + '.';
   // With parameters they stand below their table.
-  for (const warning of report.parameters ? [] : report.warnings ?? []) {
-    document.getElementById('run-story').append(element('p', {class: 'bad'}, 'Warning: ' + warning));
+  for (const warning of report.parameters ? [] : listOf(report.warnings)) {
+    document.getElementById('run-story').append(element('p', {class: 'bad'}, 'Warning: ' + textOf(warning)));
   }
   showDrift(run);
-  const sets = run.coefficients;
-  if (sets && (sets.previous || sets.proposed)) {
-    const date = (set) => (set ? `version ${set.version} of ${set.date_utc} by ${set.author}` : 'none');
+  const sets = objectOf(run.coefficients);
+  if (sets.previous || sets.proposed) {
     document.getElementById('coefficient-table').append(
-        element('p', {class: 'note'}, `Found: ${date(sets.previous)}. ${sets.pushed ? 'Pushed' : 'Proposed, not sent'}: `
-            + `${date(sets.proposed)}. ${sets.in_force ? 'The new set is in force, confirmed after the INS was reset.'
-                                                       : 'The new set is not in force by this run.'}`),
+        element('p', {class: 'note'}, `Before: ${setWords(sets.previous)}. ${sets.pushed ? 'Pushed' : 'Proposed, not sent'}: `
+            + `${setWords(sets.proposed)}. ${textOf(objectOf(report.force).words)}`),
         coefficientTable(sets, report.parameters));
   }
-  const events = run.events;
+  const events = listOf(run.events);
   document.getElementById('run-story').append(element('details', {},
       element('summary', {}, `${events.length} ${events.length === 1 ? 'event' : 'events'} of the run`), table([
-        {title: 'UTC', cells: events.map((e) => e.utc), class: 'left'},
-        {title: 'kind', cells: events.map((e) => e.kind), class: 'left'},
-        {title: 'what', cells: events.map((e) => e.text), class: 'words'}])));
+        {title: 'UTC', cells: events.map((e) => textOf(e.utc)), class: 'left'},
+        {title: 'kind', cells: events.map((e) => textOf(e.kind)), class: 'left'},
+        {title: 'what', cells: events.map((e) => textOf(e.text)), class: 'words'}])));
 }
 
 // Years as decimals, for an axis.
@@ -98,7 +107,7 @@ function yearOf(utc) {
 
 function showHistory(report) {
   const history = report.history;
-  if (!history || history.runs.length === 0) {
+  if (listOf(history?.runs).length === 0) {
     hideSection('history');
     return;
   }
@@ -106,18 +115,18 @@ function showHistory(report) {
   document.getElementById('history-words').textContent =
       `${runs.length} runs of ${history.serial}. Values that took effect, with 1 σ bars; dotted: limit of the type.`;
   document.getElementById('history-table').append(table([
-    {title: 'run', cells: runs.map((r) => String(r.run)), class: 'left'},
-    {title: 'started (UTC)', cells: runs.map((r) => r.started_utc), class: 'left'},
-    {title: 'kind', cells: runs.map((r) => r.kind), class: 'left'},
-    {title: 'end', cells: runs.map((r) => r.state), class: 'left'},
-    {title: 'by', cells: runs.map((r) => r.user), class: 'left'},
+    {title: 'run', cells: runs.map((r) => textOf(r.run)), class: 'left'},
+    {title: 'started (UTC)', cells: runs.map((r) => textOf(r.started_utc)), class: 'left'},
+    {title: 'kind', cells: runs.map((r) => textOf(r.kind)), class: 'left'},
+    {title: 'end', cells: runs.map((r) => textOf(r.state)), class: 'left'},
+    {title: 'by', cells: runs.map((r) => textOf(r.user)), class: 'left'},
     {title: 'drift before (m)', cells: runs.map((r) => significant(r.drift_before_m ?? null, 4))},
     {title: 'drift after (m)', cells: runs.map((r) => significant(r.drift_after_m ?? null, 4))},
-    {title: 'reason', cells: runs.map((r) => r.reason), class: 'words'},
+    {title: 'reason', cells: runs.map((r) => textOf(r.reason)), class: 'words'},
   ], {id: 'runs'}));
   const place = document.getElementById('history-plots');
-  for (const parameter of history.parameters.filter((p) => p.values.length > 1)) {
-    const slope = parameter.change_per_year === undefined || parameter.change_per_year === 0 ? ''
+  for (const parameter of listOf(history.parameters).filter((p) => listOf(p.values).length > 1)) {
+    const slope = !parameter.change_per_year || Math.abs(parameter.change_per_year) < insignificant * parameter.change_per_year_sigma ? ''
         : `, ${significant(parameter.change_per_year, 3)} ± ${significant(parameter.change_per_year_sigma, 2)} ${unitSymbol(parameter.unit)} a year`;
     addPlot(place, {
       id: 'history-' + parameter.name,

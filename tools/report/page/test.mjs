@@ -1,9 +1,12 @@
 // The pages in a real browser, one for all of them: node test.mjs CHROMIUM [KIND PAGE.html EXPECTED.json]...
 // KIND calibration: EXPECTED is what `selfcal estimate --json` said of the same recording; run: the saved run;
-// failed: a saved run without a result, whose recording is gone; plan: `selfcal plan --json`; fleet: an array of the saved
-// histories. With "not-" before it the page must fail, as it holds other numbers. One line for each failure; status 1.
+// failed: a saved run without a result, whose recording is gone; replaced: a saved run whose set is no longer in force;
+// creep: `selfcal diagnose --json` of the same recording, in which an effect is named; unexplained: the same with nothing
+// named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; hostile, thin: any JSON, the
+// page being alter_page.py's. With "not-" before it the page must fail, as it holds other numbers. One line for each failure; status 1.
 // SELFCAL_PICTURES: a folder for screenshots at 1400 and 800 px and the PDF of each page.
 // SELFCAL_FIRST_PLOT_MS: fail where the first plot takes longer (a bench: it depends on the machine).
+import {createHash} from 'node:crypto';
 import {readFileSync, statSync, writeFileSync} from 'node:fs';
 import {pathToFileURL} from 'node:url';
 import {chromium} from 'playwright-core';
@@ -13,6 +16,7 @@ const pictures = process.env.SELFCAL_PICTURES;
 let kind = '';
 let expected = {};
 let failures = [];
+const recording_of = {creep: 'creep.h5', unexplained: 'creep.h5'};
 const expect = (good, words) => good || failures.push(words);
 
 const largest_page = 3e6;
@@ -67,13 +71,45 @@ const layout_faults = () => {
 
 // Pictures that each kind of page must have, whatever else it has.
 const wanted = {
-  calibration: ['convergence-accel_bias_x', 'nis', 'innovations', 'gimbal', 'allan-gyro', 'allan-accel',
+  calibration: ['convergence-accel_bias_x', 'nis', 'innovations', 'gimbal', 'allan-gyro-x', 'allan-accel-z',
                 'correlation-matrix', 'misfit-before'],
   run: ['convergence-accel_bias_x', 'navigation-drift', 'history-accel_bias_x', 'misfit-before'],
+  replaced: ['convergence-accel_bias_x'],
   failed: [],
+  creep: ['misfit-before', 'misfit-after', 'convergence-accel_bias_x'],
+  unexplained: ['dwell-bias-gyros', 'dwell-bias-accelerometers', 'misfit-before'],
+  hostile: [],
+  thin: [],
   plan: ['timeline-0', 'timeline-1', 'sphere-0', 'sphere-1', 'forecast-accel_bias_x', 'forecast-gyro_misalignment_zy'],
   fleet: ['trend-accel_bias_x', 'trend-gyro_misalignment_zy'],
 };
+
+// Every plot is drawn as wide as its place (a canvas of another width is squeezed), holds its data, and has room for the
+// titles of its axes.
+const drawing_faults = () => livePlots.flatMap(({spec, host, plot}) => {
+  const faults = [];
+  if (Math.abs(plot.ctx.canvas.width / devicePixelRatio - host.clientWidth) > 1) {
+    faults.push(`${spec.id} is drawn ${plot.ctx.canvas.width / devicePixelRatio} px wide in ${host.clientWidth}`);
+  }
+  plot.ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
+  for (const [axis, room] of [[spec.x, plot.width], [spec.y, plot.height]]) {
+    const length = plot.ctx.measureText(axisTitle(axis)).width / devicePixelRatio;
+    // uPlot writes it along the middle of the plotting area.
+    const middle = axis === spec.x ? (plot.bbox.left + plot.bbox.width / 2) : (plot.bbox.top + plot.bbox.height / 2);
+    const free = 2 * Math.min(middle / devicePixelRatio, room - middle / devicePixelRatio);
+    if (length > free) {
+      faults.push(`${spec.id}: "${axisTitle(axis)}" is ${Math.round(length)} px long in ${Math.round(free)}`);
+    }
+  }
+  return faults;
+});
+
+async function check_drawing(page, where) {
+  await page.waitForFunction(() => livePlots.every(({plot}) => plot));
+  for (const fault of await page.evaluate(drawing_faults)) {
+    failures.push(`${where}: ${fault}`);
+  }
+}
 
 async function check_plots(page, where) {
   for (const id of wanted[kind]) {
@@ -101,6 +137,7 @@ function shows(text, value) {
 }
 
 async function check_parameters(page, parameters) {
+  const expected_consistent = (expected.result ?? expected).consistency.verdict === 'consistent';
   const document_in_page = JSON.parse(await page.$eval('#document', (element) => element.textContent));
   const rows = await rows_of(page, 'values');
   expect(rows.length === 24, `${rows.length} rows in the table`);
@@ -115,26 +152,120 @@ async function check_parameters(page, parameters) {
     expect(shows(value, parameter.value), `${name}: shows ${value} for ${parameter.value}`);
     expect(shows(sigma, parameter.sigma), `${name}: shows sigma ${sigma} for ${parameter.sigma}`);
     expect(/not determined/.test(state) === !parameter.determined, `${name}: shows ${state}`);
+    expect(/✔/.test(state) === Boolean(parameter.determined && expected_consistent), `${name}: shows ${state}`);
   });
+}
+
+// The banner says what the document's summary says, mark and all.
+async function check_banner(page, standing, ...words) {
+  const text = await page.textContent('#verdict');
+  expect(await page.getAttribute('#verdict', 'class') === standing, `banner stands as ${await page.getAttribute('#verdict', 'class')}, not ${standing}`);
+  expect(text.trim().startsWith({good: '✔', bad: '✘', open: '○'}[standing]), `banner: ${text}`);
+  words.forEach((wanted) => expect(text.includes(wanted), `banner lacks "${wanted}": ${text}`));
 }
 
 async function check_estimate(page) {
   await check_parameters(page, expected.parameters);
-  const verdict = await page.textContent('#verdict');
-  expect(verdict.includes(expected.acceptable ? 'Accepted' : 'Not accepted'), `verdict: ${verdict}`);
-  expect((await rows_of(page, 'adequacy')).length === 2, 'no table of before and after');
+  const summary = expected.summary ?? {standing: expected.acceptable ? 'good' : 'bad', verdict: expected.objections[0]};
+  await check_banner(page, summary.standing, summary.verdict);
+  expect((await rows_of(page, 'adequacy')).length >= 1, 'no table of the fit');
+  await check_course(page);
+  await check_angles(page);
+  await check_noise(page);
+}
+
+// The whole course: every epoch of every pass is drawn, with its band, inside the picture.
+async function check_course(page) {
+  const outside = await page.evaluate(() => livePlots.filter(({spec}) => spec.id.startsWith('convergence-')).flatMap(({spec, plot}) => {
+    const {min, max} = plot.scales.y;
+    const epochs = spec.series[0].values.filter(Number.isFinite).length;
+    return spec.series.flatMap((series, k) => {
+      const drawn = plot.data[k + 1].filter((value) => Number.isFinite(value) && value >= min && value <= max).length;
+      return drawn === epochs && epochs > 50 ? [] : [`${spec.id}, ${series.label}: ${drawn} of ${epochs} epochs inside the picture`];
+    });
+  }));
+  expect(outside.length === 0, `convergence: ${outside.length} curves cut: ${outside[0]}`);
+}
+
+async function check_angles(page) {
+  const ticks = await page.evaluate(() => livePlots.find(({spec}) => spec.id === 'gimbal').ticks.y.map((tick) => tick.at));
+  expect(ticks.length >= 3 && ticks.every((at) => at % 90 === 0), `gimbal ticks at ${ticks}`);
+}
+
+// The random walk that the table states for each sensor is that of the simulated ones (sim.toml's default), within its own
+// sigma; and that sigma is small enough to say something.
+async function check_noise(page) {
+  for (const [id, density] of [['gyro-noise', 0.001], ['accel-noise', 5]]) {
+    const titles = await page.$$eval(`#${id} th`, (cells) => cells.map((cell) => cell.textContent));
+    const column = titles.findIndex((title) => /(angle|velocity) random walk/.test(title));
+    for (const row of await rows_of(page, id)) {
+      const [value, sigma] = (row[column] ?? '').split(' ± ').map(Number);
+      expect(Math.abs(value - density) < 4 * sigma && sigma < 0.4 * value, `${id}: ${row[0]} has ${row[column]}, simulated with ${density}`);
+    }
+  }
+}
+
+// Where recording and model disagree nothing is ticked, and the corrected values stand beside the 24.
+async function check_creep(page) {
+  const rows = await rows_of(page, 'values');
+  expect(rows.length === 24 && !rows.flat().some((text) => text.includes('✔')), 'a tick stands beside an inconsistent recording');
+  const titles = await page.$$eval('#values th', (cells) => cells.map((cell) => cell.textContent));
+  const at = titles.findIndex((title) => title.startsWith('corrected value'));
+  const far = titles.findIndex((title) => title.startsWith('correction in'));
+  expect(at > 0 && far > 0, `no corrected values: ${titles}`);
+  expected.parameters.forEach((p, k) => {
+    const [value, sigma] = (rows[k]?.[at] ?? '').split(' ± ');
+    expect(shows(value, p.value) && shows(sigma, p.sigma), `${p.name}: corrected ${rows[k]?.[at]} for ${p.value} ± ${p.sigma}`);
+    const moved = Number(rows[k]?.[far].replace('−', '-'));
+    expect(Math.abs(moved - (p.value - p.value_without) / p.sigma_without) < 0.051, `${p.name}: moved by ${rows[k]?.[far]} σ`);
+  });
+  await check_banner(page, 'bad');
+  const grey = await page.$$eval('#findings td span.faint', (parts) => parts.map((part) => part.textContent));
+  const weak = expected.findings.flatMap((f) => f.parameters.filter((p) => Math.abs(p.value) < 3 * p.sigma));
+  expect(grey.length === weak.length, `${grey.length} coefficients are grey, ${weak.length} are below 3 sigma`);
+}
+
+// None of the above: a picture of what remains, with its sigma, and what to do.
+async function check_unexplained(page) {
+  expect((await page.textContent('#advice')).includes('Record the same schedule again'), 'no advice');
+  expect((await page.textContent('#doubt')).includes('names no cause'), 'the table of the 24 does not say that no cause is known');
+  const {shown, dwells} = await page.evaluate(() => ({
+    shown: livePlots.filter(({spec}) => spec.id.startsWith('dwell-bias-')).flatMap(({spec}) => spec.series.flatMap(
+        (series) => series.values.map((value, k) => [value, series.errors[k], series.label]).filter(([value]) => value !== null))),
+    dwells: JSON.parse(document.getElementById('document').textContent).diagnosis.map.dwells}));
+  expect(shown.length === dwells.bias.length, `${shown.length} of ${dwells.bias.length} dwells' biases drawn`);
+  const wrong = shown.filter(([value, sigma, label]) => (label === 'below 3 σ') !== (Math.abs(value) < 3 * sigma));
+  expect(wrong.length === 0, `grey where it is significant, or the other way: ${wrong[0]}`);
+}
+
+// A set that another one replaced is not said to be in force.
+async function check_replaced(page) {
+  const text = await page.textContent('main');
+  expect(!/(is|set) in force/.test(text) && text.includes('was in force from'), 'a replaced set is said to be in force');
+}
+
+// Whatever the document holds: nothing of it runs, and the page says something.
+async function check_hostile(page) {
+  expect(await page.evaluate(() => window.hacked) === undefined, 'markup of the document was run');
+  expect((await page.textContent('#verdict')).trim().length > 2, 'no verdict');
+  expect(kind === 'thin' || (await page.$$('.missing-part')).length === 0,
+         `a part is missing: ${await page.$$eval('.missing-part', (parts) => parts.map((part) => part.textContent).join('; '))}`);
 }
 
 async function check_run(page) {
   await check_parameters(page, expected.result.parameters);
   const rows = await rows_of(page, 'coefficients');
   expect(rows.length === 24, `${rows.length} rows of coefficients`);
-  rows.forEach(([name, , previous, pushed, read_back], k) => {
+  rows.forEach(([name, , previous, pushed, change, in_sigma, read_back], k) => {
     const sets = expected.coefficients;
     for (const [text, set] of [[previous, sets.previous], [pushed, sets.pushed], [read_back, sets.read_back]]) {
       expect(shows(text, set.parameters[k].value), `${name}: shows ${text} for ${set.parameters[k].value}`);
     }
+    const moved = sets.proposed.parameters[k].value - sets.previous.parameters[k].value;
+    expect(shows(change.replace('−', '-'), moved), `${name}: change ${change} for ${moved}`);
+    expect(Math.abs(Number(in_sigma.replace('−', '-')) - moved / expected.result.parameters[k].sigma) < 0.051, `${name}: change of ${in_sigma} σ`);
   });
+  await check_banner(page, 'bad');
   const changes = (await rows_of(page, 'values')).map((cells) => cells[6]);
   expect(changes.every((text) => /^[+−][\d.]+ \([\d.e+-]+ σ\)$/.test(text)), `change since the last calibration: ${changes[0]}`);
   const drift = /drift ([\d.]+) m before, ([\d.]+) m after/.exec(await page.textContent('#run-words')) ?? [];
@@ -143,7 +274,7 @@ async function check_run(page) {
 
 async function check_failed(page) {
   const text = await page.textContent('main');
-  expect((await page.textContent('#verdict')).includes(expected.reason), 'the reason is not told');
+  await check_banner(page, 'bad', expected.reason);
   expect(text.includes('Warning: no curves') && text.includes(expected.recording), 'the missing recording is not told');
   expect(await page.$('#navigation-drift') === null, 'a drift is shown that was not measured');
 }
@@ -221,12 +352,31 @@ async function check_paper(page, where) {
   if (pictures) {
     writeFileSync(`${pictures}/${kind}-a4.pdf`, pdf);
   }
+  await check_sheets(page, where);
   // The width between the margins of A4, 186 mm: there is no scrolling on paper.
   await page.emulateMedia({media: 'print'});
   await page.setViewportSize({width: 703, height: 1032});
   const cut = await page.evaluate(() => [...document.querySelectorAll('main *')].filter(
       (part) => part.checkVisibility() && part.getBoundingClientRect().right > innerWidth + 0.5).map((part) => `${part.tagName} ${part.textContent.slice(0, 30)}`));
   expect(cut.length === 0, `${where}: beyond the edge of the paper: ${cut.slice(0, 3).join('; ')}`);
+  await page.waitForTimeout(300);
+  await check_drawing(page, `${where}, on the sheet`);
+}
+
+// At the foot of every sheet: program and version, hash of the recording, date, number of the sheet and of all.
+async function check_sheets(page, where) {
+  const boxes = await page.evaluate(() => Object.fromEntries([...document.getElementById('paper-margins').sheet.cssRules]
+      .flatMap((rule) => [...rule.cssRules]).map((box) => [box.name, box.style.content])));
+  const foot = Object.values(boxes).join(' ');
+  const said = await page.evaluate(() => JSON.parse(document.getElementById('document').textContent));
+  expect(foot.includes(`selfcal ${said.program?.version}`), `${where}: no program version at the foot: ${foot}`);
+  expect(foot.includes(`printed ${new Date().toISOString().slice(0, 10)}`), `${where}: no date of printing at the foot: ${foot}`);
+  expect(foot.includes('counter(page)') && foot.includes('counter(pages)'), `${where}: no page numbers at the foot: ${foot}`);
+  if (said.gimbal) {
+    const hash = createHash('sha256').update(readFileSync(recording_of[kind] ?? 'recording.h5')).digest('hex');
+    expect(foot.includes(hash.slice(0, 12)), `${where}: not the recording's hash at the foot: ${foot}`);
+    expect(await page.textContent('#hash') === hash, `${where}: not the recording's whole hash on the page`);
+  }
 }
 
 // Nothing beside the window, and no table that has to be scrolled for its last columns; those of a plot's numbers may.
@@ -260,14 +410,21 @@ async function check_page(browser, page_file) {
       console.log(`${where}: first plot painted after ${Math.round(first_plot)} ms`);
     }
     await check_plots(page, where);
+    await check_drawing(page, where);
     await check_width(page, where);
     if (width === 1400) {
-      await {calibration: check_estimate, run: check_run, failed: check_failed, plan: check_plan, fleet: check_fleet}[kind](page);
+      await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep,
+             unexplained: check_unexplained, plan: check_plan, fleet: check_fleet}[kind](page);
       if (kind === 'calibration') {
         await check_keyboard(page);
         await check_saving(page, 'nis');
         await check_saving(page, 'misfit-before');
       }
+    }
+    if (width === 1400) {
+      await page.setViewportSize({width: 1100, height: 900});
+      await page.waitForTimeout(300);
+      await check_drawing(page, `${where}, then 1100 px`);
     }
     if (pictures) {
       await page.screenshot({path: `${pictures}/${kind}-${width}.png`, fullPage: true});
@@ -276,6 +433,13 @@ async function check_page(browser, page_file) {
   }
   const page = await open(browser, page_file, `${kind}, paper`, 1400, 'light');
   await check_paper(page, `${kind}, paper`);
+  await page.context().close();
+}
+
+async function check_altered(browser, page_file) {
+  const page = await open(browser, page_file, `${kind} ${page_file}`, 1400, 'light');
+  await page.waitForSelector('html[data-ready]', {state: 'attached'});
+  await check_hostile(page);
   await page.context().close();
 }
 
@@ -297,7 +461,8 @@ try {
     kind = name.replace(/^not-/, '');
     expected = JSON.parse(readFileSync(json_file, 'utf8'));
     failures = [];
-    await (name === kind ? check_page : check_other_numbers)(browser, page_file);
+    const altered = kind === 'hostile' || kind === 'thin';
+    await (altered ? check_altered : name === kind ? check_page : check_other_numbers)(browser, page_file);
     failures.forEach((words) => console.error(words));
     failed += failures.length;
   }

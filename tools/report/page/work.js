@@ -5,6 +5,16 @@ const sliceMs = 12;
 const waiting = [];
 let resting = false;   // until the next slice, which is ordered already
 let whenDone = () => {};
+let whenBroken = () => {};   // (error): a piece of work ended there; the others go on
+
+function workOnce() {
+  const work = waiting.shift();
+  try {
+    work();
+  } catch (error) {
+    whenBroken(error);
+  }
+}
 
 function later(...work) {
   waiting.push(...work);
@@ -14,11 +24,17 @@ function later(...work) {
   }
 }
 
+// Before all that waits.
+function sooner(...work) {
+  waiting.unshift(...work);
+  later();
+}
+
 function workOn() {
   resting = false;
   const end = performance.now() + sliceMs;
   while (waiting.length > 0 && performance.now() < end && !resting) {
-    waiting.shift()();
+    workOnce();
   }
   if (waiting.length > 0 && !resting) {
     resting = true;
@@ -32,7 +48,7 @@ function workOn() {
 // All that is left, at once: paper does not wait.
 function finishWork() {
   while (waiting.length > 0) {
-    waiting.shift()();
+    workOnce();
   }
   whenDone();
 }
