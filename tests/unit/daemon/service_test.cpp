@@ -201,6 +201,29 @@ TEST_F(ServiceTest, ARestoreWaitsForRunsAndThenBringsBackTheirPast) {
   EXPECT_EQ(*run("a"), 1);  // the daemon goes on with it
 }
 
+TEST_F(ServiceTest, WhatIsKnownOfAnInsWithoutAskingIt) {
+  configure("", section("a"));
+  start();
+  const Standing standing = operations().standing("a");
+  EXPECT_THAT(standing.bus, HasSubstr("absent-a"));
+  EXPECT_EQ(standing.last_calibration, 0);
+  EXPECT_EQ(standing.set_version, 0u);
+}
+
+// The run is not over: the next daemon takes it up.
+TEST_F(ServiceTest, AStopLeavesARunResumableAndBeginsNone) {
+  configure("", section("a"));
+  start();
+  ASSERT_TRUE(run("a"));
+  bool stopped = false;
+  service_->stop([&] { stopped = true; });
+  while (!stopped) {
+    loop_.turn(std::chrono::seconds(1));
+  }
+  EXPECT_FALSE(is_final(operations().record("a")->state));
+  EXPECT_FALSE(run("a"));
+}
+
 TEST_F(ServiceTest, TwoServicesDoNotShareAStateDirectory) {
   configure("", section("a"));
   start();
