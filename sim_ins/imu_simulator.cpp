@@ -101,6 +101,12 @@ Expected<ImuSimulator> ImuSimulator::create(const SimConfig& config, GimbalMotio
     imu.take(effect);
   }
   imu.prepare_turns();
+  imu.prepare_laws();
+  for (const Law& law : physics.laws) {
+    if (const auto taken = imu.take(law, seed); !taken) {
+      return tl::unexpected(taken.error());
+    }
+  }
   return imu;
 }
 
@@ -205,6 +211,9 @@ IdealIncrement ImuSimulator::output_at(double t) {
       effect.equation(effect.values, context, deviation);
     }
   }
+  if (!laws_.empty()) {
+    add_laws(t, state, deviation);
+  }
   return {state.omega_ib_b + deviation.domega, state.f_ib_b + deviation.df};
 }
 
@@ -213,7 +222,7 @@ IdealIncrement ImuSimulator::integrate(double begin, double end) {
   static const double node3 = std::sqrt(0.6);
   static const double node2 = 1.0 / std::sqrt(3.0);
   const GimbalMotion& gimbal = motion_.gimbal();
-  const bool constant = motion_.base_still() && effects_.empty();
+  const bool constant = motion_.base_still() && effects_.empty() && laws_.empty();
   const bool turning = gimbal.turning(begin - std::abs(accel_delay_s_), end + std::abs(accel_delay_s_));
   IdealIncrement sum;
   const auto add = [&](double t, double weight) {
@@ -262,6 +271,7 @@ void ImuSimulator::add_noise(IdealIncrement& increment, double begin, double end
     gyro_wander_ += root_h * gyro_walk_asd_.cwiseProduct(normal3(instability_));
     accel_wander_ += root_h * accel_walk_asd_.cwiseProduct(normal3(instability_));
   }
+  add_law_noise(increment, h);
   if (config_.gyro_bias_instability_deg_per_h > 0.0 || config_.accel_bias_instability_ug > 0.0) {
     const double keep = std::exp(-h / config_.bias_instability_tau_s);
     const double drive = std::sqrt(1.0 - keep * keep);

@@ -7,6 +7,7 @@
 
 #include "protocol/error.hpp"
 #include "sim_ins/config.hpp"
+#include "sim_ins/law.hpp"
 #include "sim_ins/physics.hpp"
 #include "sim_ins/random.hpp"
 #include "sim_ins/sensor_physics.hpp"
@@ -51,6 +52,13 @@ class ImuSimulator {
     SensorEquation equation = nullptr;
     std::vector<double> values;
   };
+  struct ActiveLaw {
+    Law law;
+    std::vector<LawEvaluator> evaluator;  // none for a process
+    std::vector<double> jumps;            // of turn k
+    double walk = 0.0;
+    Random random;
+  };
   struct Line {  // spectral line on the sensors' output
     Vector3 domega, df;
     double angular_frequency = 0.0;
@@ -67,7 +75,12 @@ class ImuSimulator {
 
   ImuSimulator(const SimConfig& config, TrueMotion motion, const SensorErrors& errors, std::uint64_t seed);
   void take(const PhysicsEffect& effect);
+  [[nodiscard]] Expected<void> take(const Law& law, std::uint64_t seed);
   void prepare_turns();
+  void prepare_laws();
+  LawVariables law_variables_at(double t, const MotionState& state) const;
+  void add_laws(double t, const MotionState& state, SensorDeviation& deviation);
+  void add_law_noise(IdealIncrement& increment, double h);
   SensorContext context_at(double t, const MotionState& state) const;
   MotionState state_at(double t);
   IdealIncrement output_at(double t);
@@ -79,6 +92,9 @@ class ImuSimulator {
   SensorErrors errors_;
   Random gyro_noise_, accel_noise_, instability_, readout_;
   std::vector<ActiveEffect> effects_;
+  std::vector<ActiveLaw> laws_;
+  std::vector<std::array<double, 2>> senses_;  // of the axes after k turns have begun
+  double mean_temperature_c_ = 0.0;
   std::vector<Line> lines_;
   std::vector<Loss> losses_;
   std::vector<Vector3> turn_df_;  // per move

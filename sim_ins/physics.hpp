@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocol/error.hpp"
+#include "sim_ins/law.hpp"
 
 namespace selfcal::sim {
 
@@ -37,6 +38,7 @@ struct PhysicsEffect {
 // Effects add up. The same effect may stand twice (two spectral lines, two settlings).
 struct ConcealedPhysics {
   std::vector<PhysicsEffect> effects;
+  std::vector<Law> laws;
 };
 
 // Reads a physics file:
@@ -44,6 +46,11 @@ struct ConcealedPhysics {
 //   id = "accel_relaxation"
 //   x = 50.0            # names and units as in physics_effects()
 //   tau_s = 60.0
+//   [[law]]
+//   axis = "accel_z"
+//   expression = "exp(-since/45.2)*so"   # or process = "jump per turn", "random walk", "white", "line"
+//   coefficient = 13.7
+//   unit = "ug"                          # ug for accel_*, deg/h for gyro_*
 // Unknown id or key, wrong type, non-finite value: bad_input naming file, line and key.
 [[nodiscard]] Expected<ConcealedPhysics> read_physics(const std::string& path);
 [[nodiscard]] Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name);

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
+#include "estimator/geometry/units.hpp"
 #include "sim_ins/physics.hpp"
 #include "sim_ins/toml_reader.hpp"
 
@@ -30,12 +34,85 @@ void read_effect(TomlTable& table, ConcealedPhysics& physics) {
   physics.effects.push_back(std::move(effect));
 }
 
+constexpr std::array<std::string_view, 6> axis_names = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+struct ProcessName {
+  std::string_view name;
+  LawProcess process;
+  double time_unit;  // the coefficient is per square root of it
+};
+constexpr std::array<ProcessName, 4> processes = {{{"jump per turn", LawProcess::jump_per_turn, 1.0},
+                                                   {"random walk", LawProcess::random_walk, units::hour},
+                                                   {"white", LawProcess::white, 1.0},
+                                                   {"line", LawProcess::line, 1.0}}};
+
+// A process in place of an expression; false: the table is refused.
+bool read_process(TomlTable& table, const std::string& name, Law& law) {
+  const auto known =
+      std::find_if(processes.begin(), processes.end(), [&](const ProcessName& p) { return p.name == name; });
+  if (known == processes.end()) {
+    table.refuse("process", fmt::format("no process is called {}", name));
+    return false;
+  }
+  law.process = known->process;
+  law.coefficient /= std::sqrt(known->time_unit);
+  if (law.process == LawProcess::line) {
+    constexpr double fastest_hz = 1e5;
+    if (!table.has("frequency_hz")) {
+      table.refuse("frequency_hz", "missing");
+    }
+    table.number("frequency_hz", law.frequency_hz, 1e-6, fastest_hz);
+  }
+  return true;
+}
+
+void read_law(TomlTable& table, ConcealedPhysics& physics) {
+  Law law;
+  std::string axis, unit, process;
+  table.text("axis", axis);
+  table.text("unit", unit);
+  table.text("expression", law.expression);
+  table.text("process", process);
+  double sigma = 0.0;
+  constexpr double any = std::numeric_limits<double>::max();
+  table.number("sigma", sigma, 0.0, any);  // the diagnosis writes it; the truth has none
+  table.table("constants", [](TomlTable& constants) { constants.ignore(); });
+  const auto found = std::find(axis_names.begin(), axis_names.end(), axis);
+  if (found == axis_names.end()) {
+    return table.refuse("axis", axis.empty() ? "missing" : fmt::format("no axis is called {}", axis));
+  }
+  law.axis = static_cast<int>(found - axis_names.begin());
+  const bool gyro = law.axis < 3;
+  if (unit != (gyro ? "deg/h" : "ug")) {
+    return table.refuse("unit", fmt::format("\"{}\" where {} is in {}", unit, axis, gyro ? "deg/h" : "ug"));
+  }
+  if (!table.has("coefficient")) {
+    return table.refuse("coefficient", "missing");
+  }
+  table.number("coefficient", law.coefficient, -any, any);
+  law.coefficient *= gyro ? units::degree_per_hour : units::micro_g;
+  if (law.expression.empty() == process.empty()) {
+    return table.refuse("expression", "either an expression or a process");
+  }
+  if (!process.empty()) {
+    if (!read_process(table, process, law)) {
+      return;
+    }
+  } else if (const auto compiled = LawEvaluator::compile(law.expression); !compiled) {
+    return table.refuse("expression", compiled.error().message);
+  } else {
+    law.uses_temperature = compiled->uses_temperature();
+  }
+  physics.laws.push_back(std::move(law));
+}
+
 }  // namespace
 
 Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name) {
   ConcealedPhysics physics;
   const auto read = read_toml(text, name, [&](TomlTable& root) {
     root.tables("effect", [&](TomlTable& table) { read_effect(table, physics); });
+    root.tables("law", [&](TomlTable& table) { read_law(table, physics); });
   });
   if (!read) {
     return tl::unexpected(read.error());

@@ -147,6 +147,14 @@ Expected<void> write_truth(const std::string& path, const SimConfig& config, std
     }
     truth["effects"].push_back({{"id", effect.id}, {"values", values}});
   }
+  truth["laws"] = nlohmann::ordered_json::array();
+  for (const Law& law : physics.laws) {
+    const bool gyro = law.axis < 3;
+    truth["laws"].push_back({{"axis", (gyro ? "gyro_" : "accel_") + std::string(1, "xyz"[law.axis % 3])},
+                             {"expression", law.expression},
+                             {"coefficient", law.coefficient / (gyro ? units::degree_per_hour : units::micro_g)},
+                             {"unit", gyro ? "deg/h" : "ug"}});
+  }
   std::ofstream file(path);
   file << truth.dump(1) << '\n';
   file.close();

@@ -24,6 +24,12 @@ const toml::node* TomlTable::asked(std::string_view key) {
   return problem_ ? nullptr : table_.get(key);
 }
 
+void TomlTable::ignore() {
+  for (const auto& [key, value] : table_) {
+    known_.insert(std::string(key.str()));
+  }
+}
+
 void TomlTable::refuse(std::string_view key, const std::string& what) {
   if (problem_) {
     return;

@@ -32,6 +32,8 @@ class TomlTable {
   void tables(std::string_view key, const std::function<void(TomlTable&)>& read);
 
   bool has(std::string_view key) const { return table_.contains(key); }
+  // The keys of this table are none of the caller's business.
+  void ignore();
   // A problem of the caller's own with a key's value.
   void refuse(std::string_view key, const std::string& what);
   bool sound() const { return !problem_; }
