@@ -12,7 +12,8 @@ namespace {
 constexpr double division_s = 0.02;
 constexpr double creeping_s = 15.0;
 constexpr std::size_t creeping_divisions = 10;
-constexpr double margin_s = 0.5;  // between a turn as found and as it was
+constexpr double margin_s = 0.5;        // between a turn as found and as it was
+constexpr double turn_margin_s = 0.25;  // segments are told apart by quarters of a second
 
 // Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a
 // trapezoid, a smooth ramp), whichever fits better. NaN where there are less than three.
@@ -59,7 +60,7 @@ RecordingContext::RecordingContext(const ImuData& data, ReferenceResidual refere
   }
   for (const Segment& s : segments_) {
     if (s.rotation) {
-      turn_ends_s_.push_back(end_of_turn(s));
+      turns_.push_back({start_of_turn(s), end_of_turn(s)});
     }
   }
 }
@@ -88,27 +89,46 @@ bool RecordingContext::divides(std::size_t sample) const {
 // Segments are told apart by quarters of a second. A creep of 400 ug that is taken to begin 10 ms late leaves 40 um/s,
 // which the position shows within a second: the end is where the rate runs out, to a millisecond.
 double RecordingContext::end_of_turn(const Segment& rotation) const {
-  constexpr double least = 2e-3, most = 0.03;  // rad/s: a hundred quanta; within tenths of a second of the end
-  constexpr double later_s = 0.25;             // than the segment at most
   const std::size_t n = samples_per_division_;
   std::vector<double> time, rate;  // of stretches of n samples, from the last to the first
-  std::size_t last = std::min(data_.size(), rotation.last + static_cast<std::size_t>(later_s * data_.sample_rate_hz));
-  for (; last > rotation.first + n; last -= n) {
-    const double w = mean_rate(last - n, last).norm();
-    if (w > most && !rate.empty()) {
-      break;
-    }
-    if (w > least) {
-      rate.push_back(w);
-      time.push_back(0.5 * (data_.time_s[last - n] + data_.time_s[last - 1] - 1.0 / data_.sample_rate_hz));
-    } else {
-      rate.clear();
-      time.clear();
-    }
+  std::size_t last =
+      std::min(data_.size(), rotation.last + static_cast<std::size_t>(turn_margin_s * data_.sample_rate_hz));
+  for (; last > rotation.first + n && collect_ramp(last - n, last, time, rate); last -= n) {
   }
   const double length = static_cast<double>(n) / data_.sample_rate_hz;
   const double end = rate_runs_out(time, rate, length);
-  return std::abs(end - rotation.end_s) < later_s + length ? end : rotation.end_s;  // a base that sways is never still
+  return std::abs(end - rotation.end_s) < turn_margin_s + length ? end
+                                                                 : rotation.end_s;  // a swaying base is never still
+}
+
+double RecordingContext::start_of_turn(const Segment& rotation) const {
+  const std::size_t n = samples_per_division_;
+  const auto margin = static_cast<std::size_t>(turn_margin_s * data_.sample_rate_hz);
+  std::vector<double> time, rate;  // of stretches of n samples, from the first to the last
+  std::size_t first = rotation.first > margin ? rotation.first - margin : 0;
+  for (; first + n < rotation.last && collect_ramp(first, first + n, time, rate); first += n) {
+  }
+  const double length = static_cast<double>(n) / data_.sample_rate_hz;
+  const double start = rate_runs_out(time, rate, length);
+  return std::abs(start - rotation.start_s) < turn_margin_s + length ? start : rotation.start_s;
+}
+
+// Adds the stretch [first, last) to the ramp of a turn; what was not yet the ramp is forgotten. False: the ramp is whole.
+bool RecordingContext::collect_ramp(std::size_t first, std::size_t last, std::vector<double>& time,
+                                    std::vector<double>& rate) const {
+  constexpr double least = 2e-3, most = 0.03;  // rad/s: a hundred quanta; within tenths of a second of the end
+  const double w = mean_rate(first, last).norm();
+  if (w > most && !rate.empty()) {
+    return false;
+  }
+  if (w > least) {
+    rate.push_back(w);
+    time.push_back(0.5 * (data_.time_s[first] + data_.time_s[last - 1] - 1.0 / data_.sample_rate_hz));
+  } else {
+    rate.clear();
+    time.clear();
+  }
+  return true;
 }
 
 // Mean over as much on either side of the boundary: exact while the rate rises evenly.
@@ -144,10 +164,11 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
   c.earth_rate_b = block.C_nb.transpose() * Vector3(std::cos(data_.site.latitude), std::sin(data_.site.latitude), 0.0);
   c.duration_s = data_.time_s.back() - start_s_;
   // What creeps after a turn goes on creeping while the next one is made.
-  const auto next_end = std::lower_bound(turn_ends_s_.begin(), turn_ends_s_.end(), block.end_s);
-  if (next_end != turn_ends_s_.begin()) {
-    c.since_turn_start_s = std::max(0.0, block.start_s - next_end[-1]);
-    c.since_turn_end_s = block.end_s - next_end[-1];
+  const auto next = std::lower_bound(turns_.begin(), turns_.end(), block.end_s,
+                                     [](const Turn& turn, double t) { return turn.end_s < t; });
+  if (next != turns_.begin()) {
+    c.since_turn_start_s = std::max(0.0, block.start_s - next[-1].end_s);
+    c.since_turn_end_s = block.end_s - next[-1].end_s;
   }
   const std::size_t middle = (block.first + block.last) / 2;
   if (!data_.gimbal_outer.empty() && !data_.gimbal_inner.empty()) {

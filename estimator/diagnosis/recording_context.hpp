@@ -17,6 +17,11 @@ Vector3 dipole_field(double latitude);
 // Whitened innovations of another recording of the same schedule, by a forward pass with this noise.
 using ReferenceResidual = std::function<const Eigen::VectorXd&(const NoiseModel&)>;
 
+// A turn of the gimbal, recording's time, s: from where the rate sets in to where it runs out.
+struct Turn {
+  double start_s = 0.0, end_s = 0.0;
+};
+
 class RecordingContext {
  public:
   // `data` must outlive this. With a reference the rows of signature passes are those of the difference, over sqrt(2).
@@ -31,6 +36,7 @@ class RecordingContext {
 
   const ImuData& data() const { return data_; }
   const std::vector<Segment>& segments() const { return segments_; }
+  const std::vector<Turn>& turns() const { return turns_; }          // in order of time
   double mean_temperature() const { return mean_temperature_; }      // degC, where there is a channel
   const ReferenceResidual& reference() const { return reference_; }  // may be empty
   bool has_temperature() const { return !data_.temperature.empty(); }
@@ -39,12 +45,14 @@ class RecordingContext {
   Vector3 rate_at(std::size_t sample) const;                     // at the boundary before `sample`, zero in dwells
   Vector3 mean_rate(std::size_t first, std::size_t last) const;  // of samples [first, last)
   bool turns_around(double t) const;
+  double start_of_turn(const Segment& rotation) const;
   double end_of_turn(const Segment& rotation) const;
+  bool collect_ramp(std::size_t first, std::size_t last, std::vector<double>& time, std::vector<double>& rate) const;
 
   const ImuData& data_;
   ReferenceResidual reference_;
   std::vector<Segment> segments_;
-  std::vector<double> turn_ends_s_;   // recording's time, ascending
+  std::vector<Turn> turns_;
   std::size_t samples_per_division_;  // 20 ms
   double start_s_, mean_temperature_ = 0.0;
   Vector3 field_n_;  // gauss
