@@ -1,0 +1,116 @@
+#include "estimator/discovery/column_pass.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr Eigen::Index batch_rows = 192;
+
+class Carrier : public PassObserver {
+ public:
+  Carrier(const PassInput& input, ColumnSource& source, ColumnSums& sums, RowSink* sink)
+      : navigator_(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &source),
+        source_(source),
+        sums_(sums),
+        sink_(sink),
+        start_s_(input.data->time_s.front() - 1.0 / input.data->sample_rate_hz),
+        dynamic_(StateLayout::navigation_count + input.noise.observation.state_count()),
+        n_(source.count()),
+        s_(Eigen::MatrixXd::Zero(dynamic_ + sensor_parameter_count, n_)),
+        batch_(Eigen::MatrixXd::Zero(batch_rows, n_)),
+        batch_residual_(Eigen::VectorXd::Zero(batch_rows)) {
+    sums_.information = Eigen::MatrixXd::Zero(n_, n_);
+    sums_.score = Eigen::VectorXd::Zero(n_);
+    Phi_ = Eigen::MatrixXd::Zero(dynamic_, dynamic_);
+    const int motion = dynamic_ - StateLayout::navigation_count;
+    Phi_.bottomRightCorner(motion, motion) = input.noise.observation.transition(input.interval_s);
+    if (sink_ != nullptr) {
+      const double most = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s + 2.0;
+      sink_->columns.resize(3 * static_cast<Eigen::Index>(most), n_);
+      sink_->residual.resize(sink_->columns.rows());
+      sink_->time_s.clear();
+    }
+  }
+
+  void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override {
+    navigator_.next(own_);
+    active_ = std::min(n_, source_.active(own_.end_s - start_s_));
+    Phi_.topLeftCorner<9, 9>() = own_.Phi;
+    next_.noalias() = Phi_ * s_.topLeftCorner(dynamic_, active_);
+    next_.topRows<9>().noalias() +=
+        own_.Gamma.leftCols<sensor_parameter_count>() * s_.bottomLeftCorner(sensor_parameter_count, active_);
+    next_.topRows<9>() += own_.Gamma.middleCols(sensor_parameter_count, active_);
+    s_.topLeftCorner(dynamic_, active_) = next_;
+    middle_s_ = 0.5 * (own_.start_s + own_.end_s);
+  }
+
+  void updated(int /*axis*/, const VectorX& h, const ScalarInnovation& innovation, const UdFilter& filter) override {
+    const double scale = 1.0 / std::sqrt(innovation.variance);
+    auto s = s_.leftCols(active_);
+    nu_.noalias() = h.transpose() * s.topRows(dynamic_);
+    batch_.row(filled_).head(active_) = scale * nu_;
+    batch_residual_(filled_) = scale * innovation.value;
+    if (sink_ != nullptr) {
+      sink_->columns.row(row_).head(active_) = scale * nu_;
+      sink_->columns.row(row_).tail(n_ - active_).setZero();
+      sink_->residual(row_) = scale * innovation.value;
+      sink_->time_s.push_back(middle_s_);
+    }
+    ++row_;
+    ++filled_;
+    s.noalias() -= filter.gain() * nu_;
+    if (filled_ == batch_rows) {
+      flush();
+    }
+  }
+
+  void finish() {
+    flush();
+    sums_.information = sums_.information.selfadjointView<Eigen::Lower>();
+    sums_.rows = static_cast<double>(row_);
+    sums_.shift = s_.bottomRows<sensor_parameter_count>();
+    if (sink_ != nullptr) {
+      sink_->columns.conservativeResize(row_, Eigen::NoChange);
+      sink_->residual.conservativeResize(row_);
+    }
+  }
+
+ private:
+  void flush() {
+    const auto Z = batch_.topLeftCorner(filled_, active_);
+    const auto r = batch_residual_.head(filled_);
+    if (active_ > 0 && filled_ > 0) {
+      sums_.information.topLeftCorner(active_, active_).selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+      sums_.score.head(active_).noalias() += Z.transpose() * r;
+    }
+    sums_.square += r.squaredNorm();
+    batch_.topRows(filled_).setZero();
+    filled_ = 0;
+  }
+
+  IntervalNavigator navigator_;
+  ColumnSource& source_;
+  ColumnSums& sums_;
+  RowSink* sink_;
+  double start_s_, middle_s_ = 0.0;
+  int dynamic_, n_, active_ = 0;
+  Interval own_;
+  Eigen::MatrixXd Phi_, s_, next_, batch_;
+  Eigen::VectorXd batch_residual_;
+  Eigen::RowVectorXd nu_;
+  Eigen::Index filled_ = 0, row_ = 0;
+};
+
+}  // namespace
+
+ColumnSums run_columns(const PassInput& input, ColumnSource& source, const std::stop_token& stop, RowSink* rows) {
+  ColumnSums sums;
+  Carrier carrier(input, source, sums, rows);
+  sums.pass = run_pass(input, {}, stop, &carrier);
+  carrier.finish();
+  return sums;
+}
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,41 @@
+// A forward pass of the calibration filter that carries any number of signature columns and sums their normal equations.
+//
+// The recursion is that of diagnosis/signature_pass.hpp (Willsky and Jones 1976); here the rows are summed as they come, so
+// that a thousand columns need no memory for rows.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/passes/pass.hpp"
+
+namespace selfcal::discovery {
+
+class ColumnSource : public ExtraSignatures {
+ public:
+  // Columns behind this one have been zero so far, at this time since the start: they need no work yet.
+  virtual int active(double time_s) const = 0;
+};
+
+struct ColumnSums {
+  Eigen::MatrixXd information;  // [n x n] sum of row^T row, rows of unit noise with the 33 states projected out
+  Eigen::VectorXd score;        // [n]
+  double square = 0.0;          // of the residual
+  double rows = 0.0;
+  Eigen::MatrixXd shift;  // [24 x n] truth minus estimate of the 24 per unit of a column
+  PassOutput pass;
+};
+
+struct RowSink {
+  Eigen::MatrixXd columns;     // [rows x n]
+  Eigen::VectorXd residual;    // [rows]
+  std::vector<double> time_s;  // [rows] middle of the interval, recording's time
+};
+
+// With `rows` the rows are kept too (few columns only).
+ColumnSums run_columns(const PassInput& input, ColumnSource& source, const std::stop_token& stop = {},
+                       RowSink* rows = nullptr);
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,355 @@
+#include "estimator/discovery/discovery.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <type_traits>
+
+#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/shortlist.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
+constexpr std::size_t class_size = 40;      // looked at exactly for the class
+constexpr int constant_rounds = 4;
+// A true law of z sigma gains (z^2 - 1)/2 on what was left out, for each of some forty parts is predicted from the rest; what
+// gains less than half of what it gains in the fit follows the noise.
+constexpr double least_held_out_share = 0.5;
+// Costs are minus the logarithms of probabilities that add up to 1 over all functions and axes, so that p times their
+// exponential is corrected for all of them. Laws and processes take half of the false-alarm rate each.
+constexpr double shares = 2.0;
+constexpr double process_count = 2.0 * axis_count;
+
+double log_p_of_law(const Candidate& c) {
+  const double degrees = 1.0 + static_cast<double>(c.term.constants.size() > 1 ? 1 : 0);
+  return diagnosis::log_chi_squared_tail(c.gain, degrees) + c.cost + std::log(shares);
+}
+
+class Search {
+ public:
+  Search(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
+         const Progress& progress)
+      : options_(options),
+        progress_(progress),
+        context_(data),
+        motion_(context_),
+        input_(diagnosis::forward_pass(data, calibration)),
+        sums_(said("pieces of the recording", [&] { return sum_over_pieces(motion_, input_, options.stop); })),
+        dictionary_(said("functions", [&] { return make_dictionary(sums_, motion_.available()); })),
+        model_(std::make_unique<PieceModel>(sums_, dictionary_)),
+        shortlist_(motion_, sums_, dictionary_) {
+    result_.misfit_before = sums_.sums.square - sums_.sums.rows;
+    result_.rows = sums_.sums.rows;
+    result_.functions_tried = dictionary_.functions.size() * axis_count;
+    empty_.fit.parameters = calibration.value;
+    empty_.fit.parameter_covariance = calibration.covariance;
+    empty_.fit.square_after = sums_.sums.square;
+    state_ = empty_;
+  }
+
+  // Laws first, for a random process can stand for any of them. Where they leave something that a process takes up, or one
+  // process explains far more than the best law, processes first; the way of the greater posterior probability is told.
+  Discovery run() {
+    constexpr double far_more = 1.5;
+    const ProcessFit process = best_process();
+    const std::vector<Candidate> laws = shortlist_.best(*model_, 1);
+    if (significant(process) && (laws.empty() || process.log_likelihood_gain > far_more * laws.front().merit())) {
+      take_processes();
+      take_laws();
+    } else {
+      take_laws();
+      if (significant(best_process())) {
+        processes_too();
+      }
+    }
+    tell();
+    return std::move(result_);
+  }
+
+ private:
+  // All that the search has decided.
+  struct State {
+    std::vector<LawTerm> terms;
+    std::vector<double> costs;  // of the terms
+    LawFit fit;
+    std::vector<DiscoveredProcess> processes;
+    double half_log_determinant = 0.0;  // of the processes: what their freedom costs
+    double log_p_remaining = 0.0;
+    std::string refused;
+  };
+
+  template <typename F>
+  std::invoke_result_t<F> said(const char* words, F&& work) {
+    if (progress_) {
+      progress_(words);
+    }
+    return work();
+  }
+
+  bool room() const {
+    return static_cast<int>(state_.terms.size() + state_.processes.size()) < options_.most_terms &&
+           !options_.stop.stop_requested();
+  }
+
+  void processes_too() {
+    take_processes();
+    const State laws_first = state_;
+    const double laws_first_posterior = log_posterior();
+    state_ = empty_;
+    model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+    take_processes();
+    take_laws();
+    if (log_posterior() < laws_first_posterior) {
+      state_ = laws_first;
+    }
+  }
+
+  // Logarithm of the posterior probability, but for a constant.
+  double log_posterior() const {
+    double costs = std::log(process_count) * static_cast<double>(state_.processes.size());
+    for (const double cost : state_.costs) {
+      costs += cost;
+    }
+    return -0.5 * model_->square() - state_.half_log_determinant - costs;
+  }
+
+  bool significant(const ProcessFit& process) const {
+    return diagnosis::log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
+           std::log(options_.false_alarm_rate);
+  }
+
+  void take_processes() {
+    for (ProcessFit process = best_process(); significant(process) && room(); process = best_process()) {
+      const double before = model_->square();
+      model_->integrate_out(process.columns, process.size * process.size);
+      state_.half_log_determinant += 0.5 * (before - model_->square()) - process.log_likelihood_gain;
+      state_.processes.push_back(
+          {process.kind, process.axis, process.size, process.sigma, process.log_likelihood_gain});
+    }
+  }
+
+  ProcessFit best_process() const {
+    ProcessFit best;
+    for (int axis = 0; axis < axis_count; ++axis) {
+      const bool there = std::any_of(state_.processes.begin(), state_.processes.end(),
+                                     [&](const DiscoveredProcess& p) { return p.axis == axis; });
+      for (const ProcessKind kind : {ProcessKind::jump_per_turn, ProcessKind::random_walk}) {
+        if (!there) {
+          ProcessFit fit = fit_process(*model_, sums_, kind, axis);
+          best = fit.log_likelihood_gain > best.log_likelihood_gain ? std::move(fit) : best;
+        }
+      }
+    }
+    return best;
+  }
+
+  void take_laws() {
+    while (room() && take_law()) {
+    }
+  }
+
+  // Adds the best law that predicts what was left out; false when none pays.
+  bool take_law() {
+    if (progress_) {
+      progress_("law " + std::to_string(state_.terms.size() + 1));
+    }
+    const double limit = std::log(options_.false_alarm_rate);
+    std::vector<Candidate> candidates = shortlist_.best(*model_, shortlist_size);
+    if (candidates.empty() || log_p_of_law(candidates.front()) > limit) {
+      state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p_of_law(candidates.front()));
+      return false;
+    }
+    make_exact(candidates);
+    for (const Candidate& candidate : candidates) {
+      state_.log_p_remaining = std::min(0.0, log_p_of_law(candidate));
+      if (log_p_of_law(candidate) > limit) {
+        return false;
+      }
+      if (accept(candidate)) {
+        exchange();
+        return true;
+      }
+      state_.refused = state_.refused.empty() ? candidate.text() : state_.refused;
+    }
+    return false;
+  }
+
+  // Gains over the pieces become those of the signatures themselves; with a process in play the pieces stand.
+  void make_exact(std::vector<Candidate>& candidates) const {
+    if (state_.processes.empty()) {
+      std::vector<LawTerm> alternatives;
+      for (const Candidate& candidate : candidates) {
+        alternatives.push_back(candidate.term);
+      }
+      const std::vector<double> gains = exact_gains(motion_, input_, state_.terms, alternatives, options_.stop);
+      for (std::size_t k = 0; k < gains.size(); ++k) {
+        candidates[k].gain = gains[k];
+      }
+    }
+    std::sort(candidates.begin(), candidates.end(),
+              [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
+  }
+
+  bool predicts(const LawFit& fit, std::size_t k) const {
+    return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k];
+  }
+
+  bool accept(const Candidate& candidate) {
+    std::vector<LawTerm> terms = state_.terms;
+    terms.push_back(candidate.term);
+    const LawFit fit = fit_laws(motion_, input_, terms, constant_rounds, options_.stop);
+    if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1)) {
+      return false;
+    }
+    state_.costs.push_back(candidate.cost);
+    adopt(fit);
+    return true;
+  }
+
+  void adopt(const LawFit& fit) {
+    state_.fit = fit;
+    state_.terms = fit.terms;
+    choose(state_.terms.size());
+  }
+
+  // Projects out all terms but one, with the derivatives by their constants.
+  void choose(std::size_t left_out) {
+    std::vector<Eigen::VectorXd> columns;
+    for (std::size_t k = 0; k < state_.terms.size(); ++k) {
+      if (k != left_out) {
+        shortlist_.add_columns(*model_, state_.terms[k], columns);
+      }
+    }
+    model_->choose(columns);
+  }
+
+  // Each term in turn against all functions, the others staying: what was taken first may have stood for two.
+  void exchange() {
+    if (state_.terms.size() < 2 || !state_.processes.empty()) {
+      return;
+    }
+    for (std::size_t k = 0; k + 1 < state_.terms.size(); ++k) {
+      choose(k);
+      std::vector<Candidate> candidates = shortlist_.best(*model_, shortlist_size);
+      std::vector<LawTerm> others = state_.terms;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      std::vector<LawTerm> alternatives = {state_.terms[k]};
+      for (const Candidate& candidate : candidates) {
+        alternatives.push_back(candidate.term);
+      }
+      const std::vector<double> gains = exact_gains(motion_, input_, others, alternatives, options_.stop);
+      std::size_t best = 0;
+      double best_merit = 0.5 * gains[0] - state_.costs[k];
+      for (std::size_t c = 0; c < candidates.size(); ++c) {
+        const double merit = 0.5 * gains[c + 1] - candidates[c].cost;
+        if (merit > best_merit + 1.0) {
+          best = c + 1;
+          best_merit = merit;
+        }
+      }
+      if (best > 0) {
+        std::vector<LawTerm> terms = state_.terms;
+        terms[k] = alternatives[best];
+        const LawFit fit = fit_laws(motion_, input_, terms, constant_rounds, options_.stop);
+        if (fit.square_after < state_.fit.square_after && predicts(fit, k)) {
+          state_.costs[k] = candidates[best - 1].cost;
+          state_.fit = fit;
+          state_.terms = fit.terms;
+        }
+      }
+    }
+    choose(state_.terms.size());
+  }
+
+  std::vector<ClassMember> ambiguity_class(std::size_t k) {
+    choose(k);
+    std::vector<Candidate> candidates = shortlist_.best(*model_, class_size);
+    choose(state_.terms.size());
+    std::vector<LawTerm> others = state_.terms, alternatives = {state_.terms[k]};
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    for (const Candidate& candidate : candidates) {
+      alternatives.push_back(candidate.term);
+    }
+    const std::vector<double> gains = exact_gains(motion_, input_, others, alternatives, options_.stop);
+    const double own = 0.5 * gains[0] - state_.costs[k];
+    const std::string own_pattern = state_.terms[k].expression.text();
+    struct Member {
+      ClassMember member;
+      double cost = 0.0;
+    };
+    std::vector<Member> members = {
+        {{state_.terms[k].expression.text(state_.terms[k].constants), state_.terms[k].axis, 1.0}, state_.costs[k]}};
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const double odds = std::exp(std::min(50.0, 0.5 * gains[c + 1] - candidates[c].cost - own));
+      const bool itself =
+          candidates[c].term.axis == state_.terms[k].axis && candidates[c].term.expression.text() == own_pattern;
+      if (odds > options_.least_odds && !itself) {
+        members.push_back({{candidates[c].text(), candidates[c].term.axis, odds}, candidates[c].cost});
+      }
+    }
+    std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) { return a.cost < b.cost; });
+    std::vector<ClassMember> result;
+    for (Member& m : members) {
+      result.push_back(std::move(m.member));
+    }
+    return result;
+  }
+
+  void tell() {
+    result_.processes = state_.processes;
+    result_.log_p_remaining = state_.log_p_remaining;
+    result_.refused = state_.refused;
+    result_.parameters = state_.fit.parameters;
+    result_.parameter_covariance = state_.fit.parameter_covariance;
+    result_.misfit_after = (state_.processes.empty() ? state_.fit.square_after : model_->square()) - result_.rows;
+    auto at = static_cast<Eigen::Index>(state_.terms.size());
+    for (std::size_t k = 0; k < state_.terms.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      DiscoveredLaw law;
+      law.term = state_.terms[k];
+      law.expression = state_.terms[k].expression.text(state_.terms[k].constants);
+      law.coefficient = state_.fit.coefficient(row);
+      law.sigma = std::sqrt(state_.fit.covariance(row, row));
+      law.gain = state_.fit.gain[k];
+      law.held_out_gain = state_.fit.held_out_gain[k];
+      law.share = std::min(1.0, law.gain / std::max(1.0, result_.misfit_before));
+      law.constants = shortlist_.constants(state_.terms[k]);
+      for (Constant& constant : law.constants) {
+        constant.sigma = std::sqrt(std::max(0.0, state_.fit.covariance(at, at)));
+        ++at;
+      }
+      const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
+      law.significance = diagnosis::sigma_from_log_p(
+          std::min(0.0, diagnosis::log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
+      law.ambiguous = ambiguity_class(k);
+      result_.laws.push_back(std::move(law));
+    }
+    std::stable_sort(result_.laws.begin(), result_.laws.end(),
+                     [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
+  }
+
+  const DiscoveryOptions& options_;
+  const Progress& progress_;
+  diagnosis::RecordingContext context_;
+  LawMotion motion_;
+  PassInput input_;
+  PieceSums sums_;
+  Dictionary dictionary_;
+  std::unique_ptr<PieceModel> model_;
+  Shortlist shortlist_;
+  Discovery result_;
+  State empty_, state_;
+};
+
+}  // namespace
+
+Discovery discover(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
+                   const Progress& progress) {
+  return Search(data, calibration, options, progress).run();
+}
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,74 @@
+// Physics that no catalogue holds, written down as laws: found, fitted, held out, with all that explains it as well.
+//
+// README.md derives the search: wide and cheap over the pieces of the recording, few candidates exactly.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "estimator/discovery/law_fit.hpp"
+#include "estimator/discovery/process.hpp"
+#include "estimator/passes/calibration.hpp"
+
+namespace selfcal::discovery {
+
+struct DiscoveryOptions {
+  double false_alarm_rate = 0.004;  // of a whole recording, over all functions, axes and processes
+  int most_terms = 6;
+  double least_odds = 0.01;  // of a member of a class against the best
+  std::stop_token stop;
+};
+
+struct ClassMember {
+  std::string expression;
+  int axis = 0;
+  double odds = 0.0;  // against the law that is told, 1 for itself
+};
+
+struct Constant {
+  std::string name, unit;
+  double value = 0.0, sigma = 0.0;
+};
+
+struct DiscoveredLaw {
+  LawTerm term;
+  std::string expression;                 // constants as numbers
+  double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
+  std::vector<Constant> constants;
+  double significance = 0.0;           // sigma, after correction for all that was tried
+  double gain = 0.0;                   // fall of the residuals' square
+  double held_out_gain = 0.0;          // log-likelihood on dwells and rotations left out in turn
+  double share = 0.0;                  // of the misfit beyond noise
+  std::vector<ClassMember> ambiguous;  // what this recording cannot tell from it, itself included, simplest first
+};
+
+struct DiscoveredProcess {
+  ProcessKind kind = ProcessKind::jump_per_turn;
+  int axis = 0;
+  double size = 0.0, sigma = 0.0;  // unit_of(axis), per sqrt(h) for a walk
+  double log_likelihood_gain = 0.0;
+};
+
+struct Discovery {
+  std::vector<DiscoveredLaw> laws;  // best first
+  std::vector<DiscoveredProcess> processes;
+  double misfit_before = 0.0, misfit_after = 0.0;  // squares of the residuals beyond their number
+  double rows = 0.0;
+  double log_p_remaining = 0.0;     // of the best function that was not taken, corrected for all that was tried
+  std::string refused;              // the best function that did not predict what was left out; empty: none
+  std::size_t functions_tried = 0;  // functions times axes
+  ParameterVector parameters;       // the 24 with the laws, SI
+  ParameterMatrix parameter_covariance;
+};
+
+using Progress = std::function<void(const std::string&)>;
+
+// `calibration` is that of the 24 alone (diagnosis/still_calibration.hpp) of `data`.
+Discovery discover(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
+                   const Progress& progress = {});
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,156 @@
+#include "estimator/discovery/piece_model.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::discovery {
+namespace {
+
+// Of a column's information this much must be left after projection: the rest of a function that lies in the span of the
+// chosen ones is rounding and the error of the pieces.
+constexpr double least_left = 1e-4;
+
+}  // namespace
+
+PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
+    : sums_(sums),
+      dictionary_(dictionary),
+      information_(sums.sums.information),
+      score_(sums.sums.score),
+      square_(sums.sums.square),
+      raw_square_(sums.sums.square) {
+  for (int axis = 0; axis < axis_count; ++axis) {
+    prepare(axis);
+  }
+}
+
+void PieceModel::prepare(int axis) {
+  const auto n = static_cast<Eigen::Index>(sums_.pieces.size());
+  const auto rows = Eigen::seqN(axis, n, axis_count);
+  const Eigen::MatrixXd G = information_(rows, rows);
+  const Eigen::MatrixXd& D = dictionary_.means;
+  const auto f = static_cast<std::size_t>(axis);
+  const Eigen::MatrixXd image = G * D;
+  function_information_[f] = (D.array() * image.array()).colwise().sum().transpose();
+  const Eigen::VectorXd own_score = score_(rows);
+  function_score_[f] = D.transpose() * own_score;
+  partner_information_[f] = Eigen::VectorXd::Zero(D.cols());
+  for (Eigen::Index k = 0; k < D.cols(); ++k) {
+    const int partner = dictionary_.functions[static_cast<std::size_t>(k)].partner;
+    if (partner >= 0) {
+      partner_information_[f](k) = D.col(k).dot(image.col(partner));
+    }
+  }
+}
+
+Eigen::VectorXd PieceModel::column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const {
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(score_.size());
+  all(Eigen::seqN(axis, means.size(), axis_count)) = means;
+  return all;
+}
+
+void PieceModel::choose(const std::vector<Eigen::VectorXd>& columns) {
+  chosen_.resize(score_.size(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    chosen_.col(static_cast<Eigen::Index>(k)) = columns[k];
+  }
+  chosen_image_ = information_ * chosen_;
+  Eigen::MatrixXd A = chosen_.transpose() * chosen_image_;
+  A.diagonal() *= 1.0 + 1e-9;
+  chosen_solver_.compute(A);
+  chosen_score_ = chosen_.transpose() * score_;
+  square_ = raw_square_;
+  if (!columns.empty()) {
+    square_ -= chosen_score_.dot(chosen_solver_.solve(chosen_score_));
+  }
+}
+
+void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
+  const Eigen::MatrixXd image = information_ * X;
+  Eigen::MatrixXd A = X.transpose() * image;
+  A.diagonal().array() += 1.0 / q;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+  const Eigen::VectorXd b = X.transpose() * score_;
+  information_ -= image * solver.solve(image.transpose());
+  score_ -= image * solver.solve(b);
+  raw_square_ -= b.dot(solver.solve(b));
+  for (int axis = 0; axis < axis_count; ++axis) {
+    prepare(axis);
+  }
+  std::vector<Eigen::VectorXd> again;
+  for (Eigen::Index k = 0; k < chosen_.cols(); ++k) {
+    again.emplace_back(chosen_.col(k));
+  }
+  choose(again);
+}
+
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(const Eigen::MatrixXd& X) const {
+  Eigen::MatrixXd G = X.transpose() * (information_ * X);
+  Eigen::VectorXd b = X.transpose() * score_;
+  if (chosen_.cols() > 0) {
+    const Eigen::MatrixXd cross = chosen_image_.transpose() * X;
+    G -= cross.transpose() * chosen_solver_.solve(cross);
+    b -= cross.transpose() * chosen_solver_.solve(chosen_score_);
+  }
+  return {G, b};
+}
+
+double PieceModel::gain(const Eigen::MatrixXd& columns) const {
+  const auto [G, b] = project(columns);
+  const Eigen::VectorXd before = (columns.transpose() * (information_ * columns)).diagonal();
+  for (Eigen::Index k = 0; k < b.size(); ++k) {
+    if (G(k, k) < least_left * before(k) || G(k, k) <= 0.0) {
+      return 0.0;
+    }
+  }
+  const double gained = b.dot(G.ldlt().solve(b));
+  return std::isfinite(gained) && gained > 0.0 ? gained : 0.0;
+}
+
+std::vector<Ranked> PieceModel::rank(std::size_t most) const {
+  std::vector<Ranked> all;
+  const Eigen::MatrixXd& D = dictionary_.means;
+  for (int axis = 0; axis < axis_count; ++axis) {
+    const auto f = static_cast<std::size_t>(axis);
+    Eigen::VectorXd information = function_information_[f], score = function_score_[f],
+                    partner = partner_information_[f];
+    if (chosen_.cols() > 0) {
+      const auto n = static_cast<Eigen::Index>(sums_.pieces.size());
+      const Eigen::MatrixXd image = chosen_image_(Eigen::seqN(axis, n, axis_count), Eigen::all);
+      const Eigen::MatrixXd cross = image.transpose() * D;
+      const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
+      information -= (cross.array() * solved.array()).colwise().sum().matrix().transpose();
+      score -= solved.transpose() * chosen_score_;
+      for (Eigen::Index k = 0; k < D.cols(); ++k) {
+        const int p = dictionary_.functions[static_cast<std::size_t>(k)].partner;
+        partner(k) -= p >= 0 ? cross.col(k).dot(solved.col(p)) : 0.0;
+      }
+    }
+    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * function_information_[f](k); };
+    for (Eigen::Index k = 0; k < D.cols(); ++k) {
+      if (!seen(k)) {
+        continue;
+      }
+      const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
+      Ranked r{axis, static_cast<int>(k), score(k) * score(k) / information(k), 0.0};
+      if (function.partner >= 0 && seen(function.partner)) {
+        const double a = information(k), c = information(function.partner), x = partner(k);
+        const double determinant = a * c - x * x;
+        if (determinant > least_left * a * c) {
+          const double u = score(k), v = score(function.partner);
+          r.gain = (c * u * u - 2.0 * x * u * v + a * v * v) / determinant;
+        }
+      }
+      r.merit = 0.5 * r.gain - function.cost - (function.partner >= 0 ? 1.0 : 0.0);
+      all.push_back(r);
+    }
+  }
+  most = std::min(most, all.size());
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(most), all.end(),
+                    [](const Ranked& a, const Ranked& b) { return a.merit > b.merit; });
+  all.resize(most);
+  return all;
+}
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,59 @@
+// Score and information of every function of the dictionary on every axis, given the terms chosen so far.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "estimator/discovery/dictionary.hpp"
+
+namespace selfcal::discovery {
+
+// A function on an axis and what it gains.
+struct Ranked {
+  int axis = 0;
+  int function = 0;
+  double gain = 0.0;   // fall of the residuals' square
+  double merit = 0.0;  // gain / 2 less the cost: logarithm of the odds against nothing, but for a constant
+};
+
+// Normal equations over the pieces. Laws are vectors over pieces and axes; what was chosen is projected out, what is a
+// random process is integrated out.
+class PieceModel {
+ public:
+  PieceModel(const PieceSums& sums, const Dictionary& dictionary);
+
+  // The function on the axis as a vector over all columns of the sums.
+  Eigen::VectorXd column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const;
+  void choose(const std::vector<Eigen::VectorXd>& columns);
+  // Columns X become random with covariance q I and are integrated out (Woodbury).
+  void integrate_out(const Eigen::MatrixXd& X, double q);
+
+  // Fall of the residuals' square by these columns together, given the chosen ones; `least` of a column's information
+  // must be left by the projection, or it counts as one that is chosen already.
+  double gain(const Eigen::MatrixXd& columns) const;
+  // All functions on all axes, largest merit first, at most `most`.
+  std::vector<Ranked> rank(std::size_t most) const;
+  // Projected information and score of columns X, [k x k] and [k].
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(const Eigen::MatrixXd& X) const;
+
+  double square() const { return square_; }  // of the residuals, the chosen ones' gain taken off
+
+ private:
+  void prepare(int axis);
+  Eigen::Index at(int axis, Eigen::Index piece) const { return piece * axis_count + axis; }
+
+  const PieceSums& sums_;
+  const Dictionary& dictionary_;
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd score_;
+  double square_ = 0.0, raw_square_ = 0.0;
+  Eigen::MatrixXd chosen_, chosen_image_;  // X, G X
+  Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
+  Eigen::VectorXd chosen_score_;
+  // Of every function on every axis before projection; of a wave with its partner.
+  std::array<Eigen::VectorXd, axis_count> function_information_, partner_information_, function_score_;
+};
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,48 @@
+// The recording cut into pieces, and what a bias of every sensor axis in every piece would do to the innovations.
+//
+// A law is slow against the pieces, so that its signature is the sum of the pieces' signatures times its means over them:
+// score and information of any function of time on any axis are a dot product and a quadratic form.
+#pragma once
+
+#include <Eigen/Core>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/discovery/column_pass.hpp"
+#include "estimator/discovery/law_motion.hpp"
+
+namespace selfcal::discovery {
+
+constexpr int axis_count = 6;  // gyro x y z, accelerometer x y z
+
+struct Piece {
+  double start_s = 0.0, end_s = 0.0;  // since the start of the recording
+  int dwell = 0;                      // number of turns begun before it
+  bool turning = false;
+};
+
+// Dwells are cut ever more coarsely after a turn, turns into equal parts.
+std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context);
+
+struct PieceSums {
+  std::vector<Piece> pieces;
+  // Column piece * axis_count + axis, in units of unit_of(axis): of the bias of that axis during that piece.
+  ColumnSums sums;
+  std::vector<Node> nodes;
+  laws::Channels channels;    // [nodes x variables]
+  std::vector<int> piece_of;  // [nodes]
+  Eigen::VectorXd piece_dt;   // [pieces] s
+
+  // Mean over each piece of a function given on the nodes, [pieces].
+  Eigen::VectorXd means(const Eigen::Ref<const Eigen::ArrayXd>& on_nodes) const;
+  // Those columns of one axis.
+  Eigen::MatrixXd information(int axis, int other_axis) const;  // [pieces x pieces]
+  Eigen::VectorXd score(int axis) const;                        // [pieces]
+};
+
+// SI size of one unit of an axis: 1 deg/h, 1 ug.
+double unit_of(int axis);
+
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop = {});
+
+}  // namespace selfcal::discovery

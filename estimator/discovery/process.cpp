@@ -1,0 +1,73 @@
+#include "estimator/discovery/process.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr double seconds_per_hour = 3600.0;
+
+// One column a dwell: the offset that holds from the start of a turn to that of the next.
+Eigen::MatrixXd jumps(const PieceModel& model, const PieceSums& sums, int axis) {
+  const int count = sums.pieces.back().dwell + 1;
+  Eigen::MatrixXd columns(sums.sums.score.size(), count);
+  for (int dwell = 0; dwell < count; ++dwell) {
+    Eigen::VectorXd means(sums.piece_dt.size());
+    for (Eigen::Index p = 0; p < means.size(); ++p) {
+      means(p) = sums.pieces[static_cast<std::size_t>(p)].dwell == dwell ? 1.0 : 0.0;
+    }
+    columns.col(dwell) = model.column(axis, means);
+  }
+  return columns;
+}
+
+// One column an increment: from the middle of a piece to that of the next, of its share of the variance per hour.
+Eigen::MatrixXd increments(const PieceModel& model, const PieceSums& sums, int axis) {
+  const auto n = sums.piece_dt.size();
+  const auto middle = [&](Eigen::Index p) {
+    const Piece& piece = sums.pieces[static_cast<std::size_t>(p)];
+    return 0.5 * (piece.start_s + piece.end_s) / seconds_per_hour;
+  };
+  Eigen::MatrixXd columns(sums.sums.score.size(), n - 1);
+  for (Eigen::Index k = 1; k < n; ++k) {
+    Eigen::VectorXd means = Eigen::VectorXd::Zero(n);
+    means.tail(n - k).setConstant(std::sqrt(middle(k) - middle(k - 1)));
+    columns.col(k - 1) = model.column(axis, means);
+  }
+  return columns;
+}
+
+}  // namespace
+
+std::string_view name_of(ProcessKind kind) {
+  return kind == ProcessKind::jump_per_turn ? "jump per turn" : "random walk";
+}
+
+ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKind kind, int axis) {
+  ProcessFit fit;
+  fit.kind = kind;
+  fit.axis = axis;
+  fit.columns = kind == ProcessKind::jump_per_turn ? jumps(model, sums, axis) : increments(model, sums, axis);
+  const auto [J, b] = model.project(fit.columns);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(J);
+  const Eigen::ArrayXd d = eigen.eigenvalues().array().max(0.0);
+  const Eigen::ArrayXd u2 = (eigen.eigenvectors().transpose() * b).array().square();
+  // log L(q) - log L(0) of columns ~ N(0, q): 1/2 sum q u^2/(1 + q d) - 1/2 sum log(1 + q d).
+  const auto gain = [&](double log_q) {
+    const double q = std::exp(log_q);
+    return 0.5 * (q * u2 / (1.0 + q * d) - (1.0 + q * d).log()).sum();
+  };
+  constexpr double low = -14.0, high = 16.0, step = 0.1;
+  double best = low;
+  for (double x = low; x <= high; x += step) {
+    best = gain(x) > gain(best) ? x : best;
+  }
+  fit.log_likelihood_gain = std::max(0.0, gain(best));
+  fit.size = std::exp(0.5 * best);
+  const double curvature = (gain(best + step) + gain(best - step) - 2.0 * gain(best)) / (step * step);
+  fit.sigma = 0.5 * fit.size / std::sqrt(std::max(-curvature, 1e-6));
+  return fit;
+}
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,25 @@
+// Random processes on one axis: a jump at each turn, a random walk of the bias.
+#pragma once
+
+#include <Eigen/Core>
+#include <string_view>
+
+#include "estimator/discovery/piece_model.hpp"
+
+namespace selfcal::discovery {
+
+enum class ProcessKind { jump_per_turn, random_walk };
+std::string_view name_of(ProcessKind kind);  // as in a law's `process`
+
+struct ProcessFit {
+  ProcessKind kind = ProcessKind::jump_per_turn;
+  int axis = 0;
+  double log_likelihood_gain = 0.0;
+  double size = 0.0, sigma = 0.0;  // standard deviation of a jump, or per sqrt(h); in unit_of(axis)
+  Eigen::MatrixXd columns;         // independent draws of unit variance, over the columns of the sums
+};
+
+// The size of greatest likelihood, given what the model has chosen.
+ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKind kind, int axis);
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,157 @@
+#include "estimator/discovery/shortlist.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "estimator/discovery/discovery.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr const char* wave = "sin(2*pi*t/?)";
+constexpr const char* wave_with_phase = "sin(2*pi*t/?+?)";
+
+// Golden section between two neighbours of the grid: `rounds` shrink the interval to 0.618^rounds of itself.
+template <typename F>
+double highest_between(double low, double high, int rounds, F&& value) {
+  constexpr double golden = 0.6180339887498949;
+  double a = low, b = high;
+  double x = b - golden * (b - a), y = a + golden * (b - a);
+  double vx = value(x), vy = value(y);
+  for (int k = 0; k < rounds; ++k) {
+    if (vx > vy) {
+      b = std::exchange(y, x);
+      vy = vx;
+      x = b - golden * (b - a);
+      vx = value(x);
+    } else {
+      a = std::exchange(x, y);
+      vx = vy;
+      y = a + golden * (b - a);
+      vy = value(y);
+    }
+  }
+  return vx > vy ? x : y;
+}
+
+}  // namespace
+
+Shortlist::Shortlist(const LawMotion& motion, const PieceSums& sums, const Dictionary& dictionary)
+    : motion_(motion), sums_(sums), dictionary_(dictionary) {}
+
+double Shortlist::gain_of(const PieceModel& model, const LawTerm& term) const {
+  const Eigen::ArrayXd values = term.expression.evaluate(sums_.channels, term.constants);
+  if (!values.isFinite().all()) {
+    return 0.0;
+  }
+  return model.gain(model.column(term.axis, sums_.means(values)));
+}
+
+Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) const {
+  const Function& function = dictionary_.functions[static_cast<std::size_t>(ranked.function)];
+  std::string pattern = dictionary_.pattern(function);
+  Candidate c;
+  c.cost = function.cost + (function.partner >= 0 ? 1.0 : 0.0);
+  c.term.axis = ranked.axis;
+  c.gain = ranked.gain;
+  if (function.partner >= 0) {
+    const Function& partner = dictionary_.functions[static_cast<std::size_t>(function.partner)];
+    const auto waves = [&](double period) {
+      Eigen::MatrixXd X(sums_.sums.score.size(), 2);
+      int column = 0;
+      for (const Function* f : {&function, &partner}) {
+        const auto expression = laws::Expression::parse(dictionary_.pattern(*f));
+        X.col(column++) =
+            model.column(ranked.axis, sums_.means(expression->evaluate(sums_.channels, std::vector<double>{period})));
+      }
+      return X;
+    };
+    const double period = highest_between(function.constant * 0.85, function.constant * 1.18, 12,
+                                          [&](double p) { return model.gain(waves(p)); });
+    const Eigen::MatrixXd X = waves(period);
+    const auto [G, b] = model.project(X);
+    const Eigen::VectorXd size = G.ldlt().solve(b);
+    c.gain = std::max(c.gain, model.gain(X));
+    pattern.replace(pattern.find(wave), std::string(wave).size(), wave_with_phase);
+    c.term.expression = *laws::Expression::parse(pattern);
+    c.term.constants = {period, std::atan2(size(1), size(0))};
+    return c;
+  }
+  c.term.expression = *laws::Expression::parse(pattern);
+  if (function.kernel == Kernel::none) {
+    return c;
+  }
+  c.term.constants = {function.constant};
+  if (function.kernel != Kernel::step) {
+    const double constant = highest_between(function.constant / 1.7, function.constant * 1.7, 12, [&](double x) {
+      LawTerm term = c.term;
+      term.constants = {x};
+      return gain_of(model, term);
+    });
+    c.term.constants = {constant};
+  }
+  c.gain = std::max(c.gain, gain_of(model, c.term));
+  return c;
+}
+
+std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most) const {
+  constexpr std::size_t looked_at = 6;  // neighbours on the grid of a constant are one law
+  std::set<std::pair<int, std::string>> seen;
+  std::vector<Candidate> all;
+  for (const Ranked& ranked : model.rank(looked_at * most)) {
+    const Function& function = dictionary_.functions[static_cast<std::size_t>(ranked.function)];
+    std::string key = dictionary_.pattern(function);
+    if (function.kernel == Kernel::step) {
+      key += std::to_string(function.constant);
+    }
+    if (ranked.gain <= 0.0 || !seen.emplace(ranked.axis, key).second) {
+      continue;
+    }
+    all.push_back(candidate(model, ranked));
+    if (all.size() == most) {
+      break;
+    }
+  }
+  std::sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
+  return all;
+}
+
+void Shortlist::add_columns(const PieceModel& model, const LawTerm& term, std::vector<Eigen::VectorXd>& columns) const {
+  const auto column = [&](const std::vector<double>& constants) -> Eigen::VectorXd {
+    return model.column(term.axis, sums_.means(term.expression.evaluate(sums_.channels, constants)));
+  };
+  const Eigen::VectorXd base = column(term.constants);
+  columns.push_back(base);
+  for (std::size_t k = 0; k < term.constants.size(); ++k) {
+    std::vector<double> moved = term.constants;
+    const double step = 1e-3 * std::max(std::abs(moved[k]), 1e-6);
+    moved[k] += step;
+    const Eigen::VectorXd up = column(moved);
+    const Eigen::VectorXd derivative = (up - base) / step;
+    if (derivative.norm() > 0.0) {
+      columns.push_back(derivative);
+    }
+  }
+}
+
+std::vector<Constant> Shortlist::constants(const LawTerm& term) const {
+  const std::string text = term.expression.text();
+  std::vector<Constant> all;
+  if (term.constants.empty()) {
+    return all;
+  }
+  if (text.find(wave_with_phase) != std::string::npos) {
+    return {{"period", "h", term.constants[0], 0.0}, {"phase", "rad", term.constants[1], 0.0}};
+  }
+  for (std::size_t k = 0; k < term.constants.size(); ++k) {
+    const bool seconds = text.find("since/?") != std::string::npos || text.find("rest/?") != std::string::npos;
+    const bool step = text.find("t-?") != std::string::npos;
+    all.push_back({step ? "at" : "tau", seconds ? "s" : "h", term.constants[k], 0.0});
+  }
+  return all;
+}
+
+}  // namespace selfcal::discovery
