@@ -73,7 +73,7 @@ ParameterMatrix Filtered::covariance() const {
 }
 
 Expected<Filtered::Difference> Filtered::difference(const sim::ConcealedPhysics& physics, double warm_up_s) const {
-  if (physics.effects.empty()) {
+  if (physics.effects.empty() && physics.laws.empty()) {
     return Difference{Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(without_.epochs.size())),
                       ParameterVector::Zero()};
   }

@@ -1,0 +1,104 @@
+// Answers one recording of the discovery trial. Links no simulation.
+//
+//   selfcal_discovery_answer RECORDING [--discover]   one JSON line; with --discover also where the catalogue leaves nothing
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/diagnosis_json.hpp"
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/discovery.hpp"
+#include "protocol/recording/recording_file.hpp"
+
+namespace {
+
+using namespace selfcal;
+using nlohmann::ordered_json;
+
+ordered_json to_json(const discovery::Discovery& d) {
+  ordered_json j = {{"misfit_before", d.misfit_before}, {"misfit_after", d.misfit_after}, {"refused", d.refused}};
+  j["laws"] = ordered_json::array();
+  for (const discovery::DiscoveredLaw& law : d.laws) {
+    ordered_json members = ordered_json::array();
+    for (const discovery::ClassMember& m : law.ambiguous) {
+      members.push_back({{"expression", m.expression}, {"axis", m.axis}, {"odds", m.odds}});
+    }
+    j["laws"].push_back({{"axis", law.term.axis},
+                         {"expression", law.expression},
+                         {"coefficient", law.coefficient},
+                         {"sigma", law.sigma},
+                         {"significance", law.significance},
+                         {"held_out_gain", law.held_out_gain},
+                         {"share", law.share},
+                         {"class", members}});
+  }
+  j["processes"] = ordered_json::array();
+  for (const discovery::DiscoveredProcess& p : d.processes) {
+    j["processes"].push_back(
+        {{"axis", p.axis}, {"process", discovery::name_of(p.kind)}, {"size", p.size}, {"sigma", p.sigma}});
+  }
+  j["parameters"] = std::vector<double>(d.parameters.data(), d.parameters.data() + d.parameters.size());
+  const ParameterVector sigma = d.parameter_covariance.diagonal().cwiseSqrt();
+  j["parameter_sigma"] = std::vector<double>(sigma.data(), sigma.data() + sigma.size());
+  return j;
+}
+
+int answer(const std::string& path, bool always) {
+  const auto loaded = read_recording(path, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
+  if (!loaded) {
+    fmt::print(stderr, "selfcal_discovery_answer: {}\n", loaded.error().message);
+    return 3;
+  }
+  std::vector<double> temperature;
+  const ImuData data = imu_view(loaded->recording, temperature);
+  const auto begin = std::chrono::steady_clock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
+  ordered_json j;
+  bool wanted = always;
+  if (!always) {
+    const diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, {});
+    if (outcome.diagnosis) {
+      j["verdict"] = verdict_name(outcome.diagnosis->verdict);
+      j["names"] = ordered_json::array();
+      for (const auto& finding : outcome.diagnosis->findings) {
+        j["names"].push_back(finding.effect);
+      }
+      wanted = outcome.diagnosis->unexplained;
+    }
+  }
+  j["diagnosis_s"] = elapsed();
+  if (wanted) {
+    const CalibrationOutcome calibration = diagnosis::calibrate_still(data, {});
+    if (calibration.result) {
+      j["discovery"] = to_json(discovery::discover(data, *calibration.result, {}));
+    }
+  }
+  j["seconds"] = elapsed();
+  fmt::print("{}\n", j.dump());
+  return 0;
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  try {
+    const std::span<char*> arguments(values, static_cast<std::size_t>(count));
+    const bool always = arguments.size() == 3 && std::string(arguments[2]) == "--discover";
+    if (arguments.size() != 2 && !always) {
+      fmt::print(stderr, "usage: selfcal_discovery_answer RECORDING [--discover]\n");
+      return 2;
+    }
+    return answer(arguments[1], always);
+  } catch (const std::exception& problem) {
+    fmt::print(stderr, "selfcal_discovery_answer: {}\n", problem.what());
+    return 5;
+  }
+}

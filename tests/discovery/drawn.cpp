@@ -1,0 +1,186 @@
+#include "tests/discovery/drawn.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "estimator/geometry/units.hpp"
+#include "tests/blind/response.hpp"
+
+namespace selfcal::discovery_trial {
+namespace {
+
+using sim::Random;
+
+template <std::size_t n>
+std::string one_of(const std::array<const char*, n>& words, Random& random) {
+  return words[static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(n) * (1.0 - 1e-12)))];
+}
+double log_uniform(Random& random, double low, double high) {
+  return low * std::pow(high / low, random.uniform(0.0, 1.0));
+}
+
+// A quantity of the motion, sometimes squared or its size.
+std::string quantity(Random& random) {
+  static constexpr std::array<const char*, 14> some = {
+      "fx", "fy", "fz", "wx", "wy", "wz", "wo", "wi", "t", "so", "sin(outer)", "cos(inner)", "cos(outer)", "si"};
+  const std::string word = one_of(some, random);
+  const double form = random.uniform(0.0, 1.0);
+  return form < 0.7 ? word : (form < 0.85 ? "abs(" + word + ")" : word + "**2");
+}
+
+std::string kernel(Random& random) {
+  const double form = random.uniform(0.0, 1.0);
+  if (form < 0.4) {
+    return fmt::format("exp(-since/{:.4g})", log_uniform(random, 8.0, 150.0));
+  }
+  if (form < 0.6) {
+    return fmt::format("log(1+rest/{:.4g})*abs(so)", log_uniform(random, 2.0, 40.0));
+  }
+  if (form < 0.8) {
+    return fmt::format("exp(-t/{:.4g})", log_uniform(random, 0.06, 0.5));
+  }
+  return fmt::format("sin(2*pi*t/{:.4g}+{:.4g})", log_uniform(random, 0.15, 1.5), random.uniform(-3.0, 3.0));
+}
+
+std::string within_grammar(Random& random) {
+  const double form = random.uniform(0.0, 1.0);
+  if (form < 0.35) {
+    return quantity(random) + "*" + quantity(random);
+  }
+  if (form < 0.5) {
+    return kernel(random);
+  }
+  if (form < 0.9) {
+    return kernel(random) + "*" + quantity(random);
+  }
+  return quantity(random);
+}
+
+std::string beyond_grammar(Random& random) {
+  const double form = random.uniform(0.0, 1.0);
+  if (form < 0.2) {
+    return fmt::format("exp(-sqrt(since/{:.4g}))", log_uniform(random, 3.0, 40.0));
+  }
+  if (form < 0.4) {
+    return fmt::format("tanh({}*{:.3g})", one_of(std::array{"fx+fy", "fy-fz", "wx*fy"}, random),
+                       log_uniform(random, 2.0, 8.0));
+  }
+  if (form < 0.6) {
+    return fmt::format("sqrt(abs({}))*{}", one_of(std::array{"fx*fy", "fx+fz", "wx"}, random), quantity(random));
+  }
+  if (form < 0.8) {
+    return fmt::format("{}/(1.2+{})", one_of(std::array{"fx", "fy", "so", "fz"}, random),
+                       one_of(std::array{"sin(outer)", "fy", "cos(inner)"}, random));
+  }
+  return fmt::format("sin({:.3g}*n)*{}", random.uniform(0.7, 2.6), one_of(std::array{"fx", "1", "fz"}, random));
+}
+
+sim::Law draw_law(const std::string& kind, Random& random) {
+  sim::Law law;
+  law.axis = static_cast<int>(random.uniform(0.0, 5.9999));
+  law.expression = kind == "foreign" ? beyond_grammar(random) : within_grammar(random);
+  law.coefficient = law.axis < 3 ? 0.01 * units::degree_per_hour : 10.0 * units::micro_g;
+  if (kind == "process") {
+    const bool jump = random.uniform(0.0, 1.0) < 0.5;
+    law.process = jump ? sim::LawProcess::jump_per_turn : sim::LawProcess::random_walk;
+    law.expression.clear();
+    law.coefficient /= jump ? 1.0 : std::sqrt(units::hour);
+  }
+  return law;
+}
+
+sim::SimConfig draw_installation(Random& random) {
+  sim::SimConfig config;
+  config.sample_rate_hz = 50.0;
+  config.parameter_set = "random";
+  config.latitude_deg = random.uniform(20.0, 60.0);
+  const bool tilted = random.uniform(0.0, 1.0) < 0.75;
+  config.roll_deg = tilted ? random.uniform(-8.0, 8.0) : 0.0;
+  config.pitch_deg = tilted ? random.uniform(3.0, 9.0) : 0.0;
+  config.heading_deg = random.uniform(0.0, 360.0);
+  config.gyro_arw_deg_per_sqrt_h = 0.001;
+  config.accel_vrw_ug_per_sqrt_hz = 5.0;
+  config.temperature.recorded = random.uniform(0.0, 1.0) < 0.5;
+  return config;
+}
+
+}  // namespace
+
+std::vector<Recipe> recipes(int laws, int pairs, int processes, int clean, int foreign) {
+  std::vector<Recipe> all;
+  const auto add = [&all](const char* kind, double strength, int count) {
+    for (int k = 0; k < count; ++k) {
+      all.push_back({kind, strength});
+    }
+  };
+  for (const double strength : {10.0, 30.0, 100.0}) {
+    add("law", strength, laws);
+  }
+  add("pair", 30.0, pairs);
+  add("process", 30.0, processes);
+  add("clean", 0.0, clean);
+  add("foreign", 30.0, foreign);
+  return all;
+}
+
+Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
+  constexpr std::uint64_t streams_per_seed = 100000;
+  Random random(seed, streams_per_seed + static_cast<std::uint64_t>(number));
+  Case c;
+  c.number = number;
+  c.kind = recipe.kind;
+  c.strength = recipe.strength;
+  c.seed = seed * streams_per_seed + static_cast<std::uint64_t>(number);
+  c.config = draw_installation(random);
+  c.schedule = *named_schedule("horizontal");
+  const auto filtered = blind::Filtered::make(c.config, c.schedule, c.seed);
+  if (!filtered) {
+    return tl::unexpected(filtered.error());
+  }
+  const int count = c.kind == "clean" ? 0 : (c.kind == "pair" ? 2 : 1);
+  for (int tries = 0; static_cast<int>(c.physics.laws.size()) < count; ++tries) {
+    constexpr int most_tries = 200;
+    if (tries == most_tries) {
+      return fail(ErrorKind::internal, fmt::format("case {}: no law of {} sigma was drawn", number, c.strength));
+    }
+    sim::Law law = draw_law(c.kind, random);
+    const auto response = filtered->response({{}, {law}});
+    // What takes more than these to reach its strength is nothing that a sensor does.
+    const double largest = law.axis < 3 ? 5.0 * units::degree_per_hour : 3000.0 * units::micro_g;
+    if (!response || !(response->sigmas > 0.0)) {
+      continue;
+    }
+    law.coefficient *= c.strength / response->sigmas;
+    const double in_time = law.process == sim::LawProcess::random_walk ? std::sqrt(units::hour) : 1.0;
+    if (law.coefficient * in_time < largest) {
+      c.physics.laws.push_back(law);
+    }
+  }
+  return c;
+}
+
+Schedule other_plan() {
+  Schedule plan;
+  constexpr std::array<std::array<double, 2>, 20> positions = {
+      {{45, 45},   {135, 45}, {225, 45},  {315, 45},  {315, 135}, {225, 135}, {135, 135},
+       {45, 135},  {45, 225}, {135, 225}, {225, 225}, {315, 225}, {315, 315}, {225, 315},
+       {135, 315}, {45, 315}, {45, 225},  {135, 135}, {225, 45},  {135, 45}}};
+  for (const auto& [outer, inner] : positions) {
+    plan.positions.push_back({outer, inner});
+    plan.dwell_s.push_back(100.0);
+  }
+  plan.rotation_s = 8.0;
+  return plan;
+}
+
+sim::SimConfig other_installation(const sim::SimConfig& config) {
+  sim::SimConfig other = config;
+  other.roll_deg = -9.0;
+  other.pitch_deg = 14.0;
+  other.heading_deg = std::fmod(config.heading_deg + 77.0, 360.0);
+  return other;
+}
+
+}  // namespace selfcal::discovery_trial

@@ -1,0 +1,41 @@
+// One case of the discovery trial, drawn from its number: the installation, the plan and what is concealed.
+//
+// The grammar of the laws is this file's own: it knows no function of the search, and holds forms that the search has not.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "estimator/geometry/schedule.hpp"
+#include "protocol/error.hpp"
+#include "sim_ins/config.hpp"
+#include "sim_ins/physics.hpp"
+#include "sim_ins/random.hpp"
+
+namespace selfcal::discovery_trial {
+
+struct Case {
+  int number = 0;
+  std::string kind;       // clean, law, pair, process, foreign (a law of forms that the search has not)
+  double strength = 0.0;  // sigma, of each law
+  std::uint64_t seed = 0;
+  sim::SimConfig config;
+  Schedule schedule;
+  sim::ConcealedPhysics physics;
+};
+
+// Kinds in the order of the trial, with strength; `repeats` of each.
+struct Recipe {
+  std::string kind;
+  double strength = 0.0;
+};
+std::vector<Recipe> recipes(int laws, int pairs, int processes, int clean, int foreign);
+
+[[nodiscard]] Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed);
+
+// The plan that no case is recorded on: 20 positions at 45 and 135 degrees, the base at another attitude.
+Schedule other_plan();
+sim::SimConfig other_installation(const sim::SimConfig& config);
+
+}  // namespace selfcal::discovery_trial

@@ -1,0 +1,175 @@
+// Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
+//
+//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE   one JSON line a case, as far as missing
+//   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
+//   selfcal_discovery_generate left KEY NUMBER LAWS.toml     share of the misfit's power that these laws leave on a plan
+//                                                            that was never used: |true - told|^2 / |true|^2
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "estimator/geometry/units.hpp"
+#include "protocol/recording/recording_file.hpp"
+#include "sim_ins/simulate.hpp"
+#include "tests/blind/response.hpp"
+#include "tests/discovery/drawn.hpp"
+
+namespace {
+
+using namespace selfcal;
+using discovery_trial::Case;
+using nlohmann::ordered_json;
+
+int complain(const Error& error) {
+  fmt::print(stderr, "selfcal_discovery_generate: {}\n", error.message);
+  return static_cast<int>(error.kind);
+}
+
+std::optional<int> to_number(const char* text) {
+  char* end = nullptr;
+  const long value = std::strtol(text, &end, 10);
+  return end != text && *end == '\0' && value >= 0 && value < 1000000 ? std::optional<int>(static_cast<int>(value))
+                                                                      : std::nullopt;
+}
+
+ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
+  ordered_json j = {{"number", c.number},
+                    {"trial_seed", trial_seed},
+                    {"kind", c.kind},
+                    {"strength", c.strength},
+                    {"attitude_deg", {c.config.roll_deg, c.config.pitch_deg, c.config.heading_deg}},
+                    {"temperature", c.config.temperature.recorded}};
+  const auto truth = sim::true_sensor_errors(c.config, c.seed);
+  if (truth) {
+    j["truth"] = *truth;
+  }
+  j["laws"] = ordered_json::array();
+  for (const sim::Law& law : c.physics.laws) {
+    const bool gyro = law.axis < 3;
+    j["laws"].push_back({{"axis", law.axis},
+                         {"expression", law.expression},
+                         {"process", static_cast<int>(law.process)},
+                         {"coefficient", law.coefficient / (gyro ? units::degree_per_hour : units::micro_g)}});
+  }
+  return j;
+}
+
+std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts) {
+  return discovery_trial::recipes(counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4));
+}
+
+int write_key(std::span<char*> arguments) {
+  ordered_json counts = ordered_json::array();
+  for (std::size_t k = 1; k < 6; ++k) {
+    const auto count = to_number(arguments[k]);
+    if (!count) {
+      return complain({ErrorKind::usage, fmt::format("{}: no count", arguments[k])});
+    }
+    counts.push_back(*count);
+  }
+  const auto seed = to_number(arguments[0]);
+  if (!seed) {
+    return complain({ErrorKind::usage, fmt::format("{}: no seed", arguments[0])});
+  }
+  int done = 0;
+  {
+    std::ifstream file(arguments[6]);
+    for (std::string line; std::getline(file, line);) {
+      ++done;
+    }
+  }
+  const auto recipes = recipes_of(counts);
+  std::ofstream file(arguments[6], std::ios::app);
+  for (int n = done; n < static_cast<int>(recipes.size()); ++n) {
+    const auto drawn =
+        discovery_trial::draw_case(recipes[static_cast<std::size_t>(n)], n, static_cast<std::uint64_t>(*seed));
+    if (!drawn) {
+      return complain(drawn.error());
+    }
+    ordered_json line = to_json(*drawn, static_cast<std::uint64_t>(*seed));
+    line["counts"] = counts;
+    file << line.dump() << '\n' << std::flush;
+  }
+  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[6])});
+}
+
+Expected<Case> case_in(const std::string& key, int number) {
+  std::ifstream file(key);
+  std::string line;
+  for (int n = 0; n <= number; ++n) {
+    if (!std::getline(file, line)) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: no case {}", key, number));
+    }
+  }
+  const ordered_json j = ordered_json::parse(line);
+  const auto recipes = recipes_of(j.at("counts"));
+  return discovery_trial::draw_case(recipes.at(static_cast<std::size_t>(number)), number, j.at("trial_seed"));
+}
+
+int write_record(const Case& c, const std::string& path) {
+  const auto recording = sim::simulate(c.config, c.schedule, c.seed, c.physics);
+  if (!recording) {
+    return complain(recording.error());
+  }
+  const auto written = write_recording(*recording, path);
+  return written ? 0 : complain(written.error());
+}
+
+int print_left(const Case& c, const std::string& laws) {
+  const auto told = sim::read_physics(laws);
+  if (!told) {
+    return complain(told.error());
+  }
+  const auto filtered =
+      blind::Filtered::make(discovery_trial::other_installation(c.config), discovery_trial::other_plan(), c.seed + 1);
+  if (!filtered) {
+    return complain(filtered.error());
+  }
+  sim::ConcealedPhysics both = c.physics;  // the sum of the true laws and the negative of those told
+  for (sim::Law law : told->laws) {
+    law.coefficient = -law.coefficient;
+    both.laws.push_back(law);
+  }
+  const auto with = filtered->response(c.physics), without = filtered->response(both);
+  if (!with || !without) {
+    return complain(with ? without.error() : with.error());
+  }
+  fmt::print("{{\"left\": {:.6g}, \"sigmas\": {:.4g}}}\n",
+             std::pow(without->sigmas / std::max(with->sigmas, 1e-9), 2.0), with->sigmas);
+  return 0;
+}
+
+int run(std::span<char*> arguments) {
+  const std::string verb = arguments.size() > 1 ? arguments[1] : "";
+  if (verb == "key" && arguments.size() == 9) {
+    return write_key(arguments.subspan(2));
+  }
+  if ((verb == "record" || verb == "left") && arguments.size() == 5 && to_number(arguments[3])) {
+    const auto c = case_in(arguments[2], *to_number(arguments[3]));
+    if (!c) {
+      return complain(c.error());
+    }
+    return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
+  }
+  fmt::print(stderr,
+             "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE | "
+             "record KEY NUMBER FILE | left KEY NUMBER LAWS.toml\n");
+  return 2;
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  try {
+    return run({values, static_cast<std::size_t>(count)});
+  } catch (const std::exception& problem) {
+    return complain({ErrorKind::bad_input, problem.what()});
+  }
+}
