@@ -62,6 +62,8 @@ class Search {
       take_laws();
     } else {
       take_laws();
+      settle();
+      take_laws();
       if (significant(best_process())) {
         processes_too();
       }
@@ -95,11 +97,37 @@ class Search {
            !options_.stop.stop_requested();
   }
 
+  // The pieces stand for a law to a per cent or so: of one of 30 sigma they leave what a process could take up. Score and
+  // residual become those of the recording without the laws.
+  void settle() {
+    if (state_.terms.empty()) {
+      return;
+    }
+    const Increments increments = without_laws(motion_, sums_, input_, state_.terms, state_.fit.coefficient);
+    ImuData data = *input_.data;
+    data.delta_theta = increments.delta_theta;
+    data.delta_v = increments.delta_v;
+    PassInput input = input_;
+    input.data = &data;
+    const PieceSums settled =
+        said("what the laws leave", [&] { return sum_over_pieces(motion_, input, options_.stop); });
+    raw_score_ = sums_.sums.score;
+    raw_square_ = sums_.sums.square;
+    sums_.sums.score = settled.sums.score;
+    sums_.sums.square = settled.sums.square;
+    model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+    choose(state_.terms.size());
+  }
+
   void processes_too() {
     take_processes();
     const State laws_first = state_;
     const double laws_first_posterior = log_posterior();
     state_ = empty_;
+    if (raw_score_.size() > 0) {
+      sums_.sums.score = raw_score_;
+      sums_.sums.square = raw_square_;
+    }
     model_ = std::make_unique<PieceModel>(sums_, dictionary_);
     take_processes();
     take_laws();
@@ -163,7 +191,9 @@ class Search {
       state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p_of_law(candidates.front()));
       return false;
     }
-    make_exact(candidates);
+    if (state_.processes.empty()) {
+      make_exact(candidates, state_.terms);
+    }
     for (const Candidate& candidate : candidates) {
       state_.log_p_remaining = std::min(0.0, log_p_of_law(candidate));
       if (log_p_of_law(candidate) > limit) {
@@ -178,17 +208,25 @@ class Search {
     return false;
   }
 
-  // Gains over the pieces become those of the signatures themselves; with a process in play the pieces stand.
-  void make_exact(std::vector<Candidate>& candidates) const {
-    if (state_.processes.empty()) {
-      std::vector<LawTerm> alternatives;
-      for (const Candidate& candidate : candidates) {
+  // Gains over the pieces become those of the signatures themselves, at the best of some constants; with a process in play the
+  // pieces stand.
+  void make_exact(std::vector<Candidate>& candidates, const std::vector<LawTerm>& given) const {
+    static constexpr std::array<double, 5> factors = {0.7, 0.85, 1.0, 1.18, 1.4};
+    std::vector<LawTerm> alternatives;
+    for (const Candidate& candidate : candidates) {
+      for (const double factor : factors) {
         alternatives.push_back(candidate.term);
+        if (candidate.term.constants.size() == 1 && !candidate.step) {
+          alternatives.back().constants.front() *= factor;
+        }
       }
-      const std::vector<double> gains = exact_gains(motion_, input_, state_.terms, alternatives, options_.stop);
-      for (std::size_t k = 0; k < gains.size(); ++k) {
-        candidates[k].gain = gains[k];
-      }
+    }
+    const std::vector<double> gains = exact_gains(motion_, sums_, input_, given, alternatives, options_.stop);
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+      const auto first = gains.begin() + static_cast<std::ptrdiff_t>(factors.size() * k);
+      const auto best = std::max_element(first, first + static_cast<std::ptrdiff_t>(factors.size()));
+      candidates[k].gain = *best;
+      candidates[k].term = alternatives[static_cast<std::size_t>(best - gains.begin())];
     }
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
@@ -201,7 +239,7 @@ class Search {
   bool accept(const Candidate& candidate) {
     std::vector<LawTerm> terms = state_.terms;
     terms.push_back(candidate.term);
-    const LawFit fit = fit_laws(motion_, input_, terms, constant_rounds, options_.stop);
+    const LawFit fit = fit_laws(motion_, sums_, input_, terms, constant_rounds, options_.stop);
     if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1)) {
       return false;
     }
@@ -227,68 +265,73 @@ class Search {
     model_->choose(columns);
   }
 
-  // Each term in turn against all functions, the others staying: what was taken first may have stood for two.
+  std::vector<LawTerm> all_but(std::size_t k) const {
+    std::vector<LawTerm> others = state_.terms;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    return others;
+  }
+
+  // What explains the recording in the place of term k, exactly; the term itself as it stands has gain `own`.
+  std::vector<Candidate> rivals(std::size_t k, std::size_t most, double& own) {
+    choose(k);
+    std::vector<Candidate> candidates = shortlist_.best(*model_, most);
+    choose(state_.terms.size());
+    const std::vector<LawTerm> others = all_but(k);
+    own = exact_gains(motion_, sums_, input_, others, {state_.terms[k]}, options_.stop).front();
+    make_exact(candidates, others);
+    return candidates;
+  }
+
+  // Each term in turn against all functions, the others staying: what was taken first may have stood for two. What is then
+  // left with less than significance is dropped.
   void exchange() {
     if (state_.terms.size() < 2 || !state_.processes.empty()) {
       return;
     }
     for (std::size_t k = 0; k + 1 < state_.terms.size(); ++k) {
-      choose(k);
-      std::vector<Candidate> candidates = shortlist_.best(*model_, shortlist_size);
-      std::vector<LawTerm> others = state_.terms;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      std::vector<LawTerm> alternatives = {state_.terms[k]};
-      for (const Candidate& candidate : candidates) {
-        alternatives.push_back(candidate.term);
+      double own = 0.0;
+      const std::vector<Candidate> candidates = rivals(k, shortlist_size, own);
+      if (candidates.empty() || candidates.front().merit() < 0.5 * own - state_.costs[k] + 1.0) {
+        continue;
       }
-      const std::vector<double> gains = exact_gains(motion_, input_, others, alternatives, options_.stop);
-      std::size_t best = 0;
-      double best_merit = 0.5 * gains[0] - state_.costs[k];
-      for (std::size_t c = 0; c < candidates.size(); ++c) {
-        const double merit = 0.5 * gains[c + 1] - candidates[c].cost;
-        if (merit > best_merit + 1.0) {
-          best = c + 1;
-          best_merit = merit;
-        }
-      }
-      if (best > 0) {
-        std::vector<LawTerm> terms = state_.terms;
-        terms[k] = alternatives[best];
-        const LawFit fit = fit_laws(motion_, input_, terms, constant_rounds, options_.stop);
-        if (fit.square_after < state_.fit.square_after && predicts(fit, k)) {
-          state_.costs[k] = candidates[best - 1].cost;
-          state_.fit = fit;
-          state_.terms = fit.terms;
-        }
+      std::vector<LawTerm> terms = state_.terms;
+      terms[k] = candidates.front().term;
+      const LawFit fit = fit_laws(motion_, sums_, input_, terms, constant_rounds, options_.stop);
+      if (fit.square_after < state_.fit.square_after && predicts(fit, k)) {
+        state_.costs[k] = candidates.front().cost;
+        adopt(fit);
       }
     }
-    choose(state_.terms.size());
+    drop_weak();
+  }
+
+  void drop_weak() {
+    for (std::size_t k = 0; k < state_.terms.size() && state_.terms.size() > 1; ++k) {
+      const Candidate here{state_.terms[k], state_.fit.gain[k], state_.costs[k], false};
+      if (log_p_of_law(here) > std::log(options_.false_alarm_rate)) {
+        const LawFit fit = fit_laws(motion_, sums_, input_, all_but(k), constant_rounds, options_.stop);
+        state_.costs.erase(state_.costs.begin() + static_cast<std::ptrdiff_t>(k));
+        adopt(fit);
+        k = static_cast<std::size_t>(-1);  // from the start: the others' gains have changed
+      }
+    }
   }
 
   std::vector<ClassMember> ambiguity_class(std::size_t k) {
-    choose(k);
-    std::vector<Candidate> candidates = shortlist_.best(*model_, class_size);
-    choose(state_.terms.size());
-    std::vector<LawTerm> others = state_.terms, alternatives = {state_.terms[k]};
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    for (const Candidate& candidate : candidates) {
-      alternatives.push_back(candidate.term);
-    }
-    const std::vector<double> gains = exact_gains(motion_, input_, others, alternatives, options_.stop);
-    const double own = 0.5 * gains[0] - state_.costs[k];
-    const std::string own_pattern = state_.terms[k].expression.text();
+    double own_gain = 0.0;
+    const std::vector<Candidate> candidates = rivals(k, class_size, own_gain);
+    const LawTerm& term = state_.terms[k];
+    const double own = 0.5 * own_gain - state_.costs[k];
     struct Member {
       ClassMember member;
       double cost = 0.0;
     };
-    std::vector<Member> members = {
-        {{state_.terms[k].expression.text(state_.terms[k].constants), state_.terms[k].axis, 1.0}, state_.costs[k]}};
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      const double odds = std::exp(std::min(50.0, 0.5 * gains[c + 1] - candidates[c].cost - own));
-      const bool itself =
-          candidates[c].term.axis == state_.terms[k].axis && candidates[c].term.expression.text() == own_pattern;
+    std::vector<Member> members = {{{term.expression.text(term.constants), term.axis, 1.0}, state_.costs[k]}};
+    for (const Candidate& c : candidates) {
+      const double odds = std::exp(std::min(50.0, c.merit() - own));
+      const bool itself = c.term.axis == term.axis && c.term.expression.text() == term.expression.text();
       if (odds > options_.least_odds && !itself) {
-        members.push_back({{candidates[c].text(), candidates[c].term.axis, odds}, candidates[c].cost});
+        members.push_back({{c.text(), c.term.axis, odds}, c.cost});
       }
     }
     std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) { return a.cost < b.cost; });
@@ -343,6 +386,8 @@ class Search {
   Shortlist shortlist_;
   Discovery result_;
   State empty_, state_;
+  Eigen::VectorXd raw_score_;  // before settle()
+  double raw_square_ = 0.0;
 };
 
 }  // namespace

@@ -63,50 +63,54 @@ void refine_constants(std::vector<LawTerm>& terms, const Eigen::VectorXd& value)
 
 }  // namespace
 
-LawColumns::LawColumns(const LawMotion& motion, const std::vector<LawTerm>& terms, bool derivatives)
-    : motion_(motion),
-      terms_(terms),
-      derivatives_(derivatives),
-      count_(static_cast<int>(terms.size()) + (derivatives ? constants_of(terms) : 0)) {}
-
-void LawColumns::block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
-                       Eigen::Ref<Eigen::Matrix3Xd> angle) {
-  const StretchNodes stretch = motion_.of(block);
-  Eigen::ArrayXd dt(stretch.channels.rows());
-  for (Eigen::Index k = 0; k < dt.size(); ++k) {
-    dt(k) = stretch.nodes[static_cast<std::size_t>(k)].dt;
+LawColumns::LawColumns(const LawMotion& motion, const NodeTable& table, const std::vector<LawTerm>& terms,
+                       bool derivatives)
+    : motion_(motion), table_(table), count_(static_cast<int>(terms.size()) + (derivatives ? constants_of(terms) : 0)) {
+  const auto n = static_cast<Eigen::Index>(table.nodes.size());
+  Eigen::ArrayXd dt(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    dt(k) = table.nodes[static_cast<std::size_t>(k)].dt;
   }
-  const auto put = [&](int axis, int column, double integral) {
-    if (!std::isfinite(integral) && !not_finite_s_) {
-      not_finite_s_ = stretch.nodes.front().time_s;
-    }
-    (axis < 3 ? angle : velocity)(axis % 3, column) = std::isfinite(integral) ? integral * unit_of(axis) : 0.0;
+  integrals_.resize(n, count_);
+  const auto put = [&](int axis, const Eigen::ArrayXd& values) {
+    integrals_.col(static_cast<Eigen::Index>(axes_.size())) =
+        values.isFinite().select(values, 0.0) * dt * unit_of(axis);
+    axes_.push_back(axis);
   };
-  int next = static_cast<int>(terms_.size());
-  for (std::size_t k = 0; k < terms_.size(); ++k) {
-    const LawTerm& term = terms_[k];
-    const double here = (term.expression.evaluate(stretch.channels, term.constants) * dt).sum();
-    put(term.axis, static_cast<int>(k), here);
-    for (std::size_t c = 0; derivatives_ && c < term.constants.size(); ++c) {
-      std::vector<double> moved = term.constants;
-      const double step = derivative_step * std::max(std::abs(moved[c]), 1e-6);
-      moved[c] += step;
-      const double up = (term.expression.evaluate(stretch.channels, moved) * dt).sum();
-      moved[c] -= 2.0 * step;
-      const double down = (term.expression.evaluate(stretch.channels, moved) * dt).sum();
-      put(term.axis, next++, (up - down) / (2.0 * step));
+  for (const LawTerm& term : terms) {
+    put(term.axis, term.expression.evaluate(table.channels, term.constants));
+  }
+  for (const LawTerm& term : terms) {
+    for (std::size_t c = 0; derivatives && c < term.constants.size(); ++c) {
+      std::vector<double> up = term.constants, down = term.constants;
+      const double step = derivative_step * std::max(std::abs(up[c]), 1e-6);
+      up[c] += step;
+      down[c] -= step;
+      put(term.axis, (term.expression.evaluate(table.channels, up) - term.expression.evaluate(table.channels, down)) /
+                         (2.0 * step));
     }
   }
 }
 
-LawFit fit_laws(const LawMotion& motion, const PassInput& input, std::vector<LawTerm> terms, int rounds,
-                const std::stop_token& stop) {
+void LawColumns::block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
+                       Eigen::Ref<Eigen::Matrix3Xd> angle) {
+  const double end_s = block.end_s - motion_.start_s();
+  for (; next_ < table_.nodes.size() && table_.nodes[next_].time_s < end_s; ++next_) {
+    for (int column = 0; column < count_; ++column) {
+      const int axis = axes_[static_cast<std::size_t>(column)];
+      (axis < 3 ? angle : velocity)(axis % 3, column) += integrals_(static_cast<Eigen::Index>(next_), column);
+    }
+  }
+}
+
+LawFit fit_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input, std::vector<LawTerm> terms,
+                int rounds, const std::stop_token& stop) {
   LawFit fit;
   const int constants = constants_of(terms);
   double best = -1.0;
   std::vector<LawTerm> next = terms;
   for (int round = 0; round <= (constants > 0 ? rounds : 0); ++round) {
-    LawColumns source(motion, next, true);
+    LawColumns source(motion, table, next, true);
     RowSink sink;
     const ColumnSums sums = run_columns(input, source, stop, &sink);
     std::vector<int> linear(next.size());
@@ -139,12 +143,14 @@ LawFit fit_laws(const LawMotion& motion, const PassInput& input, std::vector<Law
                                    sums.pass.layout.parameters(), sums.pass.layout.parameters()) +
                                shift * fit.covariance * shift.transpose();
     fit.gain.clear();
+    fit.collinear.clear();
     fit.held_out_gain.clear();
     std::vector<int> fold;
     for (const double t : sink.time_s) {
       fold.push_back(static_cast<int>(motion.context().segment_at(t)));
     }
     for (const int k : linear) {
+      fit.collinear.push_back(1.0 - 1.0 / (fit.covariance(k, k) * G(k, k)));
       fit.gain.push_back(gain_of(sums.information, sums.score, linear, k));
       std::vector<int> without = linear;
       without.erase(without.begin() + k);
@@ -158,11 +164,12 @@ LawFit fit_laws(const LawMotion& motion, const PassInput& input, std::vector<Law
   return fit;
 }
 
-std::vector<double> exact_gains(const LawMotion& motion, const PassInput& input, const std::vector<LawTerm>& given,
-                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop) {
+std::vector<double> exact_gains(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                const std::vector<LawTerm>& given, const std::vector<LawTerm>& alternatives,
+                                const std::stop_token& stop) {
   std::vector<LawTerm> all = given;
   all.insert(all.end(), alternatives.begin(), alternatives.end());
-  LawColumns source(motion, all, false);
+  LawColumns source(motion, table, all, false);
   const ColumnSums sums = run_columns(input, source, stop);
   std::vector<int> base(given.size());
   std::iota(base.begin(), base.end(), 0);
@@ -174,6 +181,48 @@ std::vector<double> exact_gains(const LawMotion& motion, const PassInput& input,
     gains.push_back(solve(sums.information(with, with), sums.score(with)).gain - before);
   }
   return gains;
+}
+
+namespace {
+
+class Subtraction : public ExtraSignatures {
+ public:
+  Subtraction(LawColumns& columns, const Eigen::VectorXd& coefficient, Increments& increments)
+      : columns_(columns), coefficient_(coefficient), increments_(increments) {}
+  int count() const override { return columns_.count(); }
+  bool block_ends_before(std::size_t sample) const override { return columns_.block_ends_before(sample); }
+  void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
+             Eigen::Ref<Eigen::Matrix3Xd> angle) override {
+    columns_.block(block, velocity, angle);
+    const double samples = static_cast<double>(block.last - block.first);
+    const Vector3 dv = velocity * coefficient_ / samples, dtheta = angle * coefficient_ / samples;
+    for (std::size_t i = block.first; i < block.last; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        increments_.delta_v[i][axis] -= dv(static_cast<Eigen::Index>(axis));
+        increments_.delta_theta[i][axis] -= dtheta(static_cast<Eigen::Index>(axis));
+      }
+    }
+  }
+
+ private:
+  LawColumns& columns_;
+  const Eigen::VectorXd& coefficient_;
+  Increments& increments_;
+};
+
+}  // namespace
+
+Increments without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                        const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
+  Increments increments{{input.data->delta_theta.begin(), input.data->delta_theta.end()},
+                        {input.data->delta_v.begin(), input.data->delta_v.end()}};
+  LawColumns columns(motion, table, terms, false);
+  Subtraction subtraction(columns, coefficient, increments);
+  IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &subtraction);
+  Interval interval;
+  while (navigator.next(interval)) {
+  }
+  return increments;
 }
 
 }  // namespace selfcal::discovery

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <array>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -25,7 +25,8 @@ struct LawFit {
   Eigen::VectorXd coefficient;  // [terms] in unit_of(axis)
   Eigen::MatrixXd covariance;   // [terms + constants], constants behind the coefficients in the order of the terms
   double square_before = 0.0, square_after = 0.0, rows = 0.0;
-  std::vector<double> gain;           // [terms] fall of the square by each, the others fitted
+  std::vector<double> gain;       // [terms] fall of the square by each, the others fitted
+  std::vector<double> collinear;  // [terms] share of the information that the other terms and constants take, 0 to 1
   std::vector<double> held_out_gain;  // [terms] log-likelihood on dwells and rotations left out in turn
   ParameterVector parameters;         // the 24 with the laws, SI
   ParameterMatrix parameter_covariance;
@@ -34,29 +35,37 @@ struct LawFit {
 // Columns of the terms, each with the derivative with respect to each of its constants behind all of them.
 class LawColumns : public ColumnSource {
  public:
-  LawColumns(const LawMotion& motion, const std::vector<LawTerm>& terms, bool derivatives);
+  // `table` is that of a pass with the same input: its nodes are those of this pass's stretches.
+  LawColumns(const LawMotion& motion, const NodeTable& table, const std::vector<LawTerm>& terms, bool derivatives);
   int count() const override { return count_; }
   int active(double /*time_s*/) const override { return count_; }
   bool block_ends_before(std::size_t sample) const override { return motion_.context().divides(sample); }
   void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
              Eigen::Ref<Eigen::Matrix3Xd> angle) override;
-  // Whether every value was finite so far; where not: the time, s since the start.
-  std::optional<double> not_finite_at_s() const { return not_finite_s_; }
 
  private:
   const LawMotion& motion_;
-  const std::vector<LawTerm>& terms_;
-  bool derivatives_;
+  const NodeTable& table_;
+  std::vector<int> axes_;      // of the columns
+  Eigen::ArrayXXd integrals_;  // [nodes x columns] value times dt, SI
   int count_;
-  std::optional<double> not_finite_s_;
+  std::size_t next_ = 0;  // node
 };
 
 // Gauss-Newton in the constants, at most `rounds`; `input` a forward pass about the calibrated recording.
-LawFit fit_laws(const LawMotion& motion, const PassInput& input, std::vector<LawTerm> terms, int rounds,
-                const std::stop_token& stop = {});
+LawFit fit_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input, std::vector<LawTerm> terms,
+                int rounds, const std::stop_token& stop = {});
 
 // Fall of the residuals' square by each term alone, given `given`, from one pass; constants as they are.
-std::vector<double> exact_gains(const LawMotion& motion, const PassInput& input, const std::vector<LawTerm>& given,
-                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop = {});
+std::vector<double> exact_gains(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                const std::vector<LawTerm>& given, const std::vector<LawTerm>& alternatives,
+                                const std::stop_token& stop = {});
+
+// Increments less the laws, stretch by stretch, each spread evenly over its samples.
+struct Increments {
+  std::vector<std::array<double, 3>> delta_theta, delta_v;
+};
+Increments without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                        const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
 
 }  // namespace selfcal::discovery

@@ -124,4 +124,45 @@ StretchNodes LawMotion::of(const SensorBlock& block) const {
   return result;
 }
 
+namespace {
+
+class Collector : public ExtraSignatures {
+ public:
+  Collector(const LawMotion& motion, NodeTable& table) : motion_(motion), table_(table) {}
+  int count() const override { return 0; }
+  bool block_ends_before(std::size_t sample) const override { return motion_.context().divides(sample); }
+  void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> /*velocity*/,
+             Eigen::Ref<Eigen::Matrix3Xd> /*angle*/) override {
+    const StretchNodes stretch = motion_.of(block);
+    for (Eigen::Index k = 0; k < stretch.channels.rows(); ++k) {
+      table_.nodes.push_back(stretch.nodes[static_cast<std::size_t>(k)]);
+      rows_.emplace_back(stretch.channels.row(k));
+    }
+  }
+  void finish() {
+    table_.channels.resize(static_cast<Eigen::Index>(rows_.size()), static_cast<Eigen::Index>(laws::variable_count));
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      table_.channels.row(static_cast<Eigen::Index>(k)) = rows_[k];
+    }
+  }
+
+ private:
+  const LawMotion& motion_;
+  NodeTable& table_;
+  std::vector<Eigen::Array<double, 1, static_cast<int>(laws::variable_count)>> rows_;
+};
+
+}  // namespace
+
+NodeTable collect_nodes(const LawMotion& motion, const PassInput& input) {
+  NodeTable table;
+  Collector collector(motion, table);
+  IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &collector);
+  Interval interval;
+  while (navigator.next(interval)) {
+  }
+  collector.finish();
+  return table;
+}
+
 }  // namespace selfcal::discovery

@@ -22,6 +22,12 @@ struct StretchNodes {
   laws::Channels channels;  // [nodes x variables]
 };
 
+// All nodes of a pass over the recording, in order of time.
+struct NodeTable {
+  std::vector<Node> nodes;
+  laws::Channels channels;  // [nodes x variables]
+};
+
 class LawMotion {
  public:
   // `context` must outlive this.
@@ -31,6 +37,7 @@ class LawMotion {
   const laws::VariableSet& available() const { return available_; }
   StretchNodes of(const SensorBlock& block) const;
   const diagnosis::RecordingContext& context() const { return context_; }
+  double start_s() const { return start_s_; }  // of the recording, recording's time
 
  private:
   struct Sense {
@@ -46,5 +53,8 @@ class LawMotion {
   std::vector<double> begins_s_, ends_s_;
   std::vector<Sense> senses_;  // after k turns have begun, [turns + 1]
 };
+
+// The nodes of a pass with this input.
+NodeTable collect_nodes(const LawMotion& motion, const PassInput& input);
 
 }  // namespace selfcal::discovery

@@ -24,12 +24,10 @@ struct Piece {
 // Dwells are cut ever more coarsely after a turn, turns into equal parts.
 std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context);
 
-struct PieceSums {
+struct PieceSums : NodeTable {
   std::vector<Piece> pieces;
   // Column piece * axis_count + axis, in units of unit_of(axis): of the bias of that axis during that piece.
   ColumnSums sums;
-  std::vector<Node> nodes;
-  laws::Channels channels;    // [nodes x variables]
   std::vector<int> piece_of;  // [nodes]
   Eigen::VectorXd piece_dt;   // [pieces] s
 

@@ -85,6 +85,7 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
     return c;
   }
   c.term.constants = {function.constant};
+  c.step = function.kernel == Kernel::step;
   if (function.kernel != Kernel::step) {
     const double constant = highest_between(function.constant / 1.7, function.constant * 1.7, 12, [&](double x) {
       LawTerm term = c.term;

@@ -14,6 +14,7 @@ struct Constant;
 struct Candidate {
   LawTerm term;
   double gain = 0.0, cost = 0.0;  // as in Ranked and Function; two constants and a free phase cost one more
+  bool step = false;              // its constant is an instant
   double merit() const { return 0.5 * gain - cost; }
   std::string text() const { return term.expression.text(term.constants); }
 };

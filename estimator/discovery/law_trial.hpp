@@ -1,0 +1,35 @@
+// A user's own equations, tried on a recording: significance, coefficients, what they leave, held-out proof.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+
+namespace selfcal::discovery {
+
+struct TriedLaw {
+  LawTerm term;                           // constants as fitted
+  std::string expression;                 // constants as numbers
+  double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
+  std::vector<Constant> constants;        // the k-th `?` is "constant k"
+  double significance = 0.0;              // sigma: one law was asked for, so nothing is corrected for
+  double gain = 0.0, held_out_gain = 0.0, share = 0.0;
+  double stated = 0.0;     // the file's coefficient; NaN: none
+  double collinear = 0.0;  // share of its information that the other laws and the constants take, 0 to 1
+};
+
+struct LawTrialFailure {
+  std::size_t law = 0;  // from 0
+  std::string words;
+};
+
+// All together, beside the 24. A law that needs a channel that the recording has not, or whose expression is not finite
+// somewhere on it, is a failure. `stated` [laws], NaN where the file has no coefficient.
+tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(const ImuData& data, const CalibrationResult& calibration,
+                                                              const std::vector<LawTerm>& laws,
+                                                              const std::vector<double>& stated);
+
+}  // namespace selfcal::discovery

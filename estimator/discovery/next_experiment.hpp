@@ -1,0 +1,38 @@
+// The rotation that would tell the laws of a class apart: planned before anything turns.
+//
+// With z_A the whitened signature of the law as found and z_B that of a rival, the rival fitted in its place leaves a misfit
+// of |z_A|^2 - (z_A . z_B)^2 / |z_B|^2, summed over the recording and the planned one: the square of the separation in sigma.
+// A planned recording needs no data for that (diagnosis/ideal_recording.hpp). Half the square is the expected logarithm of
+// the odds.
+#pragma once
+
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+#include "estimator/geometry/schedule.hpp"
+
+namespace selfcal::discovery {
+
+struct ExperimentLimits {
+  double duration_s = 3000.0;
+  double largest_move_deg = 90.0;  // of one axis in one turn
+  double rotation_s = 5.0;         // the gimbal makes the largest move in it
+};
+
+struct NextExperiment {
+  Schedule schedule;
+  double separation_now = 0.0;  // sigma, of the closest rival on the recording alone
+  double separation = 0.0;      // with the planned one
+  double log_odds = 0.0;        // expected, of the law against the closest rival
+  std::string closest;          // that rival
+};
+
+// Of a few dozen plans the one whose closest rival is farthest. None where the class has one member, or no plan helps.
+std::optional<NextExperiment> plan_experiment(const ImuData& data, const CalibrationResult& calibration,
+                                              const DiscoveredLaw& law, const ExperimentLimits& limits,
+                                              const std::stop_token& stop = {});
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,205 @@
+#include "tools/cli/discovery_output.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace selfcal::cli {
+namespace {
+
+using discovery::ClassMember;
+using discovery::Constant;
+using discovery::DiscoveredLaw;
+using discovery::Discovery;
+using nlohmann::ordered_json;
+
+constexpr std::size_t members_shown = 6;
+
+// Two digits of sigma, and the value to the same place.
+std::string with_sigma(double value, double sigma, std::string_view unit) {
+  const int decimals = sigma > 0.0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12) : 6;
+  return fmt::format("{:.{}f} +- {:.{}f} {}", value, decimals, sigma, decimals, unit);
+}
+
+std::string constants_text(const std::vector<Constant>& constants) {
+  std::string text;
+  for (const Constant& c : constants) {
+    text += fmt::format("    {} = {}\n", c.name, with_sigma(c.value, c.sigma, c.unit));
+  }
+  return text;
+}
+
+std::string class_text(const DiscoveredLaw& law) {
+  if (law.ambiguous.size() < 2) {
+    return "    no other equation that was tried explains this recording as well\n";
+  }
+  std::string text =
+      fmt::format("    {} others explain this recording too (odds against the one above):\n", law.ambiguous.size() - 1);
+  std::size_t shown = 0;
+  for (const ClassMember& m : law.ambiguous) {
+    if (m.expression == law.expression && m.axis == law.term.axis) {
+      continue;
+    }
+    if (shown++ == members_shown) {
+      return text + "      ...\n";
+    }
+    text += fmt::format("      {:<8} {}  ({:.2g})\n", name_of_axis(m.axis), m.expression, m.odds);
+  }
+  return text;
+}
+
+std::string left_text(const Discovery& found) {
+  const double noise = std::sqrt(2.0 * found.rows);
+  if (found.misfit_after < 3.0 * noise) {
+    return "  what is left is noise\n";
+  }
+  return fmt::format("  {:.0f} % of the misfit is left without an equation{}\n",
+                     100.0 * found.misfit_after / std::max(found.misfit_before, 1.0),
+                     found.refused.empty()
+                         ? ""
+                         : "; the best that was refused, for it does not predict what was left out: " + found.refused);
+}
+
+ordered_json constants_json(const std::vector<Constant>& constants) {
+  ordered_json all = ordered_json::object();
+  for (const Constant& c : constants) {
+    all[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
+  if (found.laws.empty() && found.processes.empty()) {
+    return fmt::format("discovery: no equation among {} explains what remains\n", found.functions_tried) +
+           left_text(found);
+  }
+  std::string text =
+      fmt::format("discovery: found among {} equations; each predicts the dwells and rotations left out of its fit\n",
+                  found.functions_tried);
+  for (const DiscoveredLaw& law : found.laws) {
+    text +=
+        fmt::format("  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit, held-out gain {:.0f}\n",
+                    name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
+                    law.expression, law.significance, 100.0 * law.share, law.held_out_gain);
+    text += constants_text(law.constants) + class_text(law);
+  }
+  for (const discovery::DiscoveredProcess& p : found.processes) {
+    const bool walk = p.kind == discovery::ProcessKind::random_walk;
+    text += fmt::format("  {}: a random process, {}: {}{}\n", name_of_axis(p.axis), discovery::name_of(p.kind),
+                        with_sigma(p.size, p.sigma, unit_of_axis(p.axis)), walk ? "/sqrt(h)" : " (1 sigma)");
+  }
+  text += left_text(found);
+  if (next) {
+    text += fmt::format(
+        "  next experiment: {:.0f} min, {} positions: the closest rival {} would be {:.1f} sigma away ({:.1f} now)\n",
+        next->schedule.duration_s() / 60.0, next->schedule.positions.size(), next->closest, next->separation,
+        next->separation_now);
+  }
+  return text;
+}
+
+void add_discovery(ordered_json& document, const Discovery& found,
+                   const std::optional<discovery::NextExperiment>& next) {
+  document["discovered"] = ordered_json::array();
+  for (const DiscoveredLaw& law : found.laws) {
+    ordered_json members = ordered_json::array();
+    for (const ClassMember& m : law.ambiguous) {
+      members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
+    }
+    document["discovered"].push_back({{"axis", name_of_axis(law.term.axis)},
+                                      {"expression", law.expression},
+                                      {"coefficient", law.coefficient},
+                                      {"sigma", law.sigma},
+                                      {"unit", unit_of_axis(law.term.axis)},
+                                      {"constants", constants_json(law.constants)},
+                                      {"significance", law.significance},
+                                      {"held_out_gain", law.held_out_gain},
+                                      {"share", law.share},
+                                      {"class", members}});
+  }
+  document["processes"] = ordered_json::array();
+  for (const discovery::DiscoveredProcess& p : found.processes) {
+    document["processes"].push_back({{"axis", name_of_axis(p.axis)},
+                                     {"process", discovery::name_of(p.kind)},
+                                     {"coefficient", p.size},
+                                     {"sigma", p.sigma},
+                                     {"unit", unit_of_axis(p.axis)},
+                                     {"log_likelihood_gain", p.log_likelihood_gain}});
+  }
+  document["discovery"] = {{"functions_tried", found.functions_tried},
+                           {"misfit_before", found.misfit_before},
+                           {"misfit_after", found.misfit_after},
+                           {"refused", found.refused}};
+  if (next) {
+    ordered_json positions = ordered_json::array();
+    for (const GimbalPosition& p : next->schedule.positions) {
+      positions.push_back({p.outer_deg, p.inner_deg});
+    }
+    document["next_experiment"] = {
+        {"schedule",
+         {{"positions", positions}, {"dwell_s", next->schedule.dwell_s}, {"rotation_s", next->schedule.rotation_s}}},
+        {"splits", {next->closest}},
+        {"separation_sigma", next->separation},
+        {"expected_odds", std::exp(std::min(next->log_odds, 700.0))}};
+  }
+}
+
+std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {
+  std::string text = "laws tried beside the 24:\n";
+  for (const discovery::TriedLaw& law : tried) {
+    const bool predicts = law.held_out_gain > 0.0;
+    text += fmt::format(
+        "  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit; {} (held-out gain {:.1f})\n",
+        name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
+        law.expression, law.significance, 100.0 * law.share,
+        predicts ? "it predicts what was left out of its fit" : "it does not predict what was left out of its fit",
+        law.held_out_gain);
+    text += constants_text(law.constants);
+    if (std::isfinite(law.stated)) {
+      text += fmt::format("    stated: {:.6g} {}, {:.1f} sigma from what this recording says\n", law.stated,
+                          unit_of_axis(law.term.axis), std::abs(law.stated - law.coefficient) / law.sigma);
+    }
+    if (law.collinear > 0.99) {
+      text += "    nearly collinear with the other laws or with its own constants: its sigma says how little is seen\n";
+    }
+  }
+  return text;
+}
+
+ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried) {
+  ordered_json all = ordered_json::array();
+  for (const discovery::TriedLaw& law : tried) {
+    ordered_json j = {{"axis", name_of_axis(law.term.axis)},
+                      {"expression", law.expression},
+                      {"coefficient", law.coefficient},
+                      {"sigma", law.sigma},
+                      {"unit", unit_of_axis(law.term.axis)},
+                      {"constants", constants_json(law.constants)},
+                      {"significance", law.significance},
+                      {"held_out_gain", law.held_out_gain},
+                      {"share", law.share},
+                      {"collinear", law.collinear}};
+    if (std::isfinite(law.stated)) {
+      j["stated"] = law.stated;
+    }
+    all.push_back(std::move(j));
+  }
+  return all;
+}
+
+std::vector<LawText> laws_of(const Discovery& found) {
+  std::vector<LawText> laws;
+  for (const DiscoveredLaw& law : found.laws) {
+    laws.push_back({law.term.axis, law.expression, "", law.coefficient, law.sigma, std::nullopt});
+  }
+  for (const discovery::DiscoveredProcess& p : found.processes) {
+    laws.push_back({p.axis, "", std::string(discovery::name_of(p.kind)), p.size, p.sigma, std::nullopt});
+  }
+  return laws;
+}
+
+}  // namespace selfcal::cli

@@ -1,0 +1,24 @@
+// What a discovery found, for people, for programs, and as a file of laws.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/law_trial.hpp"
+#include "estimator/discovery/next_experiment.hpp"
+#include "protocol/law_file/law_file.hpp"
+
+namespace selfcal::cli {
+
+std::string discovery_text(const discovery::Discovery& found, const std::optional<discovery::NextExperiment>& next);
+// "discovered", "processes", "next_experiment" of the document.
+void add_discovery(nlohmann::ordered_json& document, const discovery::Discovery& found,
+                   const std::optional<discovery::NextExperiment>& next);
+std::string trial_text(const std::vector<discovery::TriedLaw>& tried);
+nlohmann::ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried);
+std::vector<LawText> laws_of(const discovery::Discovery& found);
+
+}  // namespace selfcal::cli
