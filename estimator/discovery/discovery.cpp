@@ -131,7 +131,7 @@ class Search {
     model_ = std::make_unique<PieceModel>(sums_, dictionary_);
     take_processes();
     take_laws();
-    if (log_posterior() < laws_first_posterior) {
+    if (state_.processes.empty() || log_posterior() < laws_first_posterior) {
       state_ = laws_first;
     }
   }
@@ -343,6 +343,9 @@ class Search {
   }
 
   void tell() {
+    if (state_.processes.empty()) {
+      drop_weak();
+    }
     result_.processes = state_.processes;
     result_.log_p_remaining = state_.log_p_remaining;
     result_.refused = state_.refused;
