@@ -3,7 +3,6 @@
 
 const axisColours = ['x', 'y', 'z'];
 const angleSteps = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720];
-const numberOrNull = (value) => (Number.isFinite(value) ? value : null);
 const axisDashes = [undefined, [8, 4], [2, 3]];   // told apart without colour too
 
 // The virtual time of the passes laid end to end, in minutes, with a gap (null) between passes.

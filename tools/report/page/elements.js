@@ -52,6 +52,7 @@ function fixed(value, decimals) {
 
 // A document may lack what it should have: lists then are empty, texts are.
 const listOf = (value) => (Array.isArray(value) ? value : []);
+const numberOrNull = (value) => (Number.isFinite(value) ? value : null);
 const textOf = (value) => (typeof value === 'string' ? value : typeof value === 'number' ? String(value) : '');
 const objectOf = (value) => (value && typeof value === 'object' && !Array.isArray(value) ? value : {});
 

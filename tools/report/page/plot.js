@@ -191,8 +191,19 @@ function addKeys(host, state) {
   });
 }
 
+// Whether there is anything to draw: times or the like that are numbers, and a value beside one of them.
+function drawable(spec) {
+  const drawn = (series) => listOf(series.shown ?? series.values);
+  return spec.x.values.length > 0 && spec.x.values.every(Number.isFinite) &&
+      spec.series.some((series) => drawn(series).some(Number.isFinite));
+}
+
 // The frame stands at once, with room for the picture; the first plot of a page is drawn at once, the others later.
 function addPlot(parent, spec) {
+  if (!drawable(spec)) {
+    parent.append(element('p', {class: 'note'}, `${spec.title}: the document holds no numbers to draw.`));
+    return;
+  }
   const host = element('div', {class: 'plot', tabindex: '0', role: 'img', id: spec.id,
                                style: `min-height: ${plotHeight(spec)}px`,
                                'aria-label': `${spec.title}: ${axisTitle(spec.y)} against ${axisTitle(spec.x)}`});
@@ -218,7 +229,7 @@ function addPlot(parent, spec) {
       state.plot.destroy();
     }
     host.style.minHeight = `${plotHeight(spec)}px`;
-    const data = [spec.x.values, ...spec.series.map((series) => series.shown || series.values)];
+    const data = [spec.x.values, ...spec.series.map((series) => listOf(series.shown ?? series.values).map(numberOrNull))];
     state.plot = new uPlot(plotOptions(spec, widthOf(host), state.ticks, readout), data, host);
   };
   // The frame is as wide as its neighbours and the window leave it, whenever they change.
