@@ -6,7 +6,7 @@
 
 namespace selfcal {
 
-// The kind decides the exit status of the programs (interfaces.md): the numbers are theirs.
+// The kind decides the exit status of the programs (tools/handbook/exit-status.md): the numbers are theirs.
 enum class ErrorKind {
   usage = 2,      // the request itself is wrong
   bad_input = 3,  // a file or message does not hold what it must

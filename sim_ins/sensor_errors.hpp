@@ -1,4 +1,4 @@
-// The 24-parameter error model (mission.md, frames and signs): what a sensor adds to the truth.
+// The 24-parameter error model (tools/handbook/frames-and-signs.md): what a sensor adds to the truth.
 #pragma once
 
 #include "estimator/geometry/rotation.hpp"

@@ -1,4 +1,4 @@
-// The one table of the state vector (mission.md). Positions are carried as lengths, so that all of the dynamic part
+// The one table of the state vector (33 states). Positions are carried as lengths, so that all of the dynamic part
 // is in metres, metres per second and radians:
 //   dp = ((R_M+h) dL, dh, (R_N+h) cos L dlambda) | dv n u e | phi n u e | observation states | 24 parameters | extra
 // phi: C_computed = (I - [phi x]) C_true. Parameters: truth minus the values the navigation compensates with.

@@ -1,5 +1,5 @@
 // Rotations. Matrices are named C_<to><from>: v_to = C_tofrom * v_from, so adjacent letters cancel.
-// Frames (mission.md): n = north, up, east; v = vehicle (forward, up, right); b = IMU.
+// Frames (tools/handbook/frames-and-signs.md): n = north, up, east; v = vehicle (forward, up, right); b = IMU.
 #pragma once
 
 #include <Eigen/Core>

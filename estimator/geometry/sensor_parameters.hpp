@@ -1,7 +1,7 @@
 // The 24 sensor errors: one table with their order, names, units. Everything that lists them (state vector, JSON,
 // coefficient set on the bus, LCM, report) goes by it.
 //
-// Sensor output = truth + error (mission.md), f and omega in b:
+// Sensor output = truth + error (tools/handbook/frames-and-signs.md), f and omega in b:
 //   df = bias + K+ max(f,0) + K- max(-f,0) per axis, then df_y += A_yx f_x, df_z += A_zx f_x + A_zy f_y
 //   dw = drift + K_G w per axis, then dw_x += G_xy w_y + G_xz w_z, and so on.
 #pragma once

@@ -1,4 +1,4 @@
-// The 24-parameter sensor model (mission.md) on increments: its exact inverse, and its derivatives.
+// The 24-parameter sensor model (tools/handbook/frames-and-signs.md) on increments: its exact inverse, and its derivatives.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
 // The calibration: 24 sensor errors from one recording, by forward and reverse navigation and filtering.
 //
-// Source: Zhang & Jiang 2019 (mission.md) for the 33 states and the passes; estimator/README.md derives what is
+// Source: Zhang & Jiang (2019) for the 33 states and the passes; estimator/README.md derives what is
 // done differently (each pass relinearises and counts every datum once).
 #pragma once
 
