@@ -32,21 +32,25 @@ std::int32_t clamped(std::int64_t count) {
 }
 
 void add_base_effect(BaseMotion& base, const PhysicsEffect& effect) {
-  const std::vector<double>& v = effect.values;
+  const auto value = [&effect](std::string_view name) { return value_of(effect, name); };
   if (effect.id == "base_sway") {
-    const std::array<std::vector<Sine>*, 6> axes{&base.roll,  &base.pitch, &base.yaw,
-                                                 &base.surge, &base.heave, &base.sway};
-    for (std::size_t k = 0; k < axes.size(); ++k) {
-      if (v[k] != 0.0) {
-        axes[k]->push_back({v[k], v[6], v[7]});
+    const std::array<std::pair<std::string_view, std::vector<Sine>*>, 6> axes{{{"roll", &base.roll},
+                                                                               {"pitch", &base.pitch},
+                                                                               {"yaw", &base.yaw},
+                                                                               {"surge", &base.surge},
+                                                                               {"heave", &base.heave},
+                                                                               {"sway", &base.sway}}};
+    for (const auto& [name, sines] : axes) {
+      if (value(name) != 0.0) {
+        sines->push_back({value(name), value("period_s"), value("phase")});
       }
     }
   } else if (effect.id == "base_settling") {
-    base.settling_roll.push_back({v[0], v[3]});
-    base.settling_pitch.push_back({v[1], v[3]});
-    base.settling_heave.push_back({v[2], v[3]});
-    base.settling_surge.push_back({v[4], v[3]});
-    base.settling_sway.push_back({v[5], v[3]});
+    base.settling_roll.push_back({value("roll"), value("tau_s")});
+    base.settling_pitch.push_back({value("pitch"), value("tau_s")});
+    base.settling_heave.push_back({value("heave"), value("tau_s")});
+    base.settling_surge.push_back({value("surge"), value("tau_s")});
+    base.settling_sway.push_back({value("sway"), value("tau_s")});
   }
 }
 

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <map>
 
 #include "protocol/ins_interface/identifiers.hpp"
 #include "sim_ins/device/bus_node.hpp"
@@ -38,34 +39,41 @@ Expected<double> number(const std::string& fault, const std::string& text) {
   return hex ? whole : value;
 }
 
-// KEY=VALUE, as the help text lists them.
-Expected<void> take_fault(const std::string& text, NodeOptions& node, InstrumentFaults& instrument) {
+// KEY=VALUE, as the help text lists them: each a fault, or several, of a scenario.
+Expected<void> take_fault(const std::string& text, const SimConfig& config, Scenario& scenario) {
   const auto equals = text.find('=');
   const std::string key = text.substr(0, equals);
   const auto value = number(text, equals == std::string::npos ? "" : text.substr(equals + 1));
   if (!value) {
     return tl::unexpected(value.error());
   }
-  if (key == "nrc") {
-    node.refuse_all_with = static_cast<uds::Nrc>(static_cast<std::uint8_t>(*value));
-  } else if (key == "crc") {
-    instrument.spoilt_page = static_cast<std::uint32_t>(*value);
-  } else if (key == "stuck") {
-    instrument.stuck_after_s = *value;
-  } else if (key == "frozen") {
-    instrument.frozen_after_s = *value;
-  } else if (key == "saturated") {
-    instrument.saturated_after_s = *value;
-  } else if (key == "reset") {
-    node.reset_at_s = *value;
-  } else if (key == "drop") {
-    node.frame_faults.drop = *value;
-  } else if (key == "duplicate") {
-    node.frame_faults.duplicate = *value;
-  } else if (key == "corrupt") {
-    node.frame_faults.corrupt = *value;
-  } else {
+  using K = FaultKind;
+  const std::map<std::string, std::vector<K>> kinds{
+      {"nrc", {K::nrc}},     {"crc", {K::spoilt_page}},           {"stuck", {K::stuck_gimbal}},
+      {"reset", {K::reset}}, {"saturated", {K::saturated_accel}}, {"frozen", {K::frozen_gyro, K::frozen_accel}},
+      {"drop", {K::drop}},   {"duplicate", {K::duplicate}},       {"corrupt", {K::corrupt}},
+  };
+  const auto known = kinds.find(key);
+  if (known == kinds.end()) {
     return fail(ErrorKind::usage, fmt::format("--fault {}: unknown fault '{}'", text, key));
+  }
+  constexpr double limit_mps2 = 0.5 * 9.80665;
+  for (const K kind : known->second) {
+    const bool of_sensor = kind == K::saturated_accel || kind == K::frozen_gyro || kind == K::frozen_accel;
+    for (int axis = 0; axis < (of_sensor ? 3 : 1); ++axis) {
+      Fault fault;
+      fault.kind = kind;
+      if (of_sensor || kind == K::stuck_gimbal || kind == K::reset) {
+        fault.at_s = *value;
+        fault.value = axis;
+        fault.amount = limit_mps2 / config.sample_rate_hz / config.accel_lsb_m_per_s;
+      } else if (kind == K::nrc || kind == K::spoilt_page) {
+        fault.value = *value;
+      } else {
+        fault.probability = *value;
+      }
+      scenario.faults.push_back(fault);
+    }
   }
   return {};
 }
@@ -116,10 +124,11 @@ void configure(CLI::App& app, Arguments& a) {
   app.add_option("--functional-id", node.functional_id, "CAN identifier of functional requests");
   app.add_option("--status-id", node.status_id, "CAN identifier of the state frame; the gimbal frame has the next");
   app.add_flag("--extended-ids", node.extended_ids, "29-bit identifiers");
-  app.add_option("--fault", a.faults,
-                 "KEY=VALUE, repeated. nrc=0x22: refuse every request so; crc=P: page P arrives spoilt once; "
-                 "stuck=T, frozen=T, saturated=T: gimbal, IMU, accelerometers from T s of the rotation on; reset=T: at "
-                 "T s; drop=P, duplicate=P, corrupt=P: probability per frame sent");
+  app.add_option(
+      "--fault", a.faults,
+      "KEY=VALUE, repeated. nrc=0x22: refuse every request so; crc=P: page P arrives spoilt once; "
+      "stuck=T, frozen=T, saturated=T: gimbal, IMU, accelerometers (at 0.5 g) from T s of the rotation on; reset=T: at "
+      "T s; drop=P, duplicate=P, corrupt=P: probability per frame sent");
 }
 
 Expected<int> run(Arguments& a) {
@@ -141,29 +150,29 @@ Expected<int> run(Arguments& a) {
   if (!key) {
     return tl::unexpected(key.error());
   }
-  InstrumentFaults faults;
+  Scenario scenario;
+  scenario.seed = a.seed;
+  if (!a.scenario.empty()) {
+    auto read = read_scenario(a.scenario);
+    if (!read) {
+      return tl::unexpected(read.error());
+    }
+    scenario = std::move(*read);
+  }
   for (const std::string& fault : a.faults) {
-    if (const auto taken = take_fault(fault, a.node, faults); !taken) {
+    if (const auto taken = take_fault(fault, *config, scenario); !taken) {
       return tl::unexpected(taken.error());
     }
   }
-  if (!a.scenario.empty()) {
-    auto scenario = read_scenario(a.scenario);
-    if (!scenario) {
-      return tl::unexpected(scenario.error());
-    }
-    a.node.scenario = *scenario;
-    faults.scenario = std::move(*scenario);
-  }
+  a.node.scenario = scenario;
   auto flash = FlashMemory::open(a.flash, flash_bytes);
   if (!flash) {
     return tl::unexpected(flash.error());
   }
-  auto instrument = Instrument::create(*config, a.seed, *physics, std::move(*flash), faults);
+  auto instrument = Instrument::create(*config, a.seed, *physics, std::move(*flash), scenario);
   if (!instrument) {
     return tl::unexpected(instrument.error());
   }
-  a.node.seed = a.seed;
   a.node.rates = {a.arbitration_rate, a.data_rate};
   a.node.diagnostics.key = *key;
   a.node.diagnostics.longest_response = a.node.fd ? 65535 : 4095;

@@ -1,6 +1,8 @@
 #include "sim_ins/physics.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cassert>
 
 #include "estimator/geometry/units.hpp"
 
@@ -152,5 +154,13 @@ constexpr std::array<EffectDescription, 34> effects{{
 }  // namespace
 
 std::span<const EffectDescription> physics_effects() { return effects; }
+
+double value_of(const PhysicsEffect& effect, std::string_view parameter) {
+  const auto known = std::ranges::find(physics_effects(), effect.id, &EffectDescription::id);
+  assert(known != physics_effects().end());
+  const auto named = std::ranges::find(known->parameters, parameter, &EffectParameter::name);
+  assert(named != known->parameters.end());
+  return effect.values[static_cast<std::size_t>(named - known->parameters.begin())];
+}
 
 }  // namespace selfcal::sim

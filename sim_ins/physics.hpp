@@ -35,6 +35,9 @@ struct PhysicsEffect {
   std::vector<double> values;  // SI, in the order of the description's parameters
 };
 
+// The effect's parameter of this name, SI. The effect must be one of physics_effects(), and have it.
+double value_of(const PhysicsEffect& effect, std::string_view parameter);
+
 // Effects add up. The same effect may stand twice (two spectral lines, two settlings).
 struct ConcealedPhysics {
   std::vector<PhysicsEffect> effects;

@@ -29,7 +29,6 @@ constexpr int short_sleep_ms = 1, long_sleep_ms = 10;
 // During an upload, while it is the tester's turn, the clock stands: a tester in compressed time is not charged its
 // own run time a hundredfold. But not for longer than this, should it have gone.
 constexpr Time patience = 200ms;
-constexpr std::uint64_t fault_stream = 77;
 
 Time real_now() { return std::chrono::duration_cast<Time>(std::chrono::steady_clock::now().time_since_epoch()); }
 
@@ -84,7 +83,6 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       socket_(std::move(socket)),
       bus_(options.rates),
       turnaround_(options.turnaround_ms),
-      random_(options.seed, fault_stream),
       faulty_(options.scenario) {}
 
 Time BusNode::ins_time() const { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_)); }
@@ -155,7 +153,7 @@ void BusNode::advance_clock(Time now) {
   if (const Fault* refusal = options_.scenario.active(FaultKind::nrc, now_s_)) {
     diagnostics_.answer_all_with(static_cast<uds::Nrc>(static_cast<std::uint8_t>(refusal->value)));
   } else {
-    diagnostics_.answer_all_with(options_.refuse_all_with);
+    diagnostics_.answer_all_with(std::nullopt);
   }
   diagnostics_.set_instrument_time(now_s_);
   instrument_.advance(now_s_);
@@ -177,16 +175,11 @@ void BusNode::reset_on_demand(Time now) {
   const auto due = std::find_if(faults.begin(), faults.end(), [this](const Fault& fault) {
     return fault.kind == FaultKind::reset && !fault.state && now_s_ >= fault.at_s;
   });
-  const bool wanted = options_.reset_at_s && now_s_ >= *options_.reset_at_s;
-  if (due == faults.end() && !wanted) {
+  if (due == faults.end()) {
     return;
   }
-  if (due != faults.end()) {
-    faults.erase(due);
-    faulty_.count(FaultKind::reset);
-  } else {
-    options_.reset_at_s.reset();
-  }
+  faults.erase(due);
+  faulty_.count(FaultKind::reset);
   fmt::print(stderr, "sim_ins: reset on demand at {:.3f} s, {}\n", now_s_, ins::name(instrument_.state()));
   reset(now);
 }
@@ -217,32 +210,14 @@ void BusNode::queue_status() {
 
 // Frames as the faulty bus passes them on. False where the kernel's queue is full or the link is gone.
 bool BusNode::put_on_bus(std::span<const can::CanFrame> frames) {
-  if (!options_.scenario.faults.empty()) {
-    spoilt_.clear();
-    for (const can::CanFrame& frame : frames) {
-      faulty_.pass(frame, now_s_, spoilt_);
-    }
-    return send_all(spoilt_);
+  if (options_.scenario.faults.empty()) {
+    return send_all(frames);
   }
-  std::array<can::CanFrame, 2 * frames_per_call> passed;
-  std::size_t count = 0;
-  const FrameFaults& faults = options_.frame_faults;
+  spoilt_.clear();
   for (const can::CanFrame& frame : frames) {
-    if (faults.drop > 0.0 && random_.uniform() < faults.drop) {
-      continue;
-    }
-    passed[count] = frame;
-    if (faults.corrupt > 0.0 && frame.size > 0 && random_.uniform() < faults.corrupt) {
-      const auto bit = static_cast<std::size_t>(random_.uniform() * 8.0 * frame.size);
-      passed[count].data[bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
-    }
-    ++count;
-    if (faults.duplicate > 0.0 && random_.uniform() < faults.duplicate) {
-      passed[count] = passed[count - 1];
-      ++count;
-    }
+    faulty_.pass(frame, now_s_, spoilt_);
   }
-  return send_all(std::span(passed).first(count));
+  return send_all(spoilt_);
 }
 
 bool BusNode::send_all(std::span<const can::CanFrame> frames) {

@@ -14,16 +14,8 @@
 #include "sim_ins/device/instrument.hpp"
 #include "sim_ins/device/scenario.hpp"
 #include "sim_ins/device/turnaround.hpp"
-#include "sim_ins/random.hpp"
 
 namespace selfcal::sim {
-
-// What the bus does to frames that the INS sends: probability of each per frame.
-struct FrameFaults {
-  double drop = 0.0;
-  double duplicate = 0.0;
-  double corrupt = 0.0;  // one bit of the data flips, as if its CRC had let it pass
-};
 
 struct NodeOptions {
   std::string interface = "vcan0";
@@ -37,11 +29,7 @@ struct NodeOptions {
   double speed = 1.0;          // INS seconds per second
   double turnaround_ms = 0.0;  // INS time from an answer to the tester's next request, in an upload
   double patience = 1.0;       // stretches N_As, N_Bs, N_Cr and S3, which run in real time
-  FrameFaults frame_faults;
-  std::optional<uds::Nrc> refuse_all_with;  // fault on demand: every request is refused so
-  Scenario scenario;                        // faults of the bus, of status and answers, by time
-  std::optional<double> reset_at_s;         // INS time of one spontaneous reset
-  std::uint64_t seed = 1;
+  Scenario scenario;           // faults of the bus, of status and answers, by time
   DiagnosticOptions diagnostics;
 };
 
@@ -82,7 +70,6 @@ class BusNode {
   std::optional<can::Socket> socket_;
   can::BusClock bus_;
   Turnaround turnaround_;
-  Random random_;
   FaultyBus faulty_;
   std::vector<can::CanFrame> spoilt_;  // kept for its storage
   double next_intrusion_s_ = 0.0;

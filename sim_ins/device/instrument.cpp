@@ -16,7 +16,6 @@ namespace {
 
 constexpr double start_up_s = 1.0;
 constexpr std::uint64_t gimbal_stream = 2;  // as simulate(): the same seed gives the same recording
-constexpr double stuck_noticed_after_s = 2.0;
 
 std::uint16_t gimbal_counts(double angle) {
   const double turns = angle / (360.0 * units::degree);
@@ -41,11 +40,11 @@ double degrees_in_turn(double radians) {
 }  // namespace
 
 Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
-                       const InstrumentFaults& faults)
+                       const Scenario& scenario)
     : config_(config),
       seed_(seed),
       physics_(physics),
-      faults_wanted_(faults),
+      scenario_(scenario),
       flash_(std::move(flash)),
       coefficients_(flash_),
       counters_(flash_),
@@ -54,8 +53,8 @@ Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const Concea
 
 Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config, std::uint64_t seed,
                                                          const ConcealedPhysics& physics, FlashMemory flash,
-                                                         const InstrumentFaults& faults) {
-  std::unique_ptr<Instrument> instrument(new Instrument(config, seed, physics, std::move(flash), faults));
+                                                         const Scenario& scenario) {
+  std::unique_ptr<Instrument> instrument(new Instrument(config, seed, physics, std::move(flash), scenario));
   // Proves configuration and physics before anybody relies on them.
   if (auto imu = instrument->make_imu({{GimbalPosition{}}, {1.0}, 5.0}, {}); !imu) {
     return tl::unexpected(imu.error());
@@ -107,7 +106,7 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
     return fail(ErrorKind::device, "no schedule");
   }
   const Schedule schedule = as_schedule(*schedule_);
-  auto imu = make_imu(schedule, faults_wanted_.scenario);
+  auto imu = make_imu(schedule, scenario_);
   if (!imu) {
     return tl::unexpected(imu.error());
   }
@@ -118,17 +117,14 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   run_id_ = run_id;
   const std::uint64_t pages = (samples_wanted_ + flash::samples_per_page - 1) / flash::samples_per_page;
   raw_.begin(run_id, static_cast<std::uint32_t>(pages));
-  if (faults_wanted_.spoilt_page) {
-    raw_.spoil(*faults_wanted_.spoilt_page, 1);
-  }
-  for (const Fault& fault : faults_wanted_.scenario.faults) {
+  for (const Fault& fault : scenario_.faults) {
     if (fault.kind == FaultKind::spoilt_page) {
       raw_.spoil(static_cast<std::uint32_t>(fault.value), std::max(1, static_cast<int>(fault.amount)));
     }
   }
   page_ = {};
   stopped_at_s_.reset();
-  gimbal_noticed_s_ = gimbal_failure_time(faults_wanted_.scenario, schedule);
+  gimbal_noticed_s_ = gimbal_failure_time(scenario_, schedule);
   faults_ = 0;
   state_ = ins::State::rotating;
   return {};
@@ -170,15 +166,7 @@ void Instrument::flush_page(bool last) {
 }
 
 void Instrument::apply_faults(ImuSample& sample, double t) {
-  if (spoil_sample(faults_wanted_.scenario, t, last_sample_, sample)) {
-    page_.flags |= flash::page_flag::sensor_saturated;
-  }
-  if (faults_wanted_.frozen_after_s && t > *faults_wanted_.frozen_after_s) {
-    sample.delta_theta = last_sample_.delta_theta;
-    sample.delta_v = last_sample_.delta_v;
-  }
-  if (faults_wanted_.saturated_after_s && t > *faults_wanted_.saturated_after_s) {
-    sample.delta_v.fill(std::numeric_limits<std::int16_t>::max());
+  if (spoil_sample(scenario_, t, last_sample_, sample)) {
     page_.flags |= flash::page_flag::sensor_saturated;
   }
 }
@@ -196,8 +184,7 @@ void Instrument::take_sample() {
   if (page_.samples.size() == flash::samples_per_page) {
     flush_page(samples_ == samples_wanted_);
   }
-  const auto& stuck = faults_wanted_.stuck_after_s;
-  if ((stuck && t > *stuck + stuck_noticed_after_s) || (gimbal_noticed_s_ && t > *gimbal_noticed_s_)) {
+  if (gimbal_noticed_s_ && t > *gimbal_noticed_s_) {
     faults_ |= ins::fault::gimbal;
     finish_rotation(ins::State::failed);
   } else if (samples_ == samples_wanted_) {

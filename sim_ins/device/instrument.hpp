@@ -19,20 +19,11 @@
 
 namespace selfcal::sim {
 
-// What is to go wrong, on the INS's clock counted from the start of a rotation. Unset: nothing does.
-struct InstrumentFaults {
-  std::optional<double> stuck_after_s;       // the gimbal stands still from then on; the INS notices and fails
-  std::optional<double> frozen_after_s;      // the IMU repeats its last increments
-  std::optional<double> saturated_after_s;   // the accelerometers read full scale
-  Scenario scenario;                         // gimbal and sensor faults of it
-  std::optional<std::uint32_t> spoilt_page;  // its first upload comes with a flipped bit
-};
-
 class Instrument {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<Instrument>> create(const SimConfig& config, std::uint64_t seed,
                                                                     const ConcealedPhysics& physics, FlashMemory flash,
-                                                                    const InstrumentFaults& faults);
+                                                                    const Scenario& scenario);
 
   void power_on(double now_s);  // also after a reset: all is lost but what the FLASH had done
   void advance(double now_s);   // everything due up to then happens
@@ -68,7 +59,7 @@ class Instrument {
 
  private:
   Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
-             const InstrumentFaults& faults);
+             const Scenario& scenario);
 
   void take_sample();
   void apply_faults(ImuSample& sample, double t);
@@ -81,7 +72,7 @@ class Instrument {
   SimConfig config_;
   std::uint64_t seed_;
   ConcealedPhysics physics_;
-  InstrumentFaults faults_wanted_;
+  Scenario scenario_;  // of it the faults of gimbal, sensors and pages
   FlashMemory flash_;
   CoefficientStore coefficients_;
   CounterStore counters_;

@@ -53,6 +53,19 @@ bool by_rotation(FaultKind kind) {
   return (kind >= FaultKind::stuck_gimbal && kind <= FaultKind::frozen_accel) || kind == FaultKind::spoilt_page;
 }
 
+// A gimbal that sticks from a time on, not from a move on.
+bool by_time(const Fault& fault) { return fault.kind == FaultKind::stuck_gimbal && fault.value <= 0.0; }
+
+std::size_t first_move_after(const Schedule& schedule, double at_s) {
+  double begin = schedule.dwell_s[0];
+  std::size_t k = 0;
+  while (k + 1 < schedule.positions.size() && begin < at_s) {
+    ++k;
+    begin += schedule.rotation_s + schedule.dwell_s[k];
+  }
+  return k;
+}
+
 }  // namespace
 
 void Scenario::note_state(ins::State state, double t) {
@@ -115,7 +128,11 @@ Expected<Scenario> read_scenario(const std::string& path) {
 GimbalMotion spoil_gimbal(const Scenario& scenario, const GimbalMotion& planned) {
   std::vector<GimbalMove> moves = planned.moves();
   for (const Fault& fault : scenario.faults) {
-    const auto k = static_cast<std::size_t>(fault.value) - 1;
+    auto k = static_cast<std::size_t>(fault.value) - 1;
+    if (by_time(fault)) {
+      const auto first = std::ranges::find_if(moves, [&](const GimbalMove& m) { return m.start_s >= fault.at_s; });
+      k = static_cast<std::size_t>(first - moves.begin());
+    }
     if (k >= moves.size()) {
       continue;
     }
@@ -146,7 +163,7 @@ std::optional<double> gimbal_failure_time(const Scenario& scenario, const Schedu
   for (const Fault& fault : scenario.faults) {
     const bool of_gimbal = fault.kind == FaultKind::stuck_gimbal || fault.kind == FaultKind::overshoot ||
                            fault.kind == FaultKind::wrong_direction;
-    const auto k = static_cast<std::size_t>(fault.value) - 1;
+    const auto k = by_time(fault) ? first_move_after(schedule, fault.at_s) : static_cast<std::size_t>(fault.value) - 1;
     if (of_gimbal && fault.detected && k + 1 < schedule.positions.size()) {
       double t = notice_s;
       for (std::size_t i = 0; i <= k; ++i) {

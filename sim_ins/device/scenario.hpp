@@ -35,7 +35,8 @@ enum class FaultKind : std::uint8_t {
   reset,    // the INS restarts at `at_s`
   stuck_gimbal,
   overshoot,
-  wrong_direction,  // move number `value` (1 first); overshoot by `amount` degrees
+  wrong_direction,  // move number `value` (1 first); overshoot by `amount` degrees. stuck with value 0: from `at_s` on no
+                    // move begins
   saturated_gyro,
   saturated_accel,
   frozen_gyro,

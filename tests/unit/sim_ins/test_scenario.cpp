@@ -87,6 +87,10 @@ TEST(Scenario, GimbalGoesWrongAndIsNoticed) {
   EXPECT_DOUBLE_EQ(*gimbal_failure_time(*scenario_of("[[fault]]\nkind='stuck_gimbal'\nvalue=2\n"), schedule), 32.0);
   EXPECT_FALSE(
       gimbal_failure_time(*scenario_of("[[fault]]\nkind='stuck_gimbal'\nvalue=2\ndetected=false\n"), schedule));
+  // By time: at 12 s the first move is under way and ends, the second, due at 25 s, is never begun.
+  const char* by_time = "[[fault]]\nkind='stuck_gimbal'\nat_s=12\n";
+  EXPECT_NEAR(angle_after(by_time, 30.0), 90.0, 1e-9);
+  EXPECT_DOUBLE_EQ(*gimbal_failure_time(*scenario_of(by_time), schedule), 32.0);
 }
 
 TEST(Scenario, SensorsSaturateAndFreeze) {
