@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <limits>
 
 #include "daemon/estimate/amendment_job.hpp"
 #include "daemon/estimate/coefficient_set.hpp"
@@ -289,6 +290,9 @@ Task<CalibrationRun::Step> CalibrationRun::erase_inactive_slot() {
     co_return senseless(*complaint);
   }
   // The INS takes the newest: a set that is put back needs a version above the one in force.
+  if (stock_.coefficients_version == std::numeric_limits<std::uint32_t>::max()) {
+    co_return senseless(fmt::format("coefficients version {} is in force: none is newer", stock_.coefficients_version));
+  }
   if (wanted->version <= stock_.coefficients_version) {
     wanted->version = stock_.coefficients_version + 1;
   }
@@ -343,6 +347,9 @@ Task<CalibrationRun::Step> CalibrationRun::read_back() {
   const auto slot = co_await client_.read_record(ins::did::coefficients_inactive);
   if (!slot) {
     co_return tl::unexpected(slot.error());
+  }
+  if (slot->empty()) {
+    co_return senseless("the coefficients read back are an empty record");
   }
   if (auto stored = context_.store.store_set(record_.id, SetRole::read_back, *slot); !stored) {
     co_return local_trouble(stored.error());
