@@ -9,7 +9,11 @@
 
 namespace selfcal::diagnosis {
 
-// wrong_axes, wrong_sign, wrong_scale, wrong_site; the last only where the axes are right. Appends.
+// wrong_axes, wrong_sign, wrong_scale, wrong_read_out, wrong_site; the last only where the axes are right. Appends. Which of
+// gyros, accelerometers and read-outs is wrong is decided by which of them is the odd one out (data_attribution.hpp).
 void find_wrong_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults);
+
+// Whether a read-out spans more than two turns, as no gimbal does: degrees. Dwells are then found in the gyros.
+bool read_outs_in_degrees(const ImuData& data);
 
 }  // namespace selfcal::diagnosis

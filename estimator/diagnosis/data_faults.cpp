@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "estimator/diagnosis/data_axes.hpp"
-#include "estimator/geometry/units.hpp"
+#include "estimator/diagnosis/data_spikes.hpp"
 #include "estimator/models/segments.hpp"
 
 namespace selfcal::diagnosis {
@@ -29,8 +29,32 @@ bool same(const ImuData& d, std::size_t i, std::size_t j) {
   return d.delta_theta[i] == d.delta_theta[j] && d.delta_v[i] == d.delta_v[j];
 }
 
+double channel(const ImuData& d, std::size_t i, std::size_t axis) {
+  return axis < 3 ? d.delta_theta[i][axis] : d.delta_v[i][axis - 3];
+}
+
+// How many samples equal the one before where the quantum is coarse: of each sensor the share within a second that do,
+// their product over the six, for what repeats by chance repeats in one sensor at a time.
+double repeats_by_chance(const ImuData& data) {
+  const auto n = static_cast<std::size_t>(std::max(10.0, std::round(data.sample_rate_hz)));
+  double expected = 0.0;
+  for (std::size_t first = 1; first + n <= data.size(); first += n) {
+    double all = 1.0;
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      std::size_t equal = 0;
+      for (std::size_t i = first; i < first + n; ++i) {
+        equal += channel(data, i, axis) == channel(data, i - 1, axis) ? 1 : 0;
+      }
+      all *= static_cast<double>(equal) / static_cast<double>(n);
+    }
+    expected += all * static_cast<double>(n);
+  }
+  return expected;
+}
+
 // Zero increments never come by chance: gravity is always there. Repeated ones do, where the quantum is coarse: their
-// number is held against that of samples equal to the last but one, and so is the length of a run.
+// number is held against what the quantum and the correlation from sample to sample make likely, and so is the length of a
+// run.
 void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
   constexpr Triple zero{};
   DataFault zeros{"lost_samples", {}, 0, 0}, repeats{"lost_samples", {}, 0, 0}, gaps{"lost_samples", {}, 0, 0};
@@ -55,15 +79,15 @@ void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
       missing += steps - 1.0;
     }
   }
-  const auto chance = static_cast<double>(by_chance);
+  const double chance = std::max(static_cast<double>(by_chance), repeats_by_chance(data));
   const double excess = static_cast<double>(repeats.count) - chance;
   if (zeros.count > 0) {
     zeros.words = number("%.0f samples have zero velocity increments", static_cast<double>(zeros.count));
     faults.push_back(zeros);
   }
-  // Difference of two counts, 5 sigma; on a moving base neighbours are alike a little more often than that.
-  constexpr double moving_excess = 40.0;
-  if (excess > std::max(moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0))) {
+  // Difference of two counts, 5 sigma; sensors move together, and neighbours are alike by half more often than their product.
+  constexpr double moving_excess = 40.0, together = 0.5;
+  if (excess > std::max({moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0), together * chance})) {
     repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
                            static_cast<double>(repeats.count), chance);
     faults.push_back(repeats);
@@ -160,91 +184,20 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
   }
 }
 
-// Samples at the extreme value in runs that are entered from a slope. A drive comes up to its rate smoothly, and where
-// the noise is below the quantum the rate is one count all along: no clipping. Over the last 0.05 s before a rate is
-// reached with continuous acceleration, ramps of a second and more change it by less than 0.7 %; a clipped ramp by 3 %.
-template <typename Value>
-std::size_t steeply_met(const ImuData& data, const Value& value, double largest) {
-  constexpr double steep = 0.01;
-  const auto back = static_cast<std::size_t>(std::max(1.0, std::round(0.05 * data.sample_rate_hz)));
-  std::size_t met = 0;
-  bool run = false, counts = false;
-  for (std::size_t i = 0; i < data.size(); ++i) {
-    const bool extreme = std::abs(value(i)) == largest;
-    if (extreme && !run) {
-      counts = i > back && std::abs(value(i - 1) - value(i - 1 - back)) > steep * largest;
-    }
-    run = extreme;
-    met += extreme && counts ? 1 : 0;
-  }
-  return met;
-}
-
-// Single samples far from their neighbours in dwells (fourth differences: a turn's smooth beginning has none to speak of);
-// and extreme values that are met again and again.
-void spikes_and_saturation(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  // A dwell's edge may hold part of a turn, and by the gyros alone all of its beginning.
-  const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
-  const auto margin = static_cast<std::size_t>((gimbal ? 0.5 : 3.0) * data.sample_rate_hz);
-  for (std::size_t axis = 0; axis < 6; ++axis) {
-    const auto value = [&](std::size_t i) { return axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
-    const std::string name = std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3];
-    std::vector<std::pair<double, std::size_t>> off;  // in time's order
-    double largest = 0.0;
-    std::size_t met = 0, first_met = 0;
-    for (std::size_t i = 0; i < data.size(); ++i) {
-      if (std::abs(value(i)) > largest) {
-        largest = std::abs(value(i));
-        met = 0;
-        first_met = i;
-      }
-      met += std::abs(value(i)) == largest ? 1 : 0;
-    }
-    for (const Segment& s : segments) {
-      for (std::size_t i = s.first + 2 + margin; !s.rotation && i + 2 + margin < s.last; ++i) {
-        const double around = (4.0 * (value(i - 1) + value(i + 1)) - value(i - 2) - value(i + 2)) / 6.0;
-        off.emplace_back(std::abs(value(i) - around), i);
-      }
-    }
-    if (off.size() < 1000) {
-      continue;
-    }
-    std::vector<std::pair<double, std::size_t>> sorted = off;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double limit = 12.0 * middle->first / 1.645;  // the 90 % point is 1.645 sigma: 12 sigma
-    DataFault spike{"spike", {}, 0, 0};
-    for (std::size_t k = 2; k + 2 < off.size(); ++k) {  // its neighbours stand out too, by two thirds of it
-      const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
-      if (off[k].first > limit && limit > 0.0 && largest_around) {
-        note(spike, off[k].second);
-      }
-    }
-    if (spike.count > 0) {
-      spike.words = name + number(": %.0f samples in dwells stand more than 12 sigma from their neighbours",
-                                  static_cast<double>(spike.count));
-      faults.push_back(spike);
-    }
-    met = steeply_met(data, value, largest);
-    constexpr std::size_t often = 100;
-    constexpr double rest_rate = 0.5 * units::degree;  // below it the largest count of a gyro is only noise
-    const bool loud = axis < 3 ? largest * data.sample_rate_hz > rest_rate : largest * data.sample_rate_hz > 11.0;
-    if (met > often && loud) {
-      faults.push_back({"saturation", name + number(" meets its extreme value %.0f times", static_cast<double>(met)),
-                        first_met, met});
-    }
-  }
-}
-
 }  // namespace
 
 std::vector<DataFault> find_data_faults(const ImuData& data) {
   std::vector<DataFault> faults;
-  const std::vector<Segment> segments = find_segments(data);
+  ImuData sensors = data;
+  if (read_outs_in_degrees(data)) {
+    sensors.gimbal_outer = sensors.gimbal_inner = {};
+  }
+  const std::vector<Segment> segments = find_segments(sensors);
   lost_samples(data, faults);
   time_base(data, faults);
   frozen_axes(data, segments, faults);
-  spikes_and_saturation(data, segments, faults);
+  find_spikes(sensors, segments, faults);
+  find_saturation(data, faults);
   if (faults.empty()) {  // else what a turn adds up to is no question of axes
     find_wrong_axes(data, segments, faults);
   }

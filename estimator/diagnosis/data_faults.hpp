@@ -11,7 +11,7 @@ namespace selfcal::diagnosis {
 struct DataFault {
   // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_sign, wrong_scale, wrong_site
   std::string id;
-  std::string words;
+  std::string words;  // what is wrong, by what it shows, and what mends it
   std::size_t first_sample = 0;
   std::size_t count = 0;  // samples concerned
 };

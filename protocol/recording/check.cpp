@@ -165,7 +165,7 @@ Expected<std::optional<std::string>> check_gimbal(const Recording& recording, co
   }
   const std::string words = fmt::format(
       "gimbal_outer_rad, gimbal_inner_rad: rows {} to {}: read-outs turned {:.1f} and {:.1f} deg, delta_theta_rad "
-      "{:.1f} deg; {:.1f} deg apart, tolerance {:.1f}",
+      "{:.1f} deg; {:.1f} deg apart, tolerance {:.1f}; 'selfcal diagnose' tells which of them is wrong",
       found->first_row, found->last_row, found->outer_turn_deg, found->inner_turn_deg, found->gyro_turn_deg,
       found->disagreement_deg, found->tolerance_deg);
   if (policy.gimbal_contradiction_is_error) {

@@ -125,7 +125,7 @@ const Case cases[] = {
        swap_axes(s.theta, 0, 1);
        swap_axes(s.v, 0, 1);
      },
-     "wrong_axes", "gyros: x gives y, y gives x", 0},
+     "wrong_axes", "the IMU's axes: gyros and accelerometers: x gives y, y gives x", 0},
     {"accelerometer_sign", [](Samples& s) { scale_axis(s.v, 2, -1.0); }, "wrong_sign", "accelerometers: z gives -z", 0},
     {"accelerometer_axes", [](Samples& s) { swap_axes(s.v, 0, 1); }, "wrong_axes",
      "accelerometers: x gives y, y gives x", 0},
