@@ -29,9 +29,13 @@ const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
 
 double log_normal_tail(double z) { return log_chi_squared_tail(z * z, 1.0); }
 
-const Effect& effect_called(const std::string& id) {
+// A warm-up and the measured temperature share an id: with a channel the recording was asked about the latter.
+const Effect& effect_called(const std::string& id, bool temperature) {
   const std::vector<Effect>& all = catalogue();
-  return *std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.id == id; });
+  const auto asked = std::find_if(all.begin(), all.end(),
+                                  [&](const Effect& e) { return e.id == id && e.needs_temperature == temperature; });
+  return asked != all.end() ? *asked
+                            : *std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.id == id; });
 }
 
 }  // namespace
@@ -309,6 +313,9 @@ void Diagnoser::decide(const Naming& naming) {
   const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
   d_.after.accepted = d_.after.accepted && !jumps && itself && !naming.entangled();
   d_.unexplained = !d_.after.accepted;
+  if (d_.unexplained) {
+    d_.model.clear();  // rejected names are no equations of a model: nothing is carried over or taken out
+  }
   // A name that leaves something behind is the best fitting, not the truth.
   std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;
   destination.insert(destination.end(), named.begin(), named.end());
@@ -323,7 +330,7 @@ void Diagnoser::decide(const Naming& naming) {
   }
   for (const Suspect& s : naming.suspects()) {
     if (s.log_p < std::log(suspicion)) {
-      const Effect& effect = effect_called(s.effect);
+      const Effect& effect = effect_called(s.effect, !data_.temperature.empty());
       Finding f;
       f.effect = effect.id;
       f.equation = effect.equation;
