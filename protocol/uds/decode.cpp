@@ -16,12 +16,23 @@ std::string stamp(Time time) {
   return fmt::format("({}.{:06})", micros / 1'000'000, micros % 1'000'000);
 }
 
+// "idle" out of "0=starting 1=idle" where the value has a name, else the number with its unit; a count needs none.
+std::string signal_text(const ins::Signal& signal, std::uint32_t raw) {
+  const std::string key = fmt::format(" {}=", raw);
+  const std::string values = fmt::format(" {} ", signal.values);
+  if (const auto at = values.find(key); at != std::string::npos) {
+    const auto from = at + key.size();
+    return values.substr(from, values.find(' ', from) - from);
+  }
+  const bool count = signal.unit.empty() || signal.unit == "page";
+  return fmt::format("{:g}{}{}", raw * signal.factor, count ? "" : " ", count ? "" : signal.unit);
+}
+
 std::string status_line(const can::CanFrame& frame, Time time) {
   std::string line = fmt::format("{} status  ", stamp(time));
   for (const ins::Signal& signal : ins::status_signals) {
     if (signal.frame_id == frame.id) {
-      line +=
-          fmt::format(" {}={:g}{}", signal.name, ins::raw_signal(signal, frame.payload()) * signal.factor, signal.unit);
+      line += fmt::format(" {}={}", signal.name, signal_text(signal, ins::raw_signal(signal, frame.payload())));
     }
   }
   return line;

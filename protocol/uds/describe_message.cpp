@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "protocol/byte_order.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/decode.hpp"
@@ -11,6 +13,7 @@ namespace {
 
 using ByteView = std::span<const std::uint8_t>;
 constexpr std::size_t shown_bytes = 16;
+constexpr std::size_t shown_characters = 64;
 
 std::string data_text(ByteView data) {
   if (data.empty()) {
@@ -19,6 +22,21 @@ std::string data_text(ByteView data) {
   const ByteView head = data.first(std::min(data.size(), shown_bytes));
   const std::string more = data.size() > shown_bytes ? fmt::format(" … {} bytes", data.size()) : "";
   return fmt::format(": {:02X}{}", fmt::join(head, " "), more);
+}
+
+// Records that are text are shown as text; what a terminal would obey is escaped.
+std::string record_text(std::uint16_t did, ByteView record) {
+  const auto known = std::ranges::find(ins::data_identifiers, did, &ins::DataIdentifier::id);
+  if (record.empty() || known == ins::data_identifiers.end() || known->content != "ASCII") {
+    return data_text(record);
+  }
+  std::string text;
+  for (const std::uint8_t c : record.first(std::min(record.size(), shown_characters))) {
+    text += c >= 0x20 && c < 0x7F && c != '"' && c != '\\' ? std::string(1, static_cast<char>(c))
+                                                           : fmt::format("\\x{:02X}", c);
+  }
+  return fmt::format(": \"{}\"{}", text,
+                     record.size() > shown_characters ? fmt::format(" … {} bytes", record.size()) : "");
 }
 
 std::string_view action_name(std::uint8_t action) {
@@ -54,7 +72,7 @@ std::string body_text(std::uint8_t service, ByteView body, bool response) {
     case service::read_data:
     case service::write_data:
       if (const auto did = in.get<std::uint16_t>(); in.ok()) {
-        return fmt::format(" {} (0x{:04X})", ins::did_name(did), did) + data_text(body.subspan(2));
+        return fmt::format(" {} (0x{:04X})", ins::did_name(did), did) + record_text(did, body.subspan(2));
       }
       break;
     case service::routine_control: {

@@ -94,6 +94,10 @@ TEST(UdsDecode, MessagesByName) {
   EXPECT_EQ(describe_message(Bytes{0x35, 0, 0x44, 0, 0, 0, 7, 0, 0, 0x10, 0}),
             "RequestUpload (0x35) from page 7, 4096 bytes");
   EXPECT_EQ(describe_message(Bytes{0x27, 2, 0xDE, 0xAD}), "SecurityAccess (0x27) key (2 bytes)");  // never the key
+  EXPECT_EQ(describe_message(Bytes{0x62, 0xF1, 0x8C, 'S', 'I', 'M', '-', '1'}),
+            "positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"SIM-1\"");
+  EXPECT_EQ(describe_message(Bytes{0x62, 0xF1, 0x8C, 0x1B, '[', '"'}),
+            "positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"\\x1B[\\x22\"");
   EXPECT_EQ(describe_message({}), "empty message");
   EXPECT_EQ(describe_message(Bytes{0x7F, 1}), "malformed negative response: 01");
 }

@@ -27,6 +27,7 @@ TEST(BusDecode, NamesRequestResponseAndRefusal) {
   const auto finished = run_selfcal({"bus", "decode", folder / "bus.log"});
   EXPECT_EQ(finished.status, 0) << finished.error;
   EXPECT_THAT(finished.out, HasSubstr("ReadDataByIdentifier"));
+  EXPECT_THAT(finished.out, HasSubstr("ecuSerialNumber (0xF18C): \"SIM-0001\""));
   EXPECT_THAT(finished.out, HasSubstr("onditionsNotCorrect"));  // NRC 0x22
   EXPECT_EQ(std::count(finished.out.begin(), finished.out.end(), '\n'), 3) << finished.out;
 }
@@ -38,6 +39,17 @@ TEST(BusDecode, OtherIdentifiersAreOthersBusiness) {
       run_selfcal({"bus", "decode", "--request-id", "0x700", "--response-id", "0x708", folder / "bus.log"});
   EXPECT_EQ(finished.status, 0) << finished.error;
   EXPECT_EQ(finished.out, "");
+}
+
+TEST(BusDecode, StatusFramesAreSignalsByNameAndUnit) {
+  const test::TemporaryFolder folder;
+  ASSERT_TRUE(write_file_atomically(folder / "bus.log",
+                                    "(1.000000) can0 650#0100000000000007\n(1.100000) can0 651#2823000064000009\n"));
+  const auto finished = run_selfcal({"bus", "decode", folder / "bus.log"});
+  EXPECT_EQ(finished.status, 0) << finished.error;
+  EXPECT_THAT(finished.out, HasSubstr("State=idle GimbalMoving=0 "));
+  EXPECT_THAT(finished.out, HasSubstr("PagesWritten=0 "));
+  EXPECT_THAT(finished.out, HasSubstr("OuterAngle=90 deg InnerAngle=0 deg TimeLeft=10 s"));
 }
 
 TEST(BusDecode, MissingFrameIsTold) {
