@@ -121,6 +121,10 @@ std::vector<std::string> trend_warnings(const std::string& parameter, const std:
   if (limit <= 0) {
     return warnings;
   }
+  if (std::abs(value.value) > limit) {
+    warnings.push_back(fmt::format("{} {:.4g} {} is beyond its limit of {:.4g}", parameter, value.value, unit, limit));
+    return warnings;  // nothing ahead to be warned of
+  }
   if (std::abs(value.value) > near_limit * limit) {
     warnings.push_back(fmt::format("{} {:.4g} {} is near its limit of {:.4g}", parameter, value.value, unit, limit));
   }

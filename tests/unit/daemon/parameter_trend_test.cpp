@@ -55,6 +55,9 @@ TEST(TrendWarnings, ALimitIsWarnedOfNearItAndAhead) {
   const auto near = trend_warnings("gyro_drift_z", "deg/h", {}, value(2023, 90), 100);
   ASSERT_EQ(near.size(), 1u);
   EXPECT_THAT(near[0], HasSubstr("is near its limit"));
+  // What lies far beyond is not near: "795.6 ug is near its limit of 100".
+  const auto beyond = trend_warnings("accel_bias_x", "ug", {}, value(2023, 795.6), 100);
+  EXPECT_THAT(beyond, testing::ElementsAre("accel_bias_x 795.6 ug is beyond its limit of 100"));
 }
 
 }  // namespace
