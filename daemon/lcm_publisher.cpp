@@ -22,6 +22,7 @@ using namespace std::chrono_literals;
 constexpr auto retry_interval = 10s;
 constexpr std::int32_t schema = 1;
 constexpr std::int32_t estimate_schema = 2;
+constexpr std::int32_t ins_schema = 2;
 constexpr std::string_view software_version = SELFCAL_VERSION;
 
 // Whether the kernel knows a way to the group of udpm://GROUP:PORT?…; true for any other provider.
@@ -103,7 +104,7 @@ void LcmPublisher::publish_ins(const PublishedIns& ins) {
   static const RunProgress nothing;
   const RunProgress& progress = ins.progress == nullptr ? nothing : *ins.progress;
   selfcal_lcm::ins_status message;
-  message.schema = schema;
+  message.schema = ins_schema;
   message.utime_us = utc_now_us();
   message.ins = ins.name;
   message.serial = ins.serial;
@@ -119,6 +120,7 @@ void LcmPublisher::publish_ins(const PublishedIns& ins) {
   message.pages_written = static_cast<std::int32_t>(progress.ins.pages_written);
   message.pages_expected = static_cast<std::int32_t>(progress.pages_expected);
   message.lost_frames = static_cast<std::int64_t>(progress.lost_frames);
+  message.verdict = progress.summary.verdict;
   publish("SELFCAL_INS_" + ins.name, message);
 }
 

@@ -48,6 +48,11 @@ Entries entries(const RunProgress& progress) {
       {"state", std::string(name(progress.state))},
       {"words", std::string(words(progress.state))},
   };
+  if (!progress.summary.verdict.empty()) {
+    all["verdict"] = progress.summary.verdict;
+    all["cause"] = progress.summary.cause;
+    all["next"] = progress.summary.next;
+  }
   if (progress.estimate_known) {
     all["value"] = std::vector<double>(progress.value.begin(), progress.value.end());
     all["sigma"] = std::vector<double>(progress.sigma.begin(), progress.sigma.end());

@@ -7,8 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/calibrate_recording.hpp"
-#include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/estimate_job.hpp"
+#include "daemon/estimate/judged_result.hpp"
+#include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/result_json.hpp"
 #include "estimator/passes/consistency.hpp"
 
@@ -55,26 +56,11 @@ CalibrationResult amended_result(const diagnosis::Diagnosis& diagnosis, const Ca
   return result;
 }
 
-std::vector<std::string> diagnosis_objections(const diagnosis::Diagnosis& diagnosis, RunId amends) {
-  std::vector<std::string> found;
-  for (const diagnosis::DataFault& fault : diagnosis.faults) {
-    found.push_back(fmt::format("data fault in run {}: {}", amends, fault.words));
-  }
-  if (diagnosis.unexplained) {
-    found.push_back(
-        fmt::format("nothing in the catalogue explains run {}: {}", amends,
-                    diagnosis.remaining.empty() ? "what remains is not white" : diagnosis.remaining.front().words));
-  } else if (diagnosis.model.empty()) {
-    found.push_back(fmt::format("nothing to amend: no equation was named in run {}", amends));
-  }
-  return found;
-}
-
 // Effects that cannot be told apart need no objection: sigma holds what the 24 differ by between them.
 std::string story(const diagnosis::Finding& finding) {
   std::string text = fmt::format("{}, {:.0f} sigma:", finding.effect, finding.significance);
   for (const diagnosis::FindingParameter& p : finding.parameters) {
-    text += fmt::format(" {} {:.4g} +- {:.2g} {}", p.name, p.value, p.sigma, p.unit);
+    text += fmt::format(" {} {}", p.name, with_sigma(p.value, p.sigma, p.unit));
   }
   if (!finding.equivalent.empty()) {
     text += fmt::format("; or {}", fmt::join(finding.equivalent, ", "));
@@ -120,19 +106,19 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
                           const Recording& recording) {
   const CalibrationOptions options = calibration_options(request.config);
   Estimate estimate;
-  estimate.result = amended_result(diagnosis, options);
-  estimate.objections = diagnosis_objections(diagnosis, request.amends);
-  const std::vector<std::string> further = gate_objections(estimate.result, request.config);
-  estimate.objections.insert(estimate.objections.end(), further.begin(), further.end());
+  JudgedResult judged;
+  judged.result = amended_result(diagnosis, options);
+  judged.diagnosis = diagnosis;
+  judged.gate = judge_amended(judged.result, options.tolerance, request.config.limit, diagnosis, request.amends);
+  estimate.recording = recording_path(request.folder).string();
+  judged.summary = summary_of_amended(judged.result, judged.gate, {estimate.recording, 0}, diagnosis);
+  estimate.result = judged.result;
+  estimate.objections = judged.gate.words();
   for (const diagnosis::Finding& finding : diagnosis.findings) {
     estimate.notes.push_back(story(finding));
   }
-  estimate.recording = recording_path(request.folder).string();
-  nlohmann::ordered_json document = result_json(estimate.result, options, recording, {});
-  document["acceptable"] = estimate.objections.empty();
-  document["objections"] = estimate.objections;
+  nlohmann::ordered_json document = result_json(judged, options, recording, {});
   document["amends"] = request.amends;
-  document["diagnosis"] = diagnosis_json(diagnosis, diagnosis::DiagnosisOptions().false_alarm_rate);
   estimate.result_json = document.dump();
   return estimate;
 }

@@ -1,7 +1,5 @@
 #include "daemon/estimate/calibrate_recording.hpp"
 
-#include <fmt/format.h>
-
 #include <chrono>
 
 #include "estimator/geometry/units.hpp"
@@ -44,44 +42,6 @@ Expected<CalibrationResult> calibrate_recording(const Recording& recording, cons
   add_remedies(result.undetermined, result.covariance, installation_of(result, data.site, options.tolerance));
   outcome.result->elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return std::move(*outcome.result);
-}
-
-bool acceptable(const CalibrationResult& result) {
-  for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
-    if (!result.determined[k] || !result.plausible[k]) {
-      return false;
-    }
-  }
-  return result.consistency.verdict == Verdict::consistent;
-}
-
-std::vector<std::string> objections(const CalibrationResult& result, const CalibrationOptions& options) {
-  std::vector<std::string> found;
-  for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
-    const SensorParameter& parameter = sensor_parameters[k];
-    const auto row = static_cast<Eigen::Index>(k);
-    if (!result.determined[k]) {
-      found.push_back(fmt::format("{} not determined: sigma {:.3g} {}, tolerance {:.3g} {}", parameter.name,
-                                  result.sigma[row] / parameter.si_per_unit, parameter.unit,
-                                  options.tolerance[row] / parameter.si_per_unit, parameter.unit));
-    }
-    if (!result.plausible[k]) {
-      found.push_back(fmt::format("{} = {:.6g} {} is outside the physically possible range", parameter.name,
-                                  result.value[row] / parameter.si_per_unit, parameter.unit));
-    }
-  }
-  if (result.consistency.verdict == Verdict::inconsistent) {
-    found.push_back(
-        fmt::format("recording and model disagree: NIS {:.3f} where {:.3f} to {:.3f} is expected, "
-                    "whiteness p = {:.2g}",
-                    result.consistency.nis_mean, result.consistency.nis_low, result.consistency.nis_high,
-                    result.consistency.whiteness_p_value));
-  } else if (result.consistency.verdict == Verdict::not_converged) {
-    found.push_back(fmt::format("not converged after {} passes: the last moved a parameter by {:.2g} of its sigma",
-                                result.passes.size(),
-                                result.passes.empty() ? 0.0 : result.passes.back().largest_move_sigma));
-  }
-  return found;
 }
 
 }  // namespace selfcal

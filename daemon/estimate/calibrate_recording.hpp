@@ -17,17 +17,9 @@ namespace selfcal {
 ImuData imu_view(const Recording& recording, std::vector<double>& first_temperature);
 
 // Runs calibrate() and fills elapsed_s. Where no answer can be computed the error (bad_input) says why; a bad
-// answer is a CalibrationResult that says so. The recording must have passed check_recording.
+// answer is a CalibrationResult that says so (gate.hpp judges it). The recording must have passed check_recording.
 Expected<CalibrationResult> calibrate_recording(const Recording& recording, const CalibrationOptions& options,
                                                 const std::function<void(const CalibrationProgress&)>& progress = {},
                                                 const std::stop_token& stop = {});
-
-// True where every parameter is determined and plausible and the answer is consistent: what may be pushed to an
-// INS without the operator's word, and what `selfcal estimate` ends with status 0 for.
-bool acceptable(const CalibrationResult& result);
-
-// Why not, one clause for each reason ("gyro_scale_y not determined: sigma 80.2 ppm, tolerance 3 ppm"); empty
-// where acceptable.
-std::vector<std::string> objections(const CalibrationResult& result, const CalibrationOptions& options);
 
 }  // namespace selfcal

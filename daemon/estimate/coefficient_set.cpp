@@ -5,8 +5,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/estimate/calibrate_recording.hpp"
-
 namespace selfcal {
 namespace {
 
@@ -48,7 +46,8 @@ Expected<void> parse_parameter(const Json& entry, std::size_t k, CoefficientSet&
 
 }  // namespace
 
-CoefficientSet coefficient_set(const CalibrationResult& result, std::string serial, std::string computed_at_utc) {
+CoefficientSet coefficient_set(const CalibrationResult& result, bool acceptable, std::string serial,
+                               std::string computed_at_utc) {
   CoefficientSet set;
   set.serial = std::move(serial);
   set.computed_at_utc = std::move(computed_at_utc);
@@ -57,7 +56,7 @@ CoefficientSet coefficient_set(const CalibrationResult& result, std::string seri
     set.sigma[k] = result.sigma[static_cast<Eigen::Index>(k)];
     set.determined[k] = result.determined[k] && result.plausible[k];
   }
-  set.acceptable = acceptable(result);
+  set.acceptable = acceptable;
   return set;
 }
 

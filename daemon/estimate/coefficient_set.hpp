@@ -15,11 +15,12 @@ struct CoefficientSet {
   std::array<double, sensor_parameter_count> value{};  // SI, order of sensor_parameters
   std::array<double, sensor_parameter_count> sigma{};  // SI
   std::array<bool, sensor_parameter_count> determined{};
-  bool acceptable = false;  // as acceptable(result): may be pushed without a word
+  bool acceptable = false;  // the gate's answer: may be pushed without a word
 };
 
 // A value outside what is physically possible counts as not determined here. The time is the caller's, who has a clock.
-CoefficientSet coefficient_set(const CalibrationResult& result, std::string serial, std::string computed_at_utc);
+CoefficientSet coefficient_set(const CalibrationResult& result, bool acceptable, std::string serial,
+                               std::string computed_at_utc);
 
 // What the INS should hold for the parameters the recording determined, keeping `in_force` (SI) for all others: so
 // that an undetermined value is never pushed.

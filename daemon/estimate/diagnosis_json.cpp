@@ -89,6 +89,9 @@ std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
 
 ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate, const document::InputFile& input) {
   ordered_json j = document::head(document::diagnosis, input);
+  if (!input.name.empty()) {
+    j["summary"] = summary_json(summary_of(d, {input.name, 0}));
+  }
   j["mismatch"] = d.mismatch;
   j["verdict"] = verdict_name(d.verdict);
   j["false_alarm_rate"] = false_alarm_rate;

@@ -5,12 +5,14 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "daemon/estimate/summary.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/document/document_head.hpp"
 
 namespace selfcal {
 
 std::string verdict_name(diagnosis::DiagnosisVerdict verdict);
+// `input` is the recording's file, and what the commands of the summary name; without one there is no summary.
 nlohmann::ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_alarm_rate,
                                       const document::InputFile& input = {});
 

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <mutex>
 
-#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/result_json.hpp"
 #include "protocol/document/document_head.hpp"
 #include "protocol/recording/hdf5.hpp"
@@ -50,17 +49,18 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   }
   estimate.warnings.insert(estimate.warnings.end(), suspect->begin(), suspect->end());
   const CalibrationOptions options = calibration_options(request.config);
-  auto result = calibrate_recording(*recording, options, progress, stop);
+  const auto result = judged_calibration(*recording, options, request.config.limit, {estimate.recording, 0}, true,
+                                         {progress, {}}, stop);
   if (!result) {
     return tl::unexpected(result.error());
   }
-  estimate.result = std::move(*result);
-  estimate.objections = gate_objections(estimate.result, request.config);
   const auto input = document::identify_file(estimate.recording);
   if (!input) {
     return tl::unexpected(input.error());
   }
-  estimate.result_json = result_json_text(estimate.result, options, *recording, estimate.warnings, false, *input);
+  estimate.result = result->result;
+  estimate.objections = result->gate.words();
+  estimate.result_json = result_json_text(*result, options, *recording, estimate.warnings, false, *input);
   return estimate;
 }
 
@@ -74,19 +74,6 @@ CalibrationOptions calibration_options(const InsConfig& config) {
     }
   }
   return options;
-}
-
-std::vector<std::string> gate_objections(const CalibrationResult& result, const InsConfig& config) {
-  std::vector<std::string> found = objections(result, calibration_options(config));
-  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    const SensorParameter& parameter = sensor_parameters[i];
-    const double value = result.value(static_cast<Eigen::Index>(i)) / parameter.si_per_unit;
-    if (config.limit[i] && std::abs(value) > *config.limit[i]) {
-      found.push_back(fmt::format("{} implausible: {:.4g} {}, limit {:.4g}", parameter.name, value, parameter.unit,
-                                  *config.limit[i]));
-    }
-  }
-  return found;
 }
 
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings) {

@@ -13,9 +13,6 @@ namespace selfcal {
 
 CalibrationOptions calibration_options(const InsConfig& config);
 
-// Why a result may not be written without the operator's word; empty: it may.
-std::vector<std::string> gate_objections(const CalibrationResult& result, const InsConfig& config);
-
 // All samples of the pages, gap-free from the first; warnings are about saturation.
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings);
 

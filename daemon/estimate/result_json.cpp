@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal {
@@ -24,7 +24,8 @@ constexpr const char* name_of(Verdict verdict) {
   return "not converged";
 }
 
-Json parameters_json(const CalibrationResult& result, const CalibrationOptions& options) {
+Json parameters_json(const JudgedResult& judged, const CalibrationOptions& options) {
+  const CalibrationResult& result = judged.result;
   Json list = Json::array();
   for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
     const SensorParameter& parameter = sensor_parameters[k];
@@ -35,7 +36,8 @@ Json parameters_json(const CalibrationResult& result, const CalibrationOptions& 
                     {"sigma", result.sigma[row] / parameter.si_per_unit},
                     {"determined", result.determined[k]},
                     {"tolerance", options.tolerance[row] / parameter.si_per_unit},
-                    {"plausible", result.plausible[k]}});
+                    {"plausible", result.plausible[k]},
+                    {"usable", judged.gate.usable(static_cast<int>(k))}});
   }
   return list;
 }
@@ -140,15 +142,17 @@ Json consistency_json(const Consistency& consistency) {
 
 }  // namespace
 
-nlohmann::ordered_json result_json(const CalibrationResult& result, const CalibrationOptions& options,
+nlohmann::ordered_json result_json(const JudgedResult& judged, const CalibrationOptions& options,
                                    const Recording& recording, const std::vector<std::string>& warnings, bool curves,
                                    const document::InputFile& input) {
+  const CalibrationResult& result = judged.result;
   const Attitude& attitude = result.initial_attitude;
   Json document = document::head(document::estimate, input);
   document.update({{"serial", recording.serial},
-                   {"acceptable", acceptable(result)},
-                   {"objections", objections(result, options)},
-                   {"parameters", parameters_json(result, options)},
+                   {"summary", summary_json(judged.summary)},
+                   {"acceptable", judged.gate.acceptable()},
+                   {"objections", judged.gate.words()},
+                   {"parameters", parameters_json(judged, options)},
                    {"initial_attitude_deg",
                     {{"roll", attitude.roll / units::degree},
                      {"pitch", attitude.pitch / units::degree},
@@ -176,13 +180,15 @@ nlohmann::ordered_json result_json(const CalibrationResult& result, const Calibr
   if (curves) {
     document["correlation"] = correlation_json(result);
   }
+  if (judged.diagnosis) {
+    document["diagnosis"] = diagnosis_json(*judged.diagnosis, diagnosis::DiagnosisOptions().false_alarm_rate);
+  }
   return document;
 }
 
-std::string result_json_text(const CalibrationResult& result, const CalibrationOptions& options,
-                             const Recording& recording, const std::vector<std::string>& warnings, bool curves,
-                             const document::InputFile& input) {
-  return result_json(result, options, recording, warnings, curves, input).dump();
+std::string result_json_text(const JudgedResult& judged, const CalibrationOptions& options, const Recording& recording,
+                             const std::vector<std::string>& warnings, bool curves, const document::InputFile& input) {
+  return result_json(judged, options, recording, warnings, curves, input).dump();
 }
 
 }  // namespace selfcal

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/quantity_text.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal {
@@ -16,68 +16,92 @@ std::string coloured(std::string_view text, std::string_view shade, bool colour)
   return colour ? fmt::format("{}{}{}", shade, text, plain) : std::string(text);
 }
 
-// Two significant digits of sigma, and the value to the same decimal.
-int decimals_for(double sigma) {
-  int decimals = 0;
-  for (double scale = 10.0; decimals < 6 && sigma * scale < 100.0; scale *= 10.0) {
-    ++decimals;
-  }
-  return decimals;
+// The diagnosis's values are the ones to use.
+bool corrected(const JudgedResult& judged) {
+  return judged.diagnosis && judged.diagnosis->verdict == diagnosis::DiagnosisVerdict::named;
 }
 
-std::string parameter_row(const CalibrationResult& result, const CalibrationOptions& options, std::size_t k,
-                          bool colour) {
-  const SensorParameter& parameter = sensor_parameters[k];
-  const auto row = static_cast<Eigen::Index>(k);
-  const double sigma = result.sigma[row] / parameter.si_per_unit;
-  const int decimals = decimals_for(sigma);
-  const std::string_view mark = !result.plausible[k]    ? "not plausible"
-                                : !result.determined[k] ? "not determined"
-                                                        : "ok";
-  const bool good = result.plausible[k] && result.determined[k];
-  return fmt::format("{:<22} {:>12.{}f} {:>10.{}f} {:>10.4g}  {:<7} {}\n", parameter.name,
-                     result.value[row] / parameter.si_per_unit, decimals, sigma, decimals,
-                     options.tolerance[row] / parameter.si_per_unit, parameter.unit,
-                     coloured(mark, good ? green : red, colour));
+// Empty where a recording that disagrees with the model leaves nothing to say of a single value.
+std::string mark_of(const JudgedResult& judged, int k) {
+  for (const Objection& objection : judged.gate.objections) {
+    if (objection.parameter != k) {
+      continue;
+    }
+    switch (objection.kind) {
+      case ObjectionKind::implausible: return "not plausible";
+      case ObjectionKind::beyond_limit: return "beyond limit";
+      default: return "not determined";
+    }
+  }
+  return judged.gate.usable(k) ? "ok" : "not usable";
+}
+
+std::string parameter_row(const JudgedResult& judged, const CalibrationOptions& options, int k, bool colour) {
+  const SensorParameter& parameter = sensor_parameters[static_cast<std::size_t>(k)];
+  const CalibrationResult& result = judged.result;
+  const QuantityText text =
+      quantity_text(result.value(k) / parameter.si_per_unit, result.sigma(k) / parameter.si_per_unit);
+  std::string row = fmt::format("{:<22}{:>11}{:>9}", parameter.name, text.value, text.sigma);
+  if (corrected(judged)) {
+    const diagnosis::Diagnosis& d = *judged.diagnosis;
+    const QuantityText better = quantity_text(d.value(k) / parameter.si_per_unit, d.sigma(k) / parameter.si_per_unit);
+    return row + fmt::format("{:>12}{:>9}  {}\n", better.value, better.sigma, parameter.unit);
+  }
+  const std::string mark = mark_of(judged, k);
+  return row + fmt::format("{:>10}  {:<7} {}\n", number_text(options.tolerance(k) / parameter.si_per_unit),
+                           parameter.unit, coloured(mark, mark == "ok" ? green : red, colour));
+}
+
+std::string parameters_text(const JudgedResult& judged, const CalibrationOptions& options, bool colour) {
+  std::string text =
+      corrected(judged)
+          ? fmt::format("{:<22}{:>20}{:>21}\n{:<22}{:>11}{:>9}{:>12}{:>9}  {}\n", "", "without the effect", "corrected",
+                        "parameter", "value", "sigma", "value", "sigma", "unit")
+          : fmt::format("{:<22}{:>11}{:>9}{:>10}  {}\n", "parameter", "value", "sigma", "tolerance", "unit");
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    text += parameter_row(judged, options, k, colour);
+  }
+  return text;
 }
 
 std::string passes_text(const CalibrationResult& result) {
   std::string text;
   int number = 0;
   for (const PassSummary& pass : result.passes) {
-    text += fmt::format("pass {} {:<8} {:>7.0f} s  NIS {:.3f}  largest move {:.3g} sigma\n", ++number,
-                        pass.direction == PassDirection::forward ? "forward" : "reverse", pass.seconds, pass.nis_mean,
-                        pass.largest_move_sigma);
+    text += fmt::format("pass {:<2} {:<8} {:>6.0f} s  NIS {}, largest move {} sigma\n", ++number,
+                        pass.direction == PassDirection::forward ? "forward" : "reverse", pass.seconds,
+                        number_text(pass.nis_mean), number_text(pass.largest_move_sigma));
   }
   return text;
 }
 
+std::string surroundings_text(const CalibrationResult& result, const Recording& recording) {
+  const Attitude& attitude = result.initial_attitude;
+  return fmt::format("{}: {} samples, {:.0f} s, answer in {:.1f} s\n",
+                     recording.serial.empty() ? "no serial number" : recording.serial, recording.size(),
+                     static_cast<double>(recording.size()) / recording.sample_rate_hz, result.elapsed_s) +
+         fmt::format("attitude at the start: roll {:.4f}, pitch {:.4f}, heading {:.4f} deg\n",
+                     attitude.roll / units::degree, attitude.pitch / units::degree, attitude.heading / units::degree) +
+         fmt::format("{} base; noise: ARW {} deg/sqrt(h), VRW {} ug/sqrt(Hz), position {} m\n",
+                     result.moored ? "moored" : "still", number_text(result.gyro_arw / units::degree_per_sqrt_hour),
+                     number_text(result.accel_vrw / units::micro_g_per_sqrt_hz), number_text(result.position_sigma));
+}
+
 }  // namespace
 
-std::string result_table(const CalibrationResult& result, const CalibrationOptions& options, const Recording& recording,
-                         bool colour) {
-  std::string text =
-      fmt::format("{:<22} {:>12} {:>10} {:>10}  {:<7}\n", "parameter", "value", "sigma", "tolerance", "unit");
-  for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
-    text += parameter_row(result, options, k, colour);
-  }
-  const Attitude& attitude = result.initial_attitude;
-  text += fmt::format("\n{}: {} samples, {:.0f} s, answer in {:.2f} s\n",
-                      recording.serial.empty() ? "no serial number" : recording.serial, recording.size(),
-                      static_cast<double>(recording.size()) / recording.sample_rate_hz, result.elapsed_s);
-  text += fmt::format("attitude at the start: roll {:.4f}, pitch {:.4f}, heading {:.4f} deg\n",
-                      attitude.roll / units::degree, attitude.pitch / units::degree, attitude.heading / units::degree);
-  text += fmt::format("{} base; noise in use: ARW {:.3g} deg/sqrt(h), VRW {:.3g} ug/sqrt(Hz), position {:.3g} m\n",
-                      result.moored ? "moored" : "still", result.gyro_arw / units::degree_per_sqrt_hour,
-                      result.accel_vrw / units::micro_g_per_sqrt_hz, result.position_sigma);
-  text += passes_text(result);
-  for (const UndeterminedDirection& direction : result.undetermined) {
+std::string result_table(const JudgedResult& judged, const CalibrationOptions& options, const Recording& recording,
+                         bool colour, int columns) {
+  std::string text = summary_text(judged.summary, colour, columns) + "\n";
+  text += parameters_text(judged, options, colour) + "\n" + surroundings_text(judged.result, recording) +
+          passes_text(judged.result);
+  for (const UndeterminedDirection& direction : judged.result.undetermined) {
     text += fmt::format("undetermined: {}\n", direction.words);
   }
-  const bool good = acceptable(result);
-  text += coloured(fmt::format("verdict: {}", result.consistency.words), good ? green : red, colour) + "\n";
-  for (const std::string& objection : objections(result, options)) {
-    text += fmt::format("  {}\n", objection);
+  if (!judged.gate.acceptable()) {
+    text += "objections:\n";
+    for (const Objection& objection : judged.gate.objections) {
+      text += fmt::format("  {}\n", objection.words);
+    }
   }
   return text;
 }

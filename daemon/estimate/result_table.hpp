@@ -1,14 +1,15 @@
-// The answer for people: a table of the 24 with sigma and tolerance, then passes and verdict.
+// The answer for people: verdict, cause and next step, a table of the 24 with sigma and tolerance, then the passes.
 #pragma once
 
 #include <string>
 
-#include "estimator/passes/calibration.hpp"
+#include "daemon/estimate/judged_result.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace selfcal {
 
-std::string result_table(const CalibrationResult& result, const CalibrationOptions& options, const Recording& recording,
-                         bool colour);
+// Broken to `columns`; 0: not broken. Where the diagnosis names what was left out, the corrected values stand beside.
+std::string result_table(const JudgedResult& judged, const CalibrationOptions& options, const Recording& recording,
+                         bool colour, int columns = 0);
 
 }  // namespace selfcal

@@ -5,6 +5,7 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/estimate_job.hpp"
+#include "daemon/estimate/gate.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/planning/plan.hpp"
 
@@ -12,7 +13,8 @@ namespace selfcal {
 namespace {
 
 constexpr double forecast_step_s = 60.0;  // dwells longer than this are looked at in pieces
-constexpr double most_loss = 10.0;        // the data gave less than the analysis by this at most
+constexpr double out_of_reach_margin = 1.1;
+constexpr double most_loss = 10.0;  // the data gave less than the analysis by this at most
 
 // The same motion with longer dwells in pieces, a "move" to where the gimbal stands already between them.
 Schedule in_pieces(const Schedule& schedule) {
@@ -69,7 +71,8 @@ Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, con
   }
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (last(k) > tolerance(k)) {
+    // More data do not make a sigma larger, and the forecast of one is good to a tenth.
+    if (so_far.sigma(k) > tolerance(k) && last(k) > out_of_reach_margin * tolerance(k)) {
       answer.out_of_reach.emplace_back(sensor_parameters[i].name);
     }
   }
@@ -98,7 +101,7 @@ Expected<RunningEstimate> RunningEstimator::estimate(std::uint32_t pages, const 
   answer.value = result->value;
   answer.sigma = result->sigma;
   answer.tolerance = options.tolerance;
-  answer.objections = gate_objections(*result, request_.config);
+  answer.objections = judge(*result, options.tolerance, request_.config.limit).words();
   answer.met =
       answer.objections.empty() && (result->sigma.array() <= early_end_margin * options.tolerance.array()).all();
   const earth::Position site{recording.latitude_deg * units::degree, recording.longitude_deg * units::degree,

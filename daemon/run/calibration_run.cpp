@@ -5,6 +5,7 @@
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/host/journal.hpp"
 #include "daemon/host/wall_clock.hpp"
+#include "daemon/store/run_summary.hpp"
 #include "protocol/uds/services.hpp"
 
 namespace selfcal {
@@ -343,9 +344,10 @@ void CalibrationRun::conclude() {
   const bool well = record_.state == State::completed;
   journal::Fields fields = journal_fields(record_);
   fields.nrc = last_nrc_;
+  progress_.summary = run_summary(context_.store, record_);
   journal::write(well ? journal::Level::notice : journal::Level::error,
-                 record_.reason.empty() ? std::string(words(record_.state))
-                                        : fmt::format("{}: {}", words(record_.state), record_.reason),
+                 fmt::format("{}{}{}", progress_.summary.verdict, progress_.summary.cause.empty() ? "" : " ",
+                             progress_.summary.cause),
                  fields);
   report_progress(true);
   context_.observer.on_state(record_);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "daemon/estimate/estimate_worker.hpp"
+#include "daemon/estimate/summary.hpp"
 #include "daemon/host/config.hpp"
 #include "daemon/host/task.hpp"
 #include "daemon/host/timers.hpp"
@@ -42,6 +43,7 @@ struct RunProgress {
   double finish_in_s = -1.0;  // until the rotation ends, on the operator's clock; -1: it does not turn
   bool link_up = true;
   std::uint64_t lost_frames = 0;
+  Summary summary;  // of the run, once it has ended; empty sentences before
 };
 
 class RunObserver {

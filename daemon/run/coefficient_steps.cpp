@@ -134,7 +134,7 @@ Expected<void> CalibrationRun::make_new_set() {
   if (!in_force) {
     return tl::unexpected(in_force.error());
   }
-  const CoefficientSet measured = coefficient_set(estimate_->result, record_.serial, utc_now());
+  const CoefficientSet measured = coefficient_set(estimate_->result, objections_.empty(), record_.serial, utc_now());
   std::vector<std::string_view> kept;
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
     if (!measured.determined[i]) {

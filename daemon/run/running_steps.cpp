@@ -68,7 +68,8 @@ void CalibrationRun::on_running_estimate(const Expected<RunningEstimate>& answer
   }
   const auto& missing = answer->forecast.out_of_reach;
   // Early on the noise is known too badly to alarm anybody.
-  if (!missing.empty() && !out_of_reach_said_ && answer->data_s > 0.25 * schedule_.duration_s()) {
+  if (!missing.empty() && !out_of_reach_said_ && record_.early_end_s < 0 &&
+      answer->data_s > 0.25 * schedule_.duration_s()) {
     out_of_reach_said_ = true;
     warn(
         fmt::format("this schedule will not determine {} to tolerance in this installation", fmt::join(missing, ", ")));

@@ -4,6 +4,7 @@
 
 #include "daemon/host/wall_clock.hpp"
 #include "daemon/store/parameter_trend.hpp"
+#include "daemon/store/run_summary.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/document/document_head.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
@@ -15,8 +16,12 @@ using nlohmann::ordered_json;
 
 ordered_json figure(double value) { return value < 0 ? ordered_json() : ordered_json(value); }
 
-ordered_json summary(const RunRecord& run) {
-  return {
+Expected<ordered_json> heading(const RunStore& store, const RunRecord& run) {
+  const auto undone = rolled_back_run(store, run);
+  if (!undone) {
+    return tl::unexpected(undone.error());
+  }
+  return ordered_json{
       {"run", run.id},
       {"ins", run.ins},
       {"serial", run.serial},
@@ -28,7 +33,9 @@ ordered_json summary(const RunRecord& run) {
                : run.amends != 0 ? "amendment"
                                  : "calibration"},
       {"amends", run.amends == 0 ? ordered_json() : ordered_json(run.amends)},
-      {"schedule", run.schedule},
+      {"rolls_back", *undone == 0 ? ordered_json() : ordered_json(*undone)},
+      // Only a calibration turns the gimbal.
+      {"schedule", run.rollback || run.amends != 0 ? std::string() : run.schedule},
       {"dry_run", run.dry_run},
       {"stop_when_met", run.stop_when_met},
       {"early_end_s", figure(run.early_end_s)},
@@ -41,6 +48,16 @@ ordered_json summary(const RunRecord& run) {
       {"drift_before_m", figure(run.drift_old_m)},
       {"drift_after_m", figure(run.drift_new_m)},
   };
+}
+
+ordered_json text_or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
+
+ordered_json in_force_json(const InForce& force) {
+  return {{"now", force.now},
+          {"known", force.known},
+          {"from_utc", text_or_null(force.from_utc)},
+          {"until_utc", text_or_null(force.until_utc)},
+          {"ended_by_run", force.ended_by_run == 0 ? ordered_json() : ordered_json(force.ended_by_run)}};
 }
 
 // A coefficient record as it went over the bus, or null where there is none or it cannot be read.
@@ -71,7 +88,17 @@ Expected<ordered_json> set_document(const RunStore& store, RunId run, SetRole ro
 }  // namespace
 
 Expected<std::string> run_document(const RunStore& store, const RunRecord& run) {
-  ordered_json document = document::with_head(document::run, summary(run));
+  auto head = heading(store, run);
+  const auto force = in_force(store, run);
+  if (!head || !force) {
+    return tl::unexpected(head ? force.error() : head.error());
+  }
+  ordered_json document = document::with_head(document::run, *head);
+  const ordered_json result =
+      run.result_json.empty() ? ordered_json() : ordered_json::parse(run.result_json, nullptr, false);
+  const RunId undone = document["rolls_back"].is_null() ? 0 : document["rolls_back"].get<RunId>();
+  document["summary"] = summary_json(run_summary(run, *force, undone, result));
+  document["in_force"] = in_force_json(*force);
   const auto events = store.events(run.id);
   if (!events) {
     return tl::unexpected(events.error());
@@ -91,8 +118,8 @@ Expected<std::string> run_document(const RunStore& store, const RunRecord& run) 
   }
   // What the gate refused, or a dry run found, was proposed and never sent.
   sets["pushed"] = sets["read_back"].is_null() ? ordered_json() : sets["proposed"];
-  sets["in_force"] = wrote_its_set(run);
-  document["result"] = run.result_json.empty() ? ordered_json() : ordered_json::parse(run.result_json, nullptr, false);
+  sets["in_force"] = force->now;
+  document["result"] = result;
   return document.dump();
 }
 
@@ -104,7 +131,13 @@ Expected<std::string> history_document(const RunStore& store, const std::string&
   ordered_json document = document::with_head(
       document::history, {{"serial", serial}, {"runs", ordered_json::array()}, {"parameters", ordered_json::array()}});
   for (const RunRecord& run : *runs) {
-    document["runs"].push_back(summary(run));
+    auto head = heading(store, run);
+    const auto force = in_force(store, run);
+    if (!head || !force) {
+      return tl::unexpected(head ? force.error() : head.error());
+    }
+    (*head)["in_force"] = in_force_json(*force);
+    document["runs"].push_back(std::move(*head));
   }
   if (serial.empty()) {
     return document.dump();
@@ -125,8 +158,10 @@ Expected<std::string> history_document(const RunStore& store, const std::string&
     }
     ordered_json entry{{"name", parameter.name}, {"unit", parameter.unit}, {"values", std::move(values)}};
     if (const auto trend = parameter_trend(*history)) {
-      entry["change_per_year"] = trend->slope_per_year;
-      entry["change_per_year_sigma"] = trend->slope_sigma;
+      if (trend->slope_sigma > 0.0) {  // of values that lie long enough apart
+        entry["change_per_year"] = trend->slope_per_year;
+        entry["change_per_year_sigma"] = trend->slope_sigma;
+      }
       entry["ageing"] = trend->ageing;
     }
     const double limit = limits[static_cast<std::size_t>(i)].value_or(0.0);

@@ -28,6 +28,12 @@ class MismatchLoop(case.OnBench):
         self.assertEqual(run["exit_status"], case.ANSWER_IS_NO, run["reason"])
         self.assertEqual(run["result"]["consistency"]["verdict"], "inconsistent", run["reason"])
         self.assert_old_coefficients(unit)   # such a set is never written
+        # The refusal names the cause and the command that mends it, and no value is told as usable.
+        self.assertEqual(run["summary"]["standing"], "bad")
+        self.assertIn("creep of the accelerometers", run["summary"]["verdict"])
+        self.assertIn("accel_relaxation", run["summary"]["cause"])
+        self.assertEqual(run["summary"]["next"], f"selfcal amend {run['run']}")
+        self.assertFalse(any(p["usable"] for p in run["result"]["parameters"]))
         truth = unit.truth()
 
         amended = unit.folder / "amended"
@@ -57,6 +63,9 @@ class MismatchLoop(case.OnBench):
         self.assertEqual(amended_run["result"]["consistency"]["verdict"], "consistent")
         for objection in amended_run["result"]["objections"]:
             self.assertRegex(objection, "not determined")
+        shown = unit.selfcal("show", amended_run["run"]).stdout
+        self.assertLess(shown.index("fitted together with the 24"), shown.index("parameter   "), "physics comes first")
+        self.assertRegex(shown, r"tau +\S+ \+- \S+ s")
         version, held = witness.coefficients_in_force(unit.interface)
         self.assertGreater(version, 0)
         for p in amended_run["result"]["parameters"]:

@@ -136,6 +136,9 @@ std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assu
 std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, const Recording& recording) {
   const Attitude& attitude = d.calibration.initial_attitude;
   std::string text = "# What a diagnosis makes of a recording: load it with the physics file beside it.\n";
+  if (d.unexplained) {
+    text += "# WARNING: nothing explains the recording. The 24 values below are biased by what is missing.\n";
+  }
   text += fmt::format("serial = \"{}\"\nparameter_set = \"none\"\n", recording.serial);
   text += key_value("sample_rate_hz", recording.sample_rate_hz);
   text += "\n[site]\n" + key_value("latitude_deg", recording.latitude_deg) +

@@ -7,6 +7,7 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
+#include "daemon/estimate/showing_schedule.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -14,6 +15,7 @@
 #include "tools/cli/amendment.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/diagnose_output.hpp"
+#include "tools/cli/dwell_table.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -120,10 +122,39 @@ Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::
     written =
         write_file_atomically(arguments.physics, physics_text(diagnosis, options.assumed, opened.data.site.latitude));
   }
+  if (diagnosis.unexplained && !(arguments.physics.empty() && arguments.amended.empty())) {
+    fmt::print(stderr,
+               "selfcal diagnose: warning: nothing explains {}: the 24 values written are BIASED, and a simulation "
+               "with them will not agree with the recording\n",
+               arguments.recording);
+  }
   if (written && !arguments.amended.empty()) {
     written = write_amendment(arguments.amended, diagnosis, options.assumed, opened.loaded.recording, opened.data);
   }
   return written;
+}
+
+// Where no named effects are to be told apart: what would show the strongest suspect, or, where nothing in the catalogue
+// explains the recording, anything at all.
+Expected<void> write_showing(const std::string& file, const diagnosis::Diagnosis& diagnosis, const Schedule& done) {
+  for (const diagnosis::Finding& suspect : diagnosis.suspected) {
+    if (const auto showing = showing_schedule(suspect.experiment, done)) {
+      fmt::print(stderr, "selfcal diagnose: {}: {}, to show {}\n", file, showing->words, suspect.effect);
+      return write_file_atomically(file, fmt::format("# Would show {}: {}.\n{}", suspect.effect, showing->words,
+                                                     format_schedule(showing->schedule)));
+    }
+  }
+  if (diagnosis.unexplained) {
+    const ShowingSchedule showing = dwells_between(done);
+    fmt::print(stderr, "selfcal diagnose: {}: {}, to see what is not in the catalogue elsewhere\n", file,
+               showing.words);
+    return write_file_atomically(file, fmt::format("# {}.\n{}", showing.words, format_schedule(showing.schedule)));
+  }
+  fmt::print(stderr,
+             "selfcal diagnose: {} is not written: no effects to tell apart, and none that another schedule would "
+             "show\n",
+             file);
+  return {};
 }
 
 // The best experiment of the class that is hardest to split now.
@@ -142,8 +173,8 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
     }
   }
   if (hardest == nullptr) {
-    fmt::print(stderr, "selfcal diagnose: nothing to split: {} is not written\n", arguments.split_schedule);
-    return splits;
+    return write_showing(arguments.split_schedule, diagnosis, schedule_of(opened.loaded.recording, opened.data))
+        .map([&] { return splits; });
   }
   const diagnosis::Experiment& best = hardest->experiments.front();
   const std::string text =
@@ -155,8 +186,9 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
 // There is no physics to try on another recording, to split or to write.
 Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
                           const document::InputFile& file) {
-  fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate, file).dump() + "\n"
-                                  : diagnosis_text(diagnosis));
+  fmt::print("{}", arguments.json
+                       ? diagnosis_json(diagnosis, arguments.false_alarm_rate, file).dump() + "\n"
+                       : diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout)));
   for (const std::string* asked :
        {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
     if (!asked->empty()) {
@@ -213,8 +245,11 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     }
     fmt::print("{}\n", json.dump());
   } else {
-    fmt::print("{}{}{}{}", diagnosis_text(diagnosis), description ? empirical_text(*description) : std::string(),
-               splits_text(*splits), *holdout ? holdout_text(**holdout) : std::string());
+    fmt::print("{}{}{}{}{}",
+               diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout)),
+               diagnosis.unexplained ? dwell_table(data, diagnosis) : std::string(),
+               description ? empirical_text(*description) : std::string(), splits_text(*splits),
+               *holdout ? holdout_text(**holdout) : std::string());
   }
   if (const auto written = write_files(arguments, diagnosis, options, **opened); !written) {
     return tl::unexpected(written.error());

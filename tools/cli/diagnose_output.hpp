@@ -4,6 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "daemon/estimate/summary.hpp"
 #include "estimator/diagnosis/comparison.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/diagnosis/empirical.hpp"
@@ -13,7 +14,9 @@
 
 namespace selfcal::cli {
 
-std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis);
+// Verdict, cause and next step, broken to `columns` (0: not broken), then the figures. `subject` is what the commands name.
+std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis, const Subject& subject, bool colour, int columns);
+Summary summary_of_comparison(const diagnosis::Comparison& comparison);
 // The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
 nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate,
                                        const document::InputFile& recording);

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/result_json.hpp"
 #include "daemon/estimate/result_table.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -20,6 +20,7 @@ struct EstimateArguments {
   std::string recording;
   bool json = false;
   bool curves = false;
+  bool no_diagnosis = false;
   std::string covariance = "once";
   int max_passes = CalibrationOptions{}.max_passes;
   double convergence_sigma = CalibrationOptions{}.convergence_sigma;
@@ -58,13 +59,15 @@ Expected<int> estimate(const EstimateArguments& arguments) {
   for (const std::string& warning : loaded->warnings) {
     fmt::print(stderr, "selfcal estimate: warning: {}: {}\n", arguments.recording, warning);
   }
-  Expected<CalibrationResult> result = [&] {
+  const Expected<JudgedResult> judged = [&] {
     ProgressLine line;
-    return calibrate_recording(loaded->recording, *options,
-                               [&line](const CalibrationProgress& p) { line.show(progress_text(p)); });
+    const JudgedProgress progress{[&line](const CalibrationProgress& p) { line.show(progress_text(p)); },
+                                  [&line](const std::string& step) { line.show("looking for the cause: " + step); }};
+    return judged_calibration(loaded->recording, *options, {}, {arguments.recording, 0}, !arguments.no_diagnosis,
+                              progress);
   }();
-  if (!result) {
-    return fail(result.error().kind, fmt::format("{}: {}", arguments.recording, result.error().message));
+  if (!judged) {
+    return fail(judged.error().kind, fmt::format("{}: {}", arguments.recording, judged.error().message));
   }
   if (arguments.json) {
     const Expected<document::InputFile> input = document::identify_file(arguments.recording);
@@ -72,11 +75,11 @@ Expected<int> estimate(const EstimateArguments& arguments) {
       return tl::unexpected(input.error());
     }
     fmt::print("{}\n",
-               result_json_text(*result, *options, loaded->recording, loaded->warnings, arguments.curves, *input));
+               result_json_text(*judged, *options, loaded->recording, loaded->warnings, arguments.curves, *input));
   } else {
-    fmt::print("{}", result_table(*result, *options, loaded->recording, use_colour(stdout)));
+    fmt::print("{}", result_table(*judged, *options, loaded->recording, use_colour(stdout), text_columns(stdout)));
   }
-  return acceptable(*result) ? 0 : 1;
+  return judged->gate.acceptable() ? 0 : 1;
 }
 
 CommandRun configure(CLI::App& app) {
@@ -84,6 +87,8 @@ CommandRun configure(CLI::App& app) {
   app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
   app.add_flag("--json", arguments->json, "one JSON document on standard output");
   app.add_flag("--curves", arguments->curves, "with --json: convergence within the passes, and the correlations");
+  app.add_flag("--no-diagnosis", arguments->no_diagnosis,
+               "do not look for the cause where recording and model disagree (some seconds)");
   arguments->noise.add_to(app);
   app.add_option("--covariance", arguments->covariance,
                  "once: every datum counts once; carried: kept from pass to pass (overconfident, for comparison)")

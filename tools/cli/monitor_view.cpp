@@ -46,7 +46,7 @@ std::string closing_bar(double sigma, double tolerance) {
 std::string parameter_cell(const selfcal_lcm::estimate& e, std::size_t k) {
   const double tolerance = k < e.tolerance.size() ? e.tolerance[k] : 0.0;
   return fmt::format("{:<15}{:>8.3g} {:<6} {}{}", short_name(e.name[k]), e.sigma[k], e.unit[k],
-                     closing_bar(e.sigma[k], tolerance), tolerance > 0.0 && e.sigma[k] <= tolerance ? " ok" : "   ");
+                     closing_bar(e.sigma[k], tolerance), tolerance > 0.0 && e.sigma[k] <= tolerance ? " in" : "   ");
 }
 
 std::string estimate_words(const selfcal_lcm::estimate& e) {
@@ -74,6 +74,9 @@ void add_ins(const std::string& name, const MonitorState::Ins& ins, std::vector<
   const bool link = s.link_up != 0;
   lines.push_back({link ? Style::title : Style::bad,
                    fmt::format("{} {}: {}, run {}{}", s.ins, s.serial, s.state, s.run, link ? "" : "   LINK LOST")});
+  if (!s.verdict.empty()) {
+    lines.push_back({Style::plain, "verdict   " + s.verdict});
+  }
   lines.push_back(
       {Style::plain, fmt::format("schedule  [{}] position {} of {}, {} left", bar(share(s.position, s.positions), 20),
                                  s.position, s.positions, minutes_and_seconds(s.time_left_s))});
@@ -184,10 +187,10 @@ std::string message_line(const selfcal_lcm::service_status& message) {
 
 std::string message_line(const selfcal_lcm::ins_status& message) {
   return fmt::format(
-      "{} {}: {}, run {}, position {}/{}, outer {:.2f} deg, inner {:.2f} deg, {:.0f} s left, pages {}/{}{}",
+      "{} {}: {}, run {}, position {}/{}, outer {:.2f} deg, inner {:.2f} deg, {:.0f} s left, pages {}/{}{}{}{}",
       message.ins, message.serial, message.state, message.run, message.position, message.positions, message.outer_deg,
       message.inner_deg, message.time_left_s, message.pages_pulled, message.pages_expected,
-      message.link_up != 0 ? "" : ", LINK LOST");
+      message.link_up != 0 ? "" : ", LINK LOST", message.verdict.empty() ? "" : ", verdict: ", message.verdict);
 }
 
 std::string message_line(const selfcal_lcm::estimate& message) {

@@ -32,8 +32,9 @@ struct ScreenLine {
   std::string text;  // ASCII, at most `columns` long
 };
 
-// Exactly `rows` lines: the service, one INS in full (the `selected`th), the others in a line each, the 24 sigma closing
-// on their tolerance in two columns, the alarms, the keys. From 80 x 24 on everything is there; below, the end is cut.
+// Exactly `rows` lines: the service, one INS in full (the `selected`th), the others in a line each, the verdict of a run that has ended, the
+// 24 sigma closing on their tolerance in two columns ("in": within it; whether they may be used the verdict says), the
+// alarms, the keys. From 80 x 24 on everything is there; below, the end is cut.
 std::vector<ScreenLine> monitor_screen(const MonitorState& state, std::size_t selected, int columns, int rows);
 
 // One message as one line, for output that is no terminal.

@@ -7,7 +7,8 @@ target_sources(selfcal PRIVATE
   online_monitor.cpp
   online_query.cpp
   online_run.cpp
-  online_text.cpp)
+  online_text.cpp
+  run_progress.cpp)
 # GCC 12 takes a std::string that is moved here for an overrun (false -Warray-bounds) if the headers are precompiled.
 set_source_files_properties(monitor_view.cpp PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
 # The database can be restored without the daemon, which may refuse to start because of it.

@@ -154,7 +154,7 @@ Expected<int> show(ManagerClient& manager, const Options& options) {
   if (!document) {
     return tl::unexpected(document.error());
   }
-  fmt::print("{}", options.json ? *document + "\n" : run_text(*document, use_colour(stdout), true));
+  fmt::print("{}", options.json ? *document + "\n" : run_text(*document, use_colour(stdout), text_columns(stdout)));
   return 0;
 }
 

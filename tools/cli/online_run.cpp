@@ -4,16 +4,15 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/document/document_head.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_text.hpp"
+#include "tools/cli/run_progress.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -22,70 +21,32 @@ namespace {
 volatile sig_atomic_t interrupts = 0;
 
 void on_interrupt(int) { interrupts = interrupts + 1; }
+void on_resize(int) {}
 
-void catch_interrupts() {
+void catch_signals() {
   struct sigaction action {};
   action.sa_handler = on_interrupt;  // no SA_RESTART: the wait for news is to end
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = on_resize;  // the line is drawn anew at once
+  sigaction(SIGWINCH, &action, nullptr);
 }
 
-// The estimate of what has arrived so far: the parameter that needs most yet, and when all will be known.
-std::string running_text(const Entries& progress) {
-  const auto sigma = entry(progress, "sigma", std::vector<double>());
-  const auto tolerance = entry(progress, "tolerance", std::vector<double>());
-  if (sigma.size() != sensor_parameters.size() || tolerance.size() != sigma.size()) {
-    return "no estimate";
-  }
-  std::size_t worst = 0;
-  for (std::size_t i = 1; i < sigma.size(); ++i) {
-    if (sigma[i] / tolerance[i] > sigma[worst] / tolerance[worst]) {
-      worst = i;
-    }
-  }
-  std::string text = fmt::format(
-      "{} of {} to tolerance, {} {:.3g} of {:.3g} {}", entry<std::int32_t>(progress, "tolerances_met", 0), sigma.size(),
-      sensor_parameters[worst].name, sigma[worst], tolerance[worst], sensor_parameters[worst].unit);
-  const double met_at = entry(progress, "met_at_s", -1.0);
-  if (met_at >= 0) {
-    text += fmt::format(", all at {:.0f}:{:02.0f}", std::floor(met_at / 60), std::fmod(met_at, 60));
-  }
-  return text;
-}
-
-// One line of progress: what is done now, and how far.
-std::string progress_text(const Entries& progress) {
-  std::string text = entry<std::string>(progress, "words", "");
-  const int position = entry<std::int32_t>(progress, "position", 0);
-  const auto pulled = entry<std::uint32_t>(progress, "pages_pulled", 0);
-  const auto expected = entry<std::uint32_t>(progress, "pages_expected", 0);
-  const std::string state = entry<std::string>(progress, "state", "");
-  if (state == "rotating") {
-    const double left = std::max(0.0, entry(progress, "finish_in_s", 0.0));
-    text += fmt::format(", position {} of {}, {:.0f}:{:02.0f} left", position,
-                        entry<std::int32_t>(progress, "positions", 0), std::floor(left / 60), std::fmod(left, 60));
-  }
-  if (state == "rotating" && entry(progress, "running", false)) {
-    text += ", " + running_text(progress);
-  }
-  if (state == "rotating" || state == "draining") {
-    text += fmt::format(", pages {}/{}", pulled, expected);
-  }
-  if (state == "estimating" && progress.contains("sigma")) {
-    const auto sigma = entry(progress, "sigma", std::vector<double>());
-    text += fmt::format(", pass {} {:.0f} %", entry<std::int32_t>(progress, "pass", 0),
-                        100 * entry(progress, "pass_fraction", 0.0));
-    if (sigma.size() == sensor_parameters.size()) {
-      text += fmt::format(
-          ", sigma: bias {:.3g} ug, drift {:.3g} deg/h, scale {:.3g} ppm",
-          *std::max_element(sigma.begin(), sigma.begin() + 3), *std::max_element(sigma.begin() + 3, sigma.begin() + 6),
-          *std::max_element(sigma.begin() + parameter::gyro_scale, sigma.begin() + parameter::gyro_scale + 3));
-    }
-  }
-  if (!entry(progress, "link_up", true)) {
-    text += ", LINK LOST";
-  }
-  return text;
+RunProgressView view_of(const Entries& progress) {
+  RunProgressView view;
+  view.words = entry<std::string>(progress, "words", "");
+  view.state = entry<std::string>(progress, "state", "");
+  view.link_up = entry(progress, "link_up", true);
+  view.left_s = entry(progress, "finish_in_s", -1.0);
+  view.position = entry<std::int32_t>(progress, "position", 0);
+  view.positions = entry<std::int32_t>(progress, "positions", 0);
+  view.pages_pulled = entry<std::uint32_t>(progress, "pages_pulled", 0);
+  view.pages_expected = entry<std::uint32_t>(progress, "pages_expected", 0);
+  view.pass = entry<std::int32_t>(progress, "pass", 0);
+  view.pass_fraction = entry(progress, "pass_fraction", 0.0);
+  view.sigma = entry(progress, "sigma", std::vector<double>());
+  view.tolerance = entry(progress, "tolerance", std::vector<double>());
+  return view;
 }
 
 struct Ending {
@@ -99,15 +60,17 @@ class Follower {
       : manager_(manager), ins_(std::move(ins)), watch_(manager.connection(), ins_) {
     watch_.on_progress = [this](std::uint64_t run, const Entries& progress) {
       if (run == run_) {
-        line_.show(fmt::format("run {}: {}", run, progress_text(progress)));
+        view_ = view_of(progress);
+        draw();
       }
     };
     watch_.on_warning = [this](std::uint64_t run, const std::string& text) {
       if (run != run_) {
         return;
       }
-      line_.show("");
+      line_.clear();
       fmt::print(stderr, "warning: {}\n", text);
+      draw();
     };
     watch_.on_finished = [this](std::uint64_t run, int exit_status, const std::string& reason) {
       if (run == run_ || run_ == 0) {
@@ -122,25 +85,28 @@ class Follower {
     auto looked = std::chrono::steady_clock::now();
     while (true) {
       if (const auto done = early_.find(run); done != early_.end()) {
+        line_.clear();
         return done->second;
       }
       if (interrupts != seen) {
         seen = interrupts;
-        line_.show("");
+        line_.clear();
         fmt::print(stderr, "stopping run {} safely\n", run);
         if (auto asked = manager_.abort(ins_, "interrupted"); !asked) {
-          fmt::print(stderr, "{}\n", asked.error().message);
+          fmt::print(stderr, "selfcal: {}\n", asked.error().message);
         }
       }
       if (auto news = wait_for_news(manager_.connection(), 500); !news) {
         return tl::unexpected(news.error());
       }
+      draw();
       // A daemon that was restarted has told nobody: look for oneself now and then.
       if (std::chrono::steady_clock::now() - looked < std::chrono::seconds(3)) {
         continue;
       }
       looked = std::chrono::steady_clock::now();
       if (auto ended = look(run)) {
+        line_.clear();
         return *ended;
       }
     }
@@ -163,31 +129,34 @@ class Follower {
     return Expected<Ending>(Ending{json.at("exit_status").get<int>(), json.at("reason").get<std::string>()});
   }
 
+  void draw() {
+    if (view_) {
+      line_.show(progress_line(run_, *view_, line_.room()));
+    }
+  }
+
   static constexpr int patience = 10;  // looks, 3 s apart: a restarted daemon is back by then
   ManagerClient& manager_;
   std::string ins_;
   InsWatch watch_;
   ProgressLine line_;
+  std::optional<RunProgressView> view_;  // the latest
   std::uint64_t run_ = 0;
   int misses_ = 0;
   std::map<std::uint64_t, Ending> early_;
 };
 
+// The last that is seen of a run: three sentences in six lines at most. What went wrong is also one line on standard
+// error, where that is not the same screen.
 Expected<int> report(ManagerClient& manager, std::uint64_t run, const Ending& ending, bool json) {
-  if (json) {
-    const auto document = manager.show(run);
-    if (!document) {
-      return tl::unexpected(document.error());
-    }
-    fmt::print("{}\n", *document);
-  } else if (ending.exit_status == 0) {
-    const auto document = manager.show(run);
-    if (!document) {
-      return tl::unexpected(document.error());
-    }
-    fmt::print("{}", run_text(*document, use_colour(stdout), false));
+  const auto document = manager.show(run);
+  if (!document) {
+    return tl::unexpected(document.error());
   }
-  if (ending.exit_status != 0) {
+  fmt::print("{}", json ? *document + "\n" : run_ending_text(*document, use_colour(stdout), text_columns(stdout)));
+  std::fflush(stdout);
+  const bool same_screen = !json && isatty(STDOUT_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
+  if (ending.exit_status != 0 && !same_screen) {
     fmt::print(stderr, "selfcal: run {}: {}\n", run, ending.reason);
   }
   return ending.exit_status;
@@ -207,7 +176,7 @@ Expected<int> run(const RunOptions& options) {
   if (!ins) {
     return tl::unexpected(ins.error());
   }
-  catch_interrupts();
+  catch_signals();
   Follower follower(**manager, *ins);
   Entries wanted;
   if (!options.schedule.empty()) {
@@ -278,7 +247,7 @@ Expected<int> amend(const AmendOptions& options) {
   if (!manager) {
     return tl::unexpected(manager.error());
   }
-  catch_interrupts();
+  catch_signals();
   Entries wanted;
   if (options.dry_run) {
     wanted["dry_run"] = true;
@@ -308,7 +277,7 @@ Expected<int> rollback(const RollbackOptions& options) {
   if (!manager) {
     return tl::unexpected(manager.error());
   }
-  catch_interrupts();
+  catch_signals();
   return follow_begun(**manager, (*manager)->rollback(options.serial, options.reason), options.json);
 }
 

@@ -2,33 +2,85 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "daemon/estimate/quantity_text.hpp"
+#include "daemon/estimate/summary.hpp"
+#include "tools/cli/finding_text.hpp"
 
 namespace selfcal::cli {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 std::string text_of(const json& object, const char* key) {
   const auto found = object.find(key);
   return found == object.end() || !found->is_string() ? std::string() : found->get<std::string>();
 }
 
+double number_of(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found == object.end() || !found->is_number() ? NAN : found->get<double>();
+}
+
 std::string paint(const std::string& text, const char* code, bool colour) {
   return colour ? fmt::format("\033[{}m{}\033[0m", code, text) : text;
 }
 
+// A document of an older daemon has no "usable": what was not determined was told by "determined".
+std::string mark_of(const json& parameter) {
+  if (parameter.contains("usable") && parameter.at("usable") == true) {
+    return "ok";
+  }
+  if (!parameter.at("determined").get<bool>()) {
+    return "not determined";
+  }
+  return parameter.contains("usable") ? "not usable" : "";
+}
+
 std::string parameter_lines(const json& result, bool colour) {
-  std::string text = fmt::format("{:<26}{:>14}{:>12}  {}\n", "parameter", "value", "sigma", "unit");
+  std::string text = fmt::format("{:<24}{:>13}{:>11}  {}\n", "parameter", "value", "sigma", "unit");
   for (const json& parameter : result.at("parameters")) {
-    const bool determined = parameter.at("determined").get<bool>();
-    text +=
-        fmt::format("{:<26}{:>14.5g}{:>12.3g}  {}{}\n", parameter.at("name").get<std::string>(),
-                    parameter.at("value").is_number() ? parameter.at("value").get<double>() : 0.0,
-                    parameter.at("sigma").is_number() ? parameter.at("sigma").get<double>() : 0.0,
-                    parameter.at("unit").get<std::string>(), determined ? "" : paint("  not determined", "33", colour));
+    const QuantityText figures = quantity_text(number_of(parameter, "value"), number_of(parameter, "sigma"));
+    const std::string mark = mark_of(parameter);
+    text += fmt::format("{:<24}{:>13}{:>11}  {:<7} {}\n", text_of(parameter, "name"), figures.value, figures.sigma,
+                        text_of(parameter, "unit"), paint(mark, mark == "ok" ? "32" : "33", colour));
   }
   return text;
+}
+
+diagnosis::Finding finding_of(const json& document) {
+  diagnosis::Finding finding;
+  finding.effect = text_of(document, "effect");
+  finding.equation = text_of(document, "equation");
+  finding.experiment = text_of(document, "experiment");
+  finding.significance = number_of(document, "significance");
+  for (const json& p : document.at("parameters")) {
+    finding.parameters.push_back(
+        {text_of(p, "name"), text_of(p, "unit"), number_of(p, "value"), number_of(p, "sigma")});
+  }
+  for (const json& rival : document.at("equivalent")) {
+    finding.equivalent.push_back(rival.get<std::string>());
+  }
+  return finding;
+}
+
+// What a diagnosis in the result names, before the 24 that follow from it.
+std::string physics_lines(const json& result, bool amended) {
+  const auto diagnosis = result.find("diagnosis");
+  if (diagnosis == result.end() || diagnosis->value("findings", json::array()).empty()) {
+    return {};
+  }
+  std::vector<diagnosis::Finding> findings;
+  for (const json& document : diagnosis->at("findings")) {
+    findings.push_back(finding_of(document));
+  }
+  std::string text = amended ? "fitted together with the 24:\n" : "left out of the model:\n";
+  for (const diagnosis::Finding& finding : findings) {
+    text += finding_text(finding);
+  }
+  return text + symbols_text(findings);
 }
 
 std::string csv_field(const std::string& text) {
@@ -42,50 +94,112 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
-}  // namespace
-
-std::string run_text(const std::string& document, bool colour, bool story) {
-  const json run = json::parse(document);
+std::string who_and_when(const json& run) {
   const bool ended = !run.at("exit_status").is_null();
-  const bool well = ended && run.at("exit_status") == 0;
-  std::string text = fmt::format("run {}: {} of INS {} ({}), by {}\n", run.at("run").get<int>(), text_of(run, "kind"),
-                                 text_of(run, "serial"), text_of(run, "ins"), text_of(run, "user"));
-  text +=
-      fmt::format("  {} to {}, schedule {}{}\n", text_of(run, "started_utc"), ended ? text_of(run, "ended_utc") : "now",
-                  text_of(run, "schedule"), run.at("dry_run").get<bool>() ? ", dry run" : "");
+  std::string text =
+      fmt::format("run {}: {} of INS {} ({}), by {}: {}\n", run.at("run").get<int>(), text_of(run, "kind"),
+                  text_of(run, "serial"), text_of(run, "ins"), text_of(run, "user"), text_of(run, "state"));
+  text += fmt::format("{} to {}", text_of(run, "started_utc"), ended ? text_of(run, "ended_utc") : "now");
+  if (!text_of(run, "schedule").empty()) {
+    text += ", schedule " + text_of(run, "schedule");
+  }
+  if (run.value("rolls_back", json()).is_number()) {
+    text += fmt::format(", rolls back run {}", run.at("rolls_back").get<int>());
+  }
+  if (run.value("amends", json()).is_number()) {
+    text += fmt::format(", of run {}'s recording", run.at("amends").get<int>());
+  }
+  return text + (run.at("dry_run").get<bool>() ? ", dry run\n" : "\n");
+}
+
+std::string facts(const json& run) {
+  std::string text;
   if (run.at("early_end_s").is_number()) {
-    text += fmt::format("  rotation ended early, after {:.0f} s: every tolerance was met\n",
+    text += fmt::format("rotation ended early, after {:.0f} s: every tolerance was met\n",
                         run.at("early_end_s").get<double>());
   }
-  text += "  " + paint(text_of(run, "state"), well ? "32" : ended ? "31" : "36", colour);
   if (!text_of(run, "reason").empty()) {
-    text += ": " + text_of(run, "reason");
+    text += fmt::format("ended: {}\n", text_of(run, "reason"));
   }
-  text += '\n';
   if (!text_of(run, "force_reason").empty()) {
-    text += fmt::format("  forced: {}\n", text_of(run, "force_reason"));
+    text +=
+        fmt::format("{}: {}\n", text_of(run, "kind") == "rollback" ? "reason" : "forced", text_of(run, "force_reason"));
   }
   if (!text_of(run, "recording").empty()) {
-    text += fmt::format("  recording {}\n", text_of(run, "recording"));
+    text += fmt::format("recording {}\n", text_of(run, "recording"));
   }
   if (run.at("drift_before_m").is_number() && run.at("drift_after_m").is_number()) {
-    text += fmt::format("  free-inertial drift: {:.1f} m before, {:.1f} m after\n",
-                        run.at("drift_before_m").get<double>(), run.at("drift_after_m").get<double>());
+    text += fmt::format("free-inertial drift: {:.1f} m before, {:.1f} m after\n", number_of(run, "drift_before_m"),
+                        number_of(run, "drift_after_m"));
   }
   const json& pushed = run.at("coefficients").at("pushed");
   if (pushed.is_object()) {
-    text += fmt::format("  coefficients version {} written and read back{}\n", pushed.at("version").get<int>(),
+    text += fmt::format("coefficients version {} written and read back{}\n", pushed.at("version").get<int>(),
                         run.at("coefficients").at("in_force").get<bool>() ? ", in force" : "");
   }
-  if (story) {
-    for (const json& event : run.at("events")) {
-      text += fmt::format("  {}  {:<9} {}\n", text_of(event, "utc"), text_of(event, "kind"), text_of(event, "text"));
-    }
+  return text;
+}
+
+std::string events(const json& run) {
+  std::string text;
+  for (const json& event : run.at("events")) {
+    text += fmt::format("{}  {:<9} {}\n", text_of(event, "utc"), text_of(event, "kind"), text_of(event, "text"));
   }
-  if (run.at("result").is_object()) {
-    text += parameter_lines(run.at("result"), colour);
+  return text.empty() ? text : "\n" + text;
+}
+
+// "rollback of run 2: drifts more", "calibration: not written: ...".
+std::string history_kind(const json& run) {
+  std::string text = text_of(run, "kind");
+  if (run.value("rolls_back", json()).is_number()) {
+    text += fmt::format(" of run {}", run.at("rolls_back").get<int>());
+  }
+  if (run.value("amends", json()).is_number()) {
+    text += fmt::format(" of run {}", run.at("amends").get<int>());
+  }
+  if (run.contains("in_force") && run.at("in_force").value("now", false)) {
+    text += ", in force";
+  }
+  const std::string why = text_of(run, "reason").empty() ? text_of(run, "force_reason") : text_of(run, "reason");
+  return text + (why.empty() ? "" : ": " + why);
+}
+
+std::string trend_text(const json& parameter) {
+  std::string text = fmt::format("\n{} [{}]", text_of(parameter, "name"), text_of(parameter, "unit"));
+  if (parameter.contains("change_per_year")) {
+    const double slope = number_of(parameter, "change_per_year");
+    text += fmt::format(", {}{} a year", slope > 0.0 ? "+" : "",
+                        with_sigma(slope, number_of(parameter, "change_per_year_sigma"), ""));
+  }
+  text += '\n';
+  for (const json& value : parameter.at("values")) {
+    const QuantityText figures = quantity_text(number_of(value, "value"), number_of(value, "sigma"));
+    text += fmt::format("  {}  run {:<5} {:>12} +- {}{}\n", text_of(value, "utc"), value.at("run").get<int>(),
+                        figures.value, figures.sigma, value.at("determined").get<bool>() ? "" : "  not determined");
+  }
+  for (const json& warning : parameter.at("warnings")) {
+    text += fmt::format("  warning: {}\n", warning.get<std::string>());
   }
   return text;
+}
+
+}  // namespace
+
+std::string run_ending_text(const std::string& document, bool colour, int columns) {
+  const json run = json::parse(document);
+  constexpr int most_lines_each = 2;  // three sentences: six lines in all
+  return summary_text(read_summary(run.at("summary")), colour, columns, columns > 0 ? most_lines_each : 1);
+}
+
+std::string run_text(const std::string& document, bool colour, int columns) {
+  const json run = json::parse(document);
+  const std::string summary = summary_text(read_summary(run.at("summary")), colour, columns);
+  std::string text = summary + "\n" + who_and_when(run) + facts(run);
+  if (run.at("result").is_object()) {
+    const json& result = run.at("result");
+    text += "\n" + physics_lines(result, run.value("amends", json()).is_number()) + parameter_lines(result, colour);
+  }
+  return text + events(run) + (columns > 0 ? "\n" + summary : "");
 }
 
 std::string history_text(const std::string& document) {
@@ -93,28 +207,11 @@ std::string history_text(const std::string& document) {
   std::string text;
   for (const json& run : history.at("runs")) {
     text +=
-        fmt::format("run {:<5} {}  {:<10} {:<10} {:<10} {}{}\n", run.at("run").get<int>(), text_of(run, "started_utc"),
-                    text_of(run, "serial"), text_of(run, "state"), text_of(run, "user"), text_of(run, "kind"),
-                    text_of(run, "reason").empty() ? "" : ": " + text_of(run, "reason"));
+        fmt::format("run {:<5} {}  {:<10} {:<10} {:<10} {}\n", run.at("run").get<int>(), text_of(run, "started_utc"),
+                    text_of(run, "serial"), text_of(run, "state"), text_of(run, "user"), history_kind(run));
   }
   for (const json& parameter : history.at("parameters")) {
-    if (parameter.at("values").empty()) {
-      continue;
-    }
-    text += fmt::format("\n{} [{}]", text_of(parameter, "name"), text_of(parameter, "unit"));
-    if (parameter.contains("change_per_year")) {
-      text += fmt::format(", {:+.3g} +- {:.2g} a year", parameter.at("change_per_year").get<double>(),
-                          parameter.at("change_per_year_sigma").get<double>());
-    }
-    text += '\n';
-    for (const json& value : parameter.at("values")) {
-      text += fmt::format("  {}  run {:<5} {:>12.5g} +- {:.3g}{}\n", text_of(value, "utc"), value.at("run").get<int>(),
-                          value.at("value").get<double>(), value.at("sigma").get<double>(),
-                          value.at("determined").get<bool>() ? "" : "  not determined");
-    }
-    for (const json& warning : parameter.at("warnings")) {
-      text += fmt::format("  warning: {}\n", warning.get<std::string>());
-    }
+    text += parameter.at("values").empty() ? "" : trend_text(parameter);
   }
   return text.empty() ? "no runs\n" : text;
 }

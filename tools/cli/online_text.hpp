@@ -5,8 +5,11 @@
 
 namespace selfcal::cli {
 
-// A run: how it ended, its 24 parameters, drift before and after; with `story` its events too.
-std::string run_text(const std::string& document, bool colour, bool story);
+// A run in six lines at most, for the end of the command that followed it.
+std::string run_ending_text(const std::string& document, bool colour, int columns);
+// A run: its summary, who and when, what was named, its 24 parameters, drift before and after, its events; the summary
+// again at the end where the text goes to a terminal (`columns` > 0), for there the beginning has scrolled away.
+std::string run_text(const std::string& document, bool colour, int columns);
 // All runs of a serial number, then each parameter over the years.
 std::string history_text(const std::string& document);
 std::string history_csv(const std::string& document);

@@ -10,6 +10,7 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
+#include "daemon/estimate/judged_result.hpp"
 #include "daemon/host/wall_clock.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"
@@ -57,7 +58,9 @@ Expected<CalibrationOptions> options_from(const ReportArguments& arguments) {
   });
 }
 
-Expected<Json> diagnosis_document(const Recording& recording, const std::string& name, double false_alarm_rate) {
+// Adds the diagnosis, and to the summary the cause that it names.
+Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recording& recording,
+                             const std::string& name, double false_alarm_rate) {
   std::vector<double> first_temperature;
   const ImuData data = imu_view(recording, first_temperature);
   diagnosis::DiagnosisOptions options;
@@ -72,7 +75,9 @@ Expected<Json> diagnosis_document(const Recording& recording, const std::string&
   if (outcome.diagnosis->faults.empty()) {
     document["map"] = report::misfit_map(data, *outcome.diagnosis);
   }
-  return document;
+  page["diagnosis"] = std::move(document);
+  page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*outcome.diagnosis));
+  return {};
 }
 
 Expected<Json> recording_document(const std::string& file, const ReportArguments& arguments) {
@@ -84,17 +89,16 @@ Expected<Json> recording_document(const std::string& file, const ReportArguments
   if (!loaded) {
     return tl::unexpected(loaded.error());
   }
-  const Expected<CalibrationResult> result = calibrate_recording(loaded->recording, *options);
-  if (!result) {
-    return fail(result.error().kind, fmt::format("{}: {}", file, result.error().message));
+  const Expected<JudgedResult> judged = judged_calibration(loaded->recording, *options, {}, {file, 0}, false);
+  if (!judged) {
+    return fail(judged.error().kind, fmt::format("{}: {}", file, judged.error().message));
   }
-  Json document = report::calibration_document(*result, *options, loaded->recording, loaded->warnings);
+  Json document = report::calibration_document(*judged, *options, loaded->recording, loaded->warnings);
   if (!arguments.no_diagnosis) {
-    Expected<Json> diagnosed = diagnosis_document(loaded->recording, file, arguments.false_alarm_rate);
-    if (!diagnosed) {
-      return diagnosed;
+    const auto added = add_diagnosis(document, *judged, loaded->recording, file, arguments.false_alarm_rate);
+    if (!added) {
+      return tl::unexpected(added.error());
     }
-    document["diagnosis"] = std::move(*diagnosed);
   }
   return sha256_of_file(file).map([&](const std::string& hash) {
     document["input"] = {{"name", std::filesystem::path(file).filename().string()}, {"sha256", hash}};

@@ -9,7 +9,11 @@ namespace selfcal::cli {
 // A terminal, and NO_COLOR (no-color.org) unset or empty.
 bool use_colour(std::FILE* stream);
 
-// One line on standard error that is written over and wiped at the end; silent where that is no terminal.
+// Columns of a terminal; 0 where `stream` is none: text is not broken then.
+int text_columns(std::FILE* stream);
+
+// One line on standard error that is written over and wiped at the end; silent where that is no terminal. It is cut to
+// the width that the terminal has at that time, so that it never takes a second row.
 class ProgressLine {
  public:
   ProgressLine();
@@ -18,11 +22,15 @@ class ProgressLine {
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   bool visible() const { return visible_; }
+  // Characters that a line may have now.
+  int room() const;
   void show(const std::string& text);
+  // Wipes it, so that a line of another kind may follow; the next show() draws it again.
+  void clear();
 
  private:
   bool visible_;
-  bool shown_ = false;
+  int shown_ = 0;  // characters on the screen
 };
 
 }  // namespace selfcal::cli

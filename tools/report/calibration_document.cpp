@@ -71,14 +71,14 @@ Json innovations_json(const CalibrationResult& result, const Recording& recordin
 
 }  // namespace
 
-nlohmann::ordered_json calibration_document(const CalibrationResult& result, const CalibrationOptions& options,
+nlohmann::ordered_json calibration_document(const JudgedResult& judged, const CalibrationOptions& options,
                                             const Recording& recording, const std::vector<std::string>& warnings) {
-  Json document = result_json(result, options, recording, warnings, true);
+  Json document = result_json(judged, options, recording, warnings, true);
   document["kind"] = "calibration";
   round_curves(document);
   document["gimbal"] = gimbal_json(recording);
   document["allan"] = noise_document(recording);
-  document["innovations"] = innovations_json(result, recording);
+  document["innovations"] = innovations_json(judged.result, recording);
   return document;
 }
 

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "estimator/passes/calibration.hpp"
+#include "daemon/estimate/judged_result.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace selfcal::report {
 
 // result_json() with its curves, and what the plots need besides: gimbal angles over time, Allan deviations.
-nlohmann::ordered_json calibration_document(const CalibrationResult& result, const CalibrationOptions& options,
+nlohmann::ordered_json calibration_document(const JudgedResult& judged, const CalibrationOptions& options,
                                             const Recording& recording, const std::vector<std::string>& warnings);
 
 }  // namespace selfcal::report

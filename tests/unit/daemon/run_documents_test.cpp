@@ -82,11 +82,24 @@ TEST_F(RunDocumentsTest, WhatWasNotSentIsNotCalledPushed) {
   EXPECT_EQ(sets.at("in_force"), false);
 }
 
+// Nothing is said of a year after 72 s.
+TEST_F(RunDocumentsTest, ValuesOfAFewSecondsHaveNoChangePerYear) {
+  completed("2026-01-01T00:00:00Z", 10);
+  completed("2026-01-01T00:00:36Z", 11);
+  completed("2026-01-01T00:01:12Z", 10);
+  const json first = history({}).at("parameters").at(0);
+  EXPECT_EQ(first.at("values").size(), 3U);
+  EXPECT_FALSE(first.contains("change_per_year")) << first;
+  EXPECT_FALSE(first.contains("change_per_year_sigma")) << first;
+}
+
 TEST_F(RunDocumentsTest, HistoryWarnsOfADepartureAndOfALimitAhead) {
   completed("2023-01-01T00:00:00Z", 10);
   completed("2024-01-01T00:00:00Z", 20);
   completed("2025-01-01T00:00:00Z", 30);
   EXPECT_TRUE(history({}).at("parameters").at(0).at("warnings").empty());
+
+  EXPECT_NEAR(history({}).at("parameters").at(0).at("change_per_year").get<double>(), 10.0, 0.01);
 
   // 10 ug a year from 30 ug: 100 ug in seven years.
   Limits limits;

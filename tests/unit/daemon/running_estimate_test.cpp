@@ -130,6 +130,22 @@ TEST_F(RunningEstimateTest, TheForecastIsKept) {
   EXPECT_TRUE((later->sigma.array() <= later->tolerance.array()).all());
 }
 
+// "every tolerance was met", then "this schedule will not determine gyro_drift_y": a tolerance that is met, but not by
+// the margin of the early end, with nothing more to come that would shrink it.
+TEST_F(RunningEstimateTest, WhatIsWithinItsToleranceIsNeverOutOfReach) {
+  const double data_s = schedule_.duration_s() - 45.0;
+  const auto first = RunningEstimator(request_).estimate(pages_at(data_s), {});
+  ASSERT_TRUE(first) << first.error().message;
+  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
+    request_.config.tolerance[i] =
+        1.001 * first->sigma(static_cast<Eigen::Index>(i)) / sensor_parameters[i].si_per_unit;
+  }
+  const auto answer = RunningEstimator(request_).estimate(pages_at(data_s), {});
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_FALSE(answer->met);
+  EXPECT_THAT(answer->forecast.out_of_reach, testing::IsEmpty());
+}
+
 TEST_F(RunningEstimateTest, WhatTheScheduleCannotGiveIsNamed) {
   const auto gyro_scale_y = static_cast<std::size_t>(parameter::gyro_scale + 1);
   request_.config.tolerance[gyro_scale_y] = 1e-3;  // ppm: a thousandth of what such gyros allow in this time

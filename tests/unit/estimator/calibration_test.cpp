@@ -6,6 +6,7 @@
 #include <random>
 
 #include "daemon/estimate/calibrate_recording.hpp"
+#include "daemon/estimate/gate.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tests/unit/estimator/simulated.hpp"
 
@@ -136,8 +137,8 @@ TEST_F(Consistent, NotWithAThirdOfTheNoise) {
   const CalibrationResult result = calibrated(*recording, options);
   EXPECT_EQ(result.consistency.verdict, Verdict::inconsistent) << result.consistency.words;
   EXPECT_NEAR(result.consistency.nis_mean, 9.0, 1.0);
-  EXPECT_FALSE(acceptable(result));
-  EXPECT_THAT(objections(result, options), Contains(HasSubstr("recording and model disagree")));
+  EXPECT_FALSE(judge(result, default_tolerance(), {}).acceptable());
+  EXPECT_THAT(judge(result, options.tolerance, {}).words(), Contains(HasSubstr("recording and model disagree")));
 }
 
 // Sigmas larger than they need be are no danger, but are said: NIS a ninth, and for a position to 1 cm far less.
@@ -160,7 +161,7 @@ TEST_F(Consistent, NotBeforeThePassesStandStill) {
   options.convergence_sigma = 1e-12;  // below rounding: never met
   const CalibrationResult result = calibrated(*recording, options);
   EXPECT_EQ(result.consistency.verdict, Verdict::not_converged);
-  EXPECT_FALSE(acceptable(result));
+  EXPECT_FALSE(judge(result, default_tolerance(), {}).acceptable());
 }
 
 // Physics that the 24 do not have: half a milli-g that relaxes in a minute after each turn, a hundred times the noise
@@ -170,7 +171,7 @@ TEST(Consistency, SeesWhatTheModelLeavesOut) {
   physics.effects.push_back({"accel_relaxation", {0.0, 0.0, 500.0 * units::micro_g, 60.0}});  // x y z, tau
   const CalibrationResult result = calibrated(record({}, 31, physics));
   EXPECT_EQ(result.consistency.verdict, Verdict::inconsistent) << result.consistency.words;
-  EXPECT_FALSE(acceptable(result));
+  EXPECT_FALSE(judge(result, default_tolerance(), {}).acceptable());
 }
 
 // A gyro with 3 deg/h is broken, not calibrated: found, within its sigma, and not to be pushed.
@@ -182,8 +183,8 @@ TEST(Consistency, ImpossibleParameterIsNotPushed) {
               4.0 * result.sigma(parameter::gyro_drift));
   EXPECT_FALSE(result.plausible[parameter::gyro_drift]);
   EXPECT_TRUE(result.plausible[parameter::gyro_drift + 1]);
-  EXPECT_FALSE(acceptable(result));
-  EXPECT_THAT(objections(result, {}), Contains(HasSubstr("gyro_drift_x = ")));
+  EXPECT_FALSE(judge(result, default_tolerance(), {}).acceptable());
+  EXPECT_THAT(judge(result, default_tolerance(), {}).words(), Contains(HasSubstr("gyro_drift_x = ")));
 }
 
 }  // namespace

@@ -36,9 +36,10 @@ void write(lcm::LogFile& log, const std::string& channel, const Message& message
 
 selfcal_lcm::ins_status status_at(int position) {
   selfcal_lcm::ins_status m{};
-  m.schema = 1;
+  m.schema = 2;
   m.ins = "bench";
   m.serial = "SN-0042";
+  m.verdict = position < positions ? "" : "Not written: 12 of the 24 parameters are not determined to tolerance.";
   m.state = position < positions ? "rotating" : "completed";
   m.run = 7;
   m.link_up = 1;

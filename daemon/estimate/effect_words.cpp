@@ -1,0 +1,121 @@
+#include "daemon/estimate/effect_words.hpp"
+
+#include <array>
+#include <cctype>
+#include <utility>
+
+namespace selfcal {
+namespace {
+
+using Words = std::pair<std::string_view, std::string_view>;
+
+constexpr std::array effects = {
+    Words{"gyro_g_sensitivity", "gyro drift proportional to specific force (g-sensitivity)"},
+    Words{"gyro_magnetic_sensitivity", "gyro drift proportional to the magnetic field"},
+    Words{"gyro_scale_asymmetry", "gyro scale factor that differs between the two senses of turning"},
+    Words{"gyro_scale_nonlinearity", "gyro scale factor that depends on the rate"},
+    Words{"gyro_temperature", "gyro drift that follows temperature"},
+    Words{"accel_temperature", "accelerometer bias that follows temperature"},
+    Words{"gyro_drift_ramp", "gyro drift that changes steadily with time"},
+    Words{"accel_bias_ramp", "accelerometer bias that changes steadily with time"},
+    Words{"gyro_scale_temperature", "gyro scale factor that follows temperature"},
+    Words{"accel_scale_temperature", "accelerometer scale factor that follows temperature"},
+    Words{"gyro_dead_zone", "dead zone (lock-in) of the gyros at low rate"},
+    Words{"accel_quadratic", "accelerometer error quadratic in its input"},
+    Words{"accel_cubic", "accelerometer error cubic in its input"},
+    Words{"accel_cross_coupling", "accelerometer error from products of two axes (cross-coupling)"},
+    Words{"accel_relaxation", "creep of the accelerometers after each turn"},
+    Words{"accel_size_effect", "accelerometers that do not sit at one point (size effect)"},
+    Words{"imu_lever_arm", "IMU centre that is off the gimbal's centre (lever arm)"},
+    Words{"accel_gyro_time_offset", "accelerometers sampled at another time than the gyros"},
+    Words{"triad_flexure", "accelerometer triad that bends under gravity"},
+    Words{"base_sway", "sway of the base"},
+    Words{"base_settling", "base that settles during the recording"},
+    Words{"gyro_noise_level", "gyro noise (ARW) of another size than assumed"},
+    Words{"accel_noise_level", "accelerometer noise (VRW) of another size than assumed"},
+    Words{"gyro_random_walk", "random walk of the gyro drift (rate random walk)"},
+    Words{"accel_random_walk", "random walk of the accelerometer bias"},
+    Words{"quantisation", "coarser quantisation than assumed"},
+    Words{"vibration_line", "vibration at a single frequency"},
+    Words{"wrong_site", "latitude of the site that is not the true one"},
+};
+
+constexpr std::array symbols = {
+    Words{"df", "what the accelerometers put out too much"},
+    Words{"df_i", "what accelerometer i puts out too much"},
+    Words{"dw", "what the gyros put out too much"},
+    Words{"dw_i", "what gyro i puts out too much"},
+    Words{"d", "displacement of the base"},
+    Words{"f", "specific force"},
+    Words{"f_i", "specific force along axis i"},
+    Words{"u", "specific force over g"},
+    Words{"u_i", "specific force along axis i, over g"},
+    Words{"u_j", "specific force along axis j, over g"},
+    Words{"u_k", "specific force along axis k, over g"},
+    Words{"w", "angular rate"},
+    Words{"w_i", "angular rate about axis i"},
+    Words{"B_j", "magnetic field along axis j"},
+    Words{"T", "temperature"},
+    Words{"t", "time since the start of the recording"},
+    Words{"s", "time since the end of the last turn"},
+    Words{"tau", "time constant, fitted"},
+    Words{"w0", "width of the zone, fitted"},
+    Words{"r", "offset from the gimbal's centre, fitted"},
+    Words{"a_i", "coefficient of axis i, fitted"},
+    Words{"b_i", "coefficient of axis i, fitted"},
+    Words{"c_i", "coefficient of axis i, fitted"},
+    Words{"k_i", "coefficient of axis i, fitted"},
+    Words{"r_i", "fitted for axis i"},
+    Words{"a", "amplitudes, fitted"},
+    Words{"b", "amplitudes, fitted"},
+    Words{"k", "coefficient, fitted"},
+    Words{"G_ij", "coefficient of axis i for axis j, fitted"},
+    Words{"M_ij", "coefficient of axis i for axis j, fitted"},
+    Words{"K", "matrix of coefficients, fitted"},
+};
+
+template <std::size_t N>
+std::string_view look_up(const std::array<Words, N>& table, std::string_view key) {
+  for (const auto& [name, words] : table) {
+    if (name == key) {
+      return words;
+    }
+  }
+  return {};
+}
+
+bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+}  // namespace
+
+std::string effect_words(std::string_view id) {
+  const std::string_view words = look_up(effects, id);
+  return std::string(words.empty() ? id : words);
+}
+
+std::vector<Symbol> symbols_of(std::string_view equation) {
+  std::vector<Symbol> found;
+  for (std::size_t at = 0; at < equation.size();) {
+    std::size_t end = at;
+    while (end < equation.size() && in_name(equation[end])) {
+      ++end;
+    }
+    const std::string_view name = equation.substr(at, end - at);
+    // The one letter with two meanings: base_sway's frequency.
+    const bool frequency = name == "f" && equation.starts_with("d = ");
+    const std::string_view meaning = name.empty() ? std::string_view()
+                                     : frequency  ? std::string_view("frequency, fitted")
+                                                  : look_up(symbols, name);
+    bool known = false;
+    for (const Symbol& symbol : found) {
+      known = known || symbol.name == name;
+    }
+    if (!meaning.empty() && !known) {
+      found.push_back({std::string(name), std::string(meaning)});
+    }
+    at = end == at ? at + 1 : end;
+  }
+  return found;
+}
+
+}  // namespace selfcal

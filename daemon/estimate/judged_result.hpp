@@ -1,0 +1,40 @@
+// A calibration with everything that is said of it: the gate's answer, the cause of an inconsistency, the summary.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "daemon/estimate/gate.hpp"
+#include "daemon/estimate/summary.hpp"
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/passes/calibration.hpp"
+#include "protocol/error.hpp"
+#include "protocol/recording/recording.hpp"
+
+namespace selfcal {
+
+struct JudgedResult {
+  CalibrationResult result;
+  std::optional<diagnosis::Diagnosis> diagnosis;  // of the same recording, where one was made
+  Gate gate;
+  Summary summary;
+};
+
+// Judges what has been calibrated already.
+JudgedResult judged(CalibrationResult result, const ParameterVector& tolerance, const Limits& limits,
+                    const Subject& subject, std::optional<diagnosis::Diagnosis> diagnosis = std::nullopt);
+
+struct JudgedProgress {
+  std::function<void(const CalibrationProgress&)> calibration;
+  std::function<void(const std::string& step)> diagnosis;
+};
+
+// calibrate_recording, then, where recording and model disagree and `find_cause` is set, the diagnosis of the same
+// recording: some seconds more. A diagnosis that cannot be made leaves the cause open; it is no error.
+Expected<JudgedResult> judged_calibration(const Recording& recording, const CalibrationOptions& options,
+                                          const Limits& limits, const Subject& subject, bool find_cause,
+                                          const JudgedProgress& progress = {}, const std::stop_token& stop = {});
+
+}  // namespace selfcal

@@ -1,0 +1,377 @@
+#include "daemon/estimate/summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "daemon/estimate/effect_words.hpp"
+#include "daemon/estimate/quantity_text.hpp"
+#include "daemon/estimate/showing_schedule.hpp"
+
+namespace selfcal {
+namespace {
+
+using diagnosis::Diagnosis;
+using diagnosis::DiagnosisVerdict;
+using diagnosis::Finding;
+
+constexpr double significant = 3.0;  // sigma, of a coefficient that is worth a sentence
+
+std::string nis_text(const Consistency& c) {
+  return fmt::format("NIS {:.3g} where {:.3g} to {:.3g} is expected, innovations {}", c.nis_mean, c.nis_low, c.nis_high,
+                     whiteness_text(std::log(c.whiteness_p_value)));
+}
+
+// A file name as a shell takes it.
+std::string quoted(const std::string& file) {
+  const bool plain = file.find_first_not_of(
+                         "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                         "_-./+=:,@%") == std::string::npos;
+  if (plain && !file.empty()) {
+    return file;
+  }
+  std::string text = "'";
+  for (const char c : file) {
+    text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  }
+  return text + "'";
+}
+
+std::string command(const char* verb, const Subject& subject, const std::string& more = {}) {
+  const std::string about = subject.recording.empty() ? fmt::format("{}", subject.run) : quoted(subject.recording);
+  return fmt::format("selfcal {} {}{}{}", verb, about, more.empty() ? "" : " ", more);
+}
+
+// The coefficient that shows the effect best, with its constant where there is one.
+std::string figures_of(const Finding& finding) {
+  const auto strength = [](const diagnosis::FindingParameter& p) {
+    return p.sigma > 0.0 && std::isfinite(p.sigma) ? std::abs(p.value) / p.sigma : 0.0;
+  };
+  std::string text;
+  const diagnosis::FindingParameter* strongest = nullptr;
+  for (const diagnosis::FindingParameter& p : finding.parameters) {
+    const bool constant = p.name == "tau" || p.name == "frequency" || p.name == "w0";
+    if (constant && finding.parameters.size() > 1) {
+      continue;
+    }
+    if (strongest == nullptr || strength(p) > strength(*strongest)) {
+      strongest = &p;
+    }
+  }
+  if (strongest != nullptr) {
+    text = fmt::format("{} {}", strongest->name, with_sigma(strongest->value, strongest->sigma, strongest->unit));
+  }
+  return text;
+}
+
+std::string figures_with_significance(const Finding& finding) {
+  const std::string figures = figures_of(finding);
+  return fmt::format("{}{}{:.0f} sigma", figures, figures.empty() ? "" : ", ", finding.significance);
+}
+
+// The parameter that the omission moves most, in its sigma; empty where none moves by three.
+std::string largest_correction(const Diagnosis& d) {
+  int at = -1;
+  double largest = significant;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    const double moved = std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k);
+    if (moved > largest) {
+      largest = moved;
+      at = k;
+    }
+  }
+  if (at < 0) {
+    return {};
+  }
+  const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(at)];
+  const QuantityText with = quantity_text(d.value(at) / p.si_per_unit, d.sigma(at) / p.si_per_unit);
+  const QuantityText without = quantity_text(d.calibration.value(at) / p.si_per_unit, d.sigma(at) / p.si_per_unit);
+  return fmt::format("{} is {} {}, not {}", p.name, with.value, p.unit, without.value);
+}
+
+std::string named(const Diagnosis& d) {
+  std::string text;
+  const std::size_t most = 2;
+  for (std::size_t i = 0; i < std::min(most, d.findings.size()); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : "; and ", effect_words(d.findings[i].effect));
+  }
+  if (d.findings.size() > most) {
+    text += fmt::format("; and {} more", d.findings.size() - most);
+  }
+  return text;
+}
+
+// What shows it: the strongest coefficient, what the fit makes of the misfit, and what it does to the 24.
+std::string named_cause(const Diagnosis& d) {
+  std::string text;
+  if (!d.findings.empty()) {
+    const Finding& first = d.findings.front();
+    text = fmt::format("{}: {}; NIS {:.3g} becomes {:.3g}", first.effect, figures_with_significance(first),
+                       d.before.nis, d.after.nis);
+  }
+  const std::string moved = largest_correction(d);
+  return text + (moved.empty() ? "." : fmt::format("; {}.", moved));
+}
+
+std::string unexplained_cause(const Diagnosis& d) {
+  std::string text;
+  // The mean over all hides what few places hold.
+  const bool hidden = std::abs(d.after.nis - 1.0) < 0.1;
+  if (!d.remaining.empty()) {
+    text = hidden ? fmt::format("NIS {:.3g} is as expected over all, but ", d.after.nis) : std::string();
+    text += fmt::format("{:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
+  } else if (d.after.log_p_white < std::log(1e-3)) {
+    text = fmt::format("what remains is {}", whiteness_text(d.after.log_p_white));
+  } else {
+    text = fmt::format("NIS {:.3g}", d.after.nis);
+  }
+  if (!d.rejected.empty()) {
+    const Finding& best = d.rejected.front();
+    text +=
+        fmt::format("; the best of the catalogue, {} ({}), leaves it", best.effect, figures_with_significance(best));
+  }
+  return text + ".";
+}
+
+std::string fault_cause(const Diagnosis& d) {
+  return d.faults.empty() ? std::string() : fmt::format("{}: {}.", d.faults.front().id, d.faults.front().words);
+}
+
+// A schedule where one would do, else what else it takes.
+std::string next_for_suspects(const Diagnosis& d, const Subject& subject) {
+  if (d.suspected.empty()) {
+    return {};
+  }
+  const std::string& experiment = d.suspected.front().experiment;
+  return showing_schedule(experiment, {}) ? command("diagnose", subject, "--split-schedule next.toml")
+                                          : fmt::format("Record again with {}.", experiment);
+}
+
+std::size_t count(const Gate& gate, ObjectionKind kind) {
+  return static_cast<std::size_t>(std::count_if(gate.objections.begin(), gate.objections.end(),
+                                                [&](const Objection& o) { return o.kind == kind; }));
+}
+
+std::string and_more(const Gate& gate) {
+  const std::size_t same = count(gate, gate.objections.front().kind);
+  const std::string& first = gate.objections.front().words;
+  return same > 1 ? fmt::format("{}, and {} more.", first, same - 1) : first + ".";
+}
+
+// Recording and model agree, but some of the 24 may not be used.
+Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate, const Subject& subject) {
+  const Objection& first = gate.objections.front();
+  Summary s{Standing::bad, {}, and_more(gate), {}};
+  const std::size_t same = count(gate, first.kind);
+  const std::string those = same == 1 ? "1 of the 24 parameters is" : fmt::format("{} of the 24 parameters are", same);
+  switch (first.kind) {
+    case ObjectionKind::implausible:
+      s.verdict = those + " outside what such sensors can have; the set must not be used.";
+      s.next = command("diagnose", subject);
+      return s;
+    case ObjectionKind::beyond_limit:
+      s.verdict = those + " beyond the operator's limit; the set is not written without a reason.";
+      s.next = subject.run > 0 ? fmt::format(
+                                     "Check the unit, or correct `limit` in the configuration; then `selfcal "
+                                     "run --force REASON` writes such a set.")
+                               : "Check the unit, or correct the limit.";
+      return s;
+    default: break;
+  }
+  s.verdict = those + " not determined to tolerance; the others may be used.";
+  s.next = result.undetermined.empty() || result.undetermined.front().supply.empty()
+               ? std::string("selfcal plan --optimize")
+               : fmt::format(
+                     "Add to the schedule: {:.0f}/{:.0f} then {:.0f}/{:.0f} deg (outer/inner); `selfcal plan "
+                     "--optimize` looks for a whole one.",
+                     result.undetermined.front().supply.front().from.outer_deg,
+                     result.undetermined.front().supply.front().from.inner_deg,
+                     result.undetermined.front().supply.front().to.outer_deg,
+                     result.undetermined.front().supply.front().to.inner_deg);
+  return s;
+}
+
+Summary summary_of_inconsistency(const CalibrationResult& result, const Subject& subject, const Diagnosis* d) {
+  Summary s{Standing::bad, {}, {}, {}};
+  if (d != nullptr && d->verdict == DiagnosisVerdict::data_fault) {
+    s.verdict = "The recording is faulty, so none of the 24 values may be used.";
+    s.cause = fault_cause(*d);
+    s.next = "Mend the fault and record again.";
+  } else if (d != nullptr && d->verdict == DiagnosisVerdict::named) {
+    s.verdict = fmt::format("These 24 values are biased by what the model leaves out: {}.", named(*d));
+    s.cause = named_cause(*d);
+    s.next = subject.run > 0 ? fmt::format("selfcal amend {}", subject.run) : command("diagnose", subject);
+  } else if (d != nullptr && d->unexplained) {
+    s.verdict = "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.";
+    s.cause = unexplained_cause(*d);
+    s.next = command("diagnose", subject);
+  } else {
+    s.verdict = "Recording and model disagree: do not use these 24 values, their sigma is too small.";
+    s.cause = nis_text(result.consistency) + ".";
+    s.next = command("diagnose", subject);
+  }
+  return s;
+}
+
+Summary acceptable_summary(const CalibrationResult& result, const Subject& subject) {
+  Summary s{Standing::good, "All 24 parameters are determined to tolerance, and recording and model agree.", {}, {}};
+  s.cause = nis_text(result.consistency) + ".";
+  s.next = command("report", subject, "-o report.html");
+  return s;
+}
+
+constexpr const char* red = "31";
+constexpr const char* green = "32";
+constexpr const char* yellow = "33";
+
+// Breaks at spaces; a word that is longer than the line keeps a line of its own.
+std::vector<std::string> broken(const std::string& text, int columns) {
+  std::vector<std::string> lines;
+  std::string line;
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    const std::string word = text.substr(at, end - at);
+    at = end + 1;
+    if (!line.empty() && columns > 0 && static_cast<int>(line.size() + 1 + word.size()) > columns) {
+      lines.push_back(line);
+      line.clear();
+    }
+    line += (line.empty() ? "" : " ") + word;
+  }
+  lines.push_back(line);
+  return lines;
+}
+
+std::string paragraph(const char* head, const std::string& text, const char* shade, int columns, int most_lines) {
+  constexpr int indent = 9;
+  constexpr int narrowest = 16;
+  if (text.empty()) {
+    return {};
+  }
+  std::vector<std::string> lines = broken(text, columns > 0 ? std::max(narrowest, columns - indent) : 0);
+  if (most_lines > 0 && static_cast<int>(lines.size()) > most_lines) {
+    lines.resize(static_cast<std::size_t>(most_lines));
+    std::string& last = lines.back();
+    const auto room = static_cast<std::size_t>(std::max(narrowest, columns - indent) - 4);
+    last = last.substr(0, last.size() > room ? last.rfind(' ', room) : last.size()) + " ...";
+  }
+  std::string out;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string shown = shade == nullptr ? lines[i] : fmt::format("\033[{}m{}\033[0m", shade, lines[i]);
+    out += fmt::format("{:<{}}{}\n", i == 0 ? head : "", indent, shown);
+  }
+  return out;
+}
+
+}  // namespace
+
+Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subject& subject, const Diagnosis* d) {
+  if (gate.acceptable()) {
+    return acceptable_summary(result, subject);
+  }
+  switch (gate.objections.front().kind) {
+    case ObjectionKind::data_fault:
+    case ObjectionKind::unexplained:
+    case ObjectionKind::inconsistent: return summary_of_inconsistency(result, subject, d);
+    case ObjectionKind::not_converged:
+      return {Standing::bad, "The passes did not settle: none of the 24 values may be used.",
+              gate.objections.front().words + ".", command("diagnose", subject)};
+    default: return summary_of_parameters(result, gate, subject);
+  }
+}
+
+Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, const Subject& subject,
+                           const Diagnosis& d) {
+  if (gate.acceptable()) {
+    return {Standing::good,
+            fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d)),
+            named_cause(d), command("report", subject, "-o report.html")};
+  }
+  switch (gate.objections.front().kind) {
+    case ObjectionKind::nothing_to_amend:
+      return {Standing::bad, "Nothing to amend: no equation was named in the recording.",
+              summary_of(d, subject).verdict, command("diagnose", subject)};
+    case ObjectionKind::data_fault:
+    case ObjectionKind::unexplained:
+    case ObjectionKind::inconsistent:
+      return summary_of_inconsistency(result, {subject.recording, 0}, &d);  // amending again would not help
+    default: return summary_of(result, gate, subject, &d);
+  }
+}
+
+Summary summary_of(const Diagnosis& d, const Subject& subject) {
+  switch (d.verdict) {
+    case DiagnosisVerdict::adequate:
+      return {Standing::good,
+              "Recording and model agree: nothing that this recording can show was left out.",
+              fmt::format("NIS {:.3g}, largest misfit {:.1f} sigma, innovations {}.", d.before.nis,
+                          d.before.largest_sigma, whiteness_text(d.before.log_p_white)),
+              {}};
+    case DiagnosisVerdict::named: {
+      const bool several = !d.findings.empty() && !d.findings.front().equivalent.empty();
+      return {Standing::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
+              several           ? command("diagnose", subject, "--split-schedule split.toml")
+              : subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
+                                : command("diagnose", subject, "--amended amended")};
+    }
+    case DiagnosisVerdict::none_of_the_above:
+      return {Standing::bad, "Recording and model differ, and nothing in the catalogue explains it.",
+              unexplained_cause(d), command("diagnose", subject, "--split-schedule next.toml")};
+    case DiagnosisVerdict::not_enough_information:
+      return {Standing::open, "Recording and model may differ, but too little to say by what.",
+              d.suspected.empty()
+                  ? std::string()
+                  : fmt::format("The strongest suspect is {}: {}.", effect_words(d.suspected.front().effect),
+                                figures_with_significance(d.suspected.front())),
+              next_for_suspects(d, subject)};
+    case DiagnosisVerdict::data_fault:
+      return {Standing::bad, "The recording is faulty: nothing else is concluded from it.", fault_cause(d),
+              "Mend the fault and record again."};
+  }
+  return {};
+}
+
+std::string_view name(Standing standing) {
+  switch (standing) {
+    case Standing::good: return "good";
+    case Standing::bad: return "bad";
+    case Standing::open: break;
+  }
+  return "open";
+}
+
+nlohmann::ordered_json summary_json(const Summary& summary) {
+  return {{"standing", name(summary.standing)},
+          {"verdict", summary.verdict},
+          {"cause", summary.cause},
+          {"next", summary.next}};
+}
+
+Summary read_summary(const nlohmann::ordered_json& json) {
+  const auto text = [&](const char* key) {
+    const auto found = json.find(key);
+    return found == json.end() || !found->is_string() ? std::string() : found->get<std::string>();
+  };
+  Summary summary{Standing::open, text("verdict"), text("cause"), text("next")};
+  for (const Standing standing : {Standing::good, Standing::bad}) {
+    if (text("standing") == name(standing)) {
+      summary.standing = standing;
+    }
+  }
+  return summary;
+}
+
+std::string summary_text(const Summary& summary, bool colour, int columns, int most_lines) {
+  const char* shade = !colour                              ? nullptr
+                      : summary.standing == Standing::good ? green
+                      : summary.standing == Standing::bad  ? red
+                                                           : yellow;
+  return paragraph("verdict", summary.verdict, shade, columns, most_lines) +
+         paragraph("cause", summary.cause, nullptr, columns, most_lines) +
+         paragraph("next", summary.next, nullptr, columns, 0);  // a command is of use only whole
+}
+
+}  // namespace selfcal

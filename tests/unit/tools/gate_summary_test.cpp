@@ -1,0 +1,184 @@
+// The gate, the summary and the numbers that are told of a result.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "daemon/estimate/effect_words.hpp"
+#include "daemon/estimate/judged_result.hpp"
+#include "daemon/estimate/quantity_text.hpp"
+#include "daemon/estimate/result_json.hpp"
+#include "daemon/estimate/result_table.hpp"
+
+namespace selfcal {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+// Everything well inside its tolerance, recording and model in agreement.
+CalibrationResult good_result() {
+  CalibrationResult result;
+  result.value = 0.01 * plausible_limit();
+  result.sigma = 0.1 * default_tolerance();
+  result.covariance = result.sigma.cwiseAbs2().asDiagonal();
+  result.attitude_sigma.setZero();
+  result.determined.fill(true);
+  result.plausible.fill(true);
+  result.consistency.nis_mean = 1.0;
+  result.consistency.nis_low = 0.9;
+  result.consistency.nis_high = 1.1;
+  result.consistency.whiteness_p_value = 0.4;
+  return result;
+}
+
+CalibrationResult inconsistent_result() {
+  CalibrationResult result = good_result();
+  result.consistency.verdict = Verdict::inconsistent;
+  result.consistency.nis_mean = 8.2;
+  result.consistency.whiteness_p_value = 0.0;
+  return result;
+}
+
+diagnosis::Diagnosis creep() {
+  diagnosis::Diagnosis d;
+  d.verdict = diagnosis::DiagnosisVerdict::named;
+  d.mismatch = true;
+  d.calibration = inconsistent_result();
+  d.value = d.calibration.value;
+  d.sigma = d.calibration.sigma;
+  d.value(0) = d.calibration.value(0) - 19.0 * 9.80665e-6;  // 19 ug, which are 19 of its sigmas
+  d.before.nis = 8.2;
+  d.after.nis = 1.01;
+  diagnosis::Finding finding;
+  finding.effect = "accel_relaxation";
+  finding.significance = 85.0;
+  finding.parameters = {{"x", "ug", 49.81, 0.58}, {"tau", "s", 45.1, 1.2}};
+  d.findings = {finding};
+  return d;
+}
+
+nlohmann::json document_of(const JudgedResult& judged) {
+  Recording recording;
+  recording.sample_rate_hz = 200.0;
+  return nlohmann::json::parse(result_json_text(judged, {}, recording, {}));
+}
+
+// Limits were known to the run and not to its stored result: refused, and told as accepted.
+TEST(Gate, AResultRefusedForALimitAloneIsNotStoredAsAcceptable) {
+  Limits limits;
+  limits[0] = 10.0;  // ug; the value is 100 ug
+  const JudgedResult judged_result = judged(good_result(), default_tolerance(), limits, {"r.h5", 0});
+  ASSERT_THAT(judged_result.gate.words(), ElementsAre("accel_bias_x = 100 ug is beyond the limit of 10.0 ug"));
+  const nlohmann::json document = document_of(judged_result);
+  EXPECT_EQ(document.at("acceptable"), false);
+  EXPECT_EQ(document.at("objections").size(), 1U);
+  EXPECT_EQ(document.at("summary").at("standing"), "bad");
+  EXPECT_EQ(document.at("parameters").at(0).at("usable"), false);
+  EXPECT_EQ(document.at("parameters").at(1).at("usable"), true);
+  Recording recording;
+  recording.sample_rate_hz = 200.0;
+  EXPECT_THAT(result_table(judged_result, {}, recording, false), HasSubstr("beyond limit"));
+}
+
+TEST(Gate, TheMostImportantObjectionComesFirst) {
+  CalibrationResult result = inconsistent_result();
+  result.determined[0] = false;
+  Limits limits;
+  limits[0] = 10.0;
+  const Gate gate = judge(result, default_tolerance(), limits);
+  ASSERT_EQ(gate.objections.size(), 3U);
+  EXPECT_EQ(gate.objections[0].kind, ObjectionKind::inconsistent);
+  EXPECT_EQ(gate.objections[1].kind, ObjectionKind::beyond_limit);
+  EXPECT_EQ(gate.objections[2].kind, ObjectionKind::undetermined);
+}
+
+// 269.12 +- 0.63, "ok", where the truth is 250.
+TEST(Gate, NoParameterIsOkWhereRecordingAndModelDisagree) {
+  const JudgedResult alone = judged(inconsistent_result(), default_tolerance(), {}, {"r.h5", 0});
+  const nlohmann::json document = document_of(alone);
+  for (const nlohmann::json& parameter : document.at("parameters")) {
+    EXPECT_EQ(parameter.at("usable"), false) << parameter;
+  }
+  Recording recording;
+  recording.sample_rate_hz = 200.0;
+  const std::string table = result_table(alone, {}, recording, false);
+  EXPECT_THAT(table, Not(HasSubstr(" ok\n")));
+  EXPECT_THAT(table, StartsWith("verdict"));
+  EXPECT_EQ(alone.summary.next, "selfcal diagnose r.h5");
+  // The same table does say ok of a good result.
+  const JudgedResult good = judged(good_result(), default_tolerance(), {}, {"r.h5", 0});
+  EXPECT_THAT(result_table(good, {}, recording, false), HasSubstr(" ok\n"));
+}
+
+TEST(Summary, TheCauseIsNamedWhereTheDiagnosisKnowsIt) {
+  const JudgedResult named = judged(inconsistent_result(), default_tolerance(), {}, {"my file.h5", 0}, creep());
+  EXPECT_EQ(named.summary.standing, Standing::bad);
+  EXPECT_THAT(named.summary.verdict, HasSubstr("creep of the accelerometers after each turn"));
+  EXPECT_THAT(named.summary.cause, HasSubstr("x 49.81 +- 0.58 ug, 85 sigma"));
+  EXPECT_THAT(named.summary.cause, HasSubstr("accel_bias_x is 81.0 ug, not 100.0"));
+  EXPECT_EQ(named.summary.next, "selfcal diagnose 'my file.h5'");
+  // The corrected value stands beside the biased one.
+  Recording recording;
+  recording.sample_rate_hz = 200.0;
+  const std::string table = result_table(named, {}, recording, false);
+  EXPECT_THAT(table, HasSubstr("corrected"));
+  EXPECT_THAT(table, Not(HasSubstr(" ok\n")));
+}
+
+TEST(Summary, EveryVerdictOfTheDiagnosisHasASentence) {
+  diagnosis::Diagnosis d = creep();
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::bad);
+  d.verdict = diagnosis::DiagnosisVerdict::adequate;
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::good);
+  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
+  d.unexplained = true;
+  d.rejected = d.findings;
+  EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("accel_relaxation (x 49.81 +- 0.58 ug, 85 sigma)"));
+  d.verdict = diagnosis::DiagnosisVerdict::not_enough_information;
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::open);
+  d.verdict = diagnosis::DiagnosisVerdict::data_fault;
+  d.faults = {{"lost_samples", "3 gaps", 17, 3}};
+  EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("3 gaps"));
+}
+
+TEST(Summary, IsBrokenToTheTerminalAndItsNextStepIsNeverCut) {
+  const Summary summary{Standing::bad, "one two three four five six seven eight nine ten eleven twelve", "why so",
+                        "selfcal diagnose /a/long/path/to/a/recording.h5 --split-schedule"};
+  const std::string text = summary_text(summary, false, 40, 1);
+  EXPECT_THAT(text, StartsWith("verdict  one two three four five six ...\ncause    why so\n"));
+  EXPECT_THAT(text, HasSubstr("--split-schedule"));
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(line.size(), 40U) << text;
+  }
+}
+
+// Two digits of sigma, the value to the same place, at any scale.
+TEST(QuantityText, HasTheDigitsThatSigmaCarries) {
+  EXPECT_EQ(with_sigma(269.1234, 0.634, "ug"), "269.12 +- 0.63 ug");
+  EXPECT_EQ(with_sigma(-0.0023456, 0.00101, "deg/h"), "-0.0023 +- 0.0010 deg/h");
+  EXPECT_EQ(with_sigma(-380512.0, 2104.0, "ug"), "-380512 +- 2104 ug");
+  EXPECT_EQ(with_sigma(2.6134e-7, 1.22e-9, "s"), "2.613e-07 +- 1.2e-09 s");
+  EXPECT_EQ(with_sigma(1e300, 1e299, "m"), "1.00e+300 +- 1.0e+299 m");
+  EXPECT_EQ(with_sigma(3.0, 0.0999, ""), "3.00 +- 0.10");
+  EXPECT_EQ(with_sigma(3.14159, 0.0, "s"), "3.142 +- ? s");
+}
+
+TEST(QuantityText, SaysPValuesAsPeopleDo) {
+  EXPECT_EQ(whiteness_text(-9166.6), "correlated in time (p below 1e-12)");
+  EXPECT_EQ(whiteness_text(std::log(0.32)), "white (p = 0.32)");
+}
+
+TEST(EffectWords, DefineEachSymbolOnce) {
+  const std::vector<Symbol> symbols = symbols_of("dw_i = sum_j G_ij u_j");
+  ASSERT_EQ(symbols.size(), 3U);
+  EXPECT_EQ(symbols[2].name, "u_j");
+  EXPECT_EQ(symbols_of("d = a sin(2 pi f t)")[2].meaning, "frequency, fitted");
+}
+
+}  // namespace
+}  // namespace selfcal

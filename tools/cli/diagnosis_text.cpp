@@ -1,0 +1,183 @@
+// The diagnosis for people: what it comes to, then the figures.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/estimate/effect_words.hpp"
+#include "daemon/estimate/quantity_text.hpp"
+#include "daemon/estimate/summary.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+#include "estimator/geometry/units.hpp"
+#include "tools/cli/diagnose_output.hpp"
+#include "tools/cli/finding_text.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using diagnosis::Adequacy;
+using diagnosis::Diagnosis;
+using diagnosis::Finding;
+using diagnosis::Located;
+
+constexpr std::size_t most_places = 8;
+
+std::string adequacy_text(const Diagnosis& d) {
+  std::string text = fmt::format("{:<8}{:>9}  {:>15}  {}\n", "", "NIS", "largest misfit", "innovations");
+  for (const Adequacy* a : {&d.before, &d.after}) {
+    text += fmt::format("{:<8}{:>9}  {:>9} sigma  {}\n", a == &d.before ? "before" : "after", number_text(a->nis),
+                        number_text(a->largest_sigma), whiteness_text(a->log_p_white));
+  }
+  return text;
+}
+
+std::string findings_text(const char* head, const std::vector<Finding>& findings) {
+  if (findings.empty()) {
+    return {};
+  }
+  std::string text = fmt::format("\n{}:\n", head);
+  for (const Finding& finding : findings) {
+    text += finding_text(finding);
+  }
+  return text + symbols_text(findings);
+}
+
+// Those of the 24 that the omission moved by three sigma and more, most first.
+std::string corrections_text(const Diagnosis& d) {
+  const auto moved = [&](int k) { return std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k); };
+  std::vector<int> order;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (moved(k) >= shown_sigma) {
+      order.push_back(k);
+    }
+  }
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return moved(a) > moved(b); });
+  if (order.empty()) {
+    return {};
+  }
+  std::string text = fmt::format("\ncorrected values of the 24:\n  {:<22}{:>11}{:>11}{:>9}  {:<7}{}\n", "", "without",
+                                 "corrected", "sigma", "unit", "moved by");
+  for (const int k : order) {
+    const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+    const double sigma = d.sigma(k) / p.si_per_unit;
+    const QuantityText after = quantity_text(d.value(k) / p.si_per_unit, sigma);
+    text += fmt::format("  {:<22}{:>11}{:>11}{:>9}  {:<7}{} sigma\n", p.name,
+                        quantity_text(d.calibration.value(k) / p.si_per_unit, sigma).value, after.value, after.sigma,
+                        p.unit, number_text(moved(k)));
+  }
+  return text;
+}
+
+// One list, largest first, whatever a place was found by.
+std::string places_text(const char* head, std::vector<Located> places, const std::vector<Located>& by) {
+  places.insert(places.end(), by.begin(), by.end());
+  if (places.empty()) {
+    return {};
+  }
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Located& a, const Located& b) { return a.significance > b.significance; });
+  places.resize(std::min(most_places, places.size()));
+  std::string text = fmt::format("\n{}:\n", head);
+  for (const Located& l : places) {
+    text += fmt::format("  {:>6} sigma  {}\n", number_text(l.significance), l.words);
+  }
+  return text;
+}
+
+std::string undetectable_text(const Diagnosis& d) {
+  if (d.undetectable.empty()) {
+    return {};
+  }
+  std::vector<diagnosis::Undetectable> order = d.undetectable;
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto& a, const auto& b) { return a.expected_z > b.expected_z; });
+  std::string text = "\nnot visible in this recording at its typical size (sigma to be expected):\n";
+  for (const diagnosis::Undetectable& u : order) {
+    text += fmt::format("  {:>5}  {}\n", number_text(u.expected_z), u.effect);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colour, int columns) {
+  std::string text = summary_text(summary_of(d, subject), colour, columns);
+  if (!d.faults.empty()) {
+    text += "\nfaults of the data:\n";
+    for (const auto& f : d.faults) {
+      text += fmt::format("  {}: {} (first at sample {})\n", f.id, f.words, f.first_sample);
+    }
+    return text;
+  }
+  text += "\n" + adequacy_text(d) + findings_text("left out of the model", d.findings) + corrections_text(d);
+  if (!d.before.accepted) {
+    text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);
+  }
+  if (d.unexplained) {
+    text += findings_text("tried and rejected by what remains", d.rejected);
+    text += places_text("what remains, largest first", d.remaining, d.remaining_by);
+  }
+  if (!d.suspected.empty()) {
+    text += "\ntoo weak to name:\n";
+    for (const Finding& f : d.suspected) {
+      text += fmt::format("  {:>6} sigma  {}: {}; would show with {}\n", number_text(f.significance), f.effect,
+                          effect_words(f.effect), f.experiment);
+    }
+  }
+  return text + undetectable_text(d);
+}
+
+std::string comparison_text(const diagnosis::Comparison& c) {
+  const Diagnosis& d = c.diagnosis;
+  std::string text = summary_text(summary_of_comparison(c), false) + "\n" + adequacy_text(d);
+  text += findings_text("the recording has more of", d.findings);
+  if (!d.before.accepted) {
+    text += places_text("where recording and simulation differ, largest first", d.located, d.located_by);
+  }
+  if (!c.in_both.empty()) {
+    text += "\nwhat the simulation holds was taken out of both:";
+    for (const Finding& f : c.in_both) {
+      text += " " + f.effect;
+    }
+    text += "\n";
+  }
+  text += "\nthe 24, where they differ by 3 sigma or more:\n";
+  int differing = 0;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (std::abs(c.difference(k)) >= shown_sigma * c.sigma(k)) {
+      const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
+      text += fmt::format("  {:<22} {}\n", p.name,
+                          with_sigma(c.difference(k) / p.si_per_unit, c.sigma(k) / p.si_per_unit, std::string(p.unit)));
+      ++differing;
+    }
+  }
+  text += differing == 0 ? "  none\n" : "";
+  constexpr double noticeable = 0.2 * units::degree;
+  if (c.attitude_difference > noticeable) {
+    text += fmt::format(
+        "attitudes differ by up to {:.2f} deg: what both hold and no name was found for cancels only to that degree\n",
+        c.attitude_difference / units::degree);
+  }
+  return text;
+}
+
+Summary summary_of_comparison(const diagnosis::Comparison& c) {
+  const Diagnosis& d = c.diagnosis;
+  const std::string figures = fmt::format("NIS of the difference {}, largest misfit {} sigma",
+                                          number_text(d.before.nis), number_text(d.before.largest_sigma));
+  if (!d.mismatch) {
+    return {Standing::good, "Recording and simulation agree.", figures + ".", {}};
+  }
+  if (d.findings.empty()) {
+    return {
+        Standing::bad, "Recording and simulation differ, and nothing in the catalogue explains it.", figures + ".", {}};
+  }
+  const Finding& first = d.findings.front();
+  return {Standing::bad,
+          fmt::format("Recording and simulation differ by {}.", effect_words(first.effect)),
+          fmt::format("{}: {:.0f} sigma; {}, {} with it.", first.effect, first.significance, figures,
+                      number_text(d.after.nis)),
+          {}};
+}
+
+}  // namespace selfcal::cli
