@@ -310,13 +310,10 @@ Summary summary_of(const Diagnosis& d, const Subject& subject) {
               fmt::format("NIS {:.3g}, largest misfit {:.1f} sigma, innovations {}.", d.before.nis,
                           d.before.largest_sigma, whiteness_text(d.before.log_p_white)),
               {}};
-    case DiagnosisVerdict::named: {
-      const bool several = !d.findings.empty() && !d.findings.front().equivalent.empty();
+    case DiagnosisVerdict::named:
       return {Standing::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
-              several           ? command("diagnose", subject, "--split-schedule split.toml")
-              : subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
-                                : command("diagnose", subject, "--amended amended")};
-    }
+              subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
+                              : command("diagnose", subject, "--amended amended")};
     case DiagnosisVerdict::none_of_the_above:
       return {Standing::bad, "Recording and model differ, and nothing in the catalogue explains it.",
               unexplained_cause(d), command("diagnose", subject, "--split-schedule next.toml")};

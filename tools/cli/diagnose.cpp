@@ -172,6 +172,11 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
       hardest = &s;
     }
   }
+  if (hardest == nullptr && !splits.empty()) {
+    fmt::print(stderr, "selfcal diagnose: {} is not written: nothing splits {} from what it is a special case of\n",
+               arguments.split_schedule, splits.front().effect);
+    return splits;
+  }
   if (hardest == nullptr) {
     return write_showing(arguments.split_schedule, diagnosis, schedule_of(opened.loaded.recording, opened.data))
         .map([&] { return splits; });

@@ -60,11 +60,58 @@ nlohmann::ordered_json estimate_of(const Entries& progress) {
   return estimate;
 }
 
+using Json = nlohmann::ordered_json;
+
+// What the daemon remembers of the unit that `ins` spoke to last: the run whose set is in force, and the last
+// calibration that has ended; null where there is none.
+void add_memory(Json& ins, const Json& runs) {
+  ins["in_force"] = Json();
+  ins["last_calibration"] = Json();
+  std::string serial = ins.at("serial").get<std::string>();
+  if (serial.empty()) {  // nothing since the daemon was started: the latest run knows
+    for (const Json& run : runs) {
+      serial = run.at("ins") == ins.at("ins") ? run.at("serial").get<std::string>() : serial;
+    }
+  }
+  for (const Json& run : runs) {
+    if (serial.empty() || run.at("serial") != serial) {
+      continue;
+    }
+    if (run.at("in_force").at("now").get<bool>()) {
+      ins["in_force"] = {
+          {"run", run.at("run")}, {"kind", run.at("kind")}, {"from_utc", run.at("in_force").at("from_utc")}};
+    }
+    if (run.at("kind") != "rollback" && !run.at("exit_status").is_null()) {
+      ins["last_calibration"] = {
+          {"run", run.at("run")}, {"state", run.at("state")}, {"ended_utc", run.at("ended_utc")}};
+    }
+  }
+}
+
+std::string memory_text(const Json& ins) {
+  const Json& force = ins.at("in_force");
+  const Json& last = ins.at("last_calibration");
+  std::string text = "  in force          ";
+  text += force.is_null() ? "no set that was written from here"
+                          : fmt::format("the set of run {} ({}), since {}", force.at("run").get<int>(),
+                                        force.at("kind").get<std::string>(), force.at("from_utc").get<std::string>());
+  text += "\n  last calibration  ";
+  text += last.is_null() ? "none"
+                         : fmt::format("run {}, {}, {}", last.at("run").get<int>(), last.at("state").get<std::string>(),
+                                       last.at("ended_utc").get<std::string>());
+  return text + "\n";
+}
+
 Expected<int> status(ManagerClient& manager, const Options& options) {
   const auto instruments = manager.instruments();
   if (!instruments) {
     return tl::unexpected(instruments.error());
   }
+  const auto history = manager.history("");
+  if (!history) {
+    return tl::unexpected(history.error());
+  }
+  const Json runs = Json::parse(*history).at("runs");
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const std::string& ins : *instruments) {
     if (!options.ins.empty() && options.ins != ins) {
@@ -92,6 +139,7 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                    {"finish_in_s", entry(progress, "finish_in_s", -1.0)},
                    {"link_up", entry(progress, "link_up", true)},
                    {"estimate", estimate_of(progress)}});
+    add_memory(all.back(), runs);
   }
   if (all.empty()) {
     return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
@@ -115,7 +163,7 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                  ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
                  ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());
     }
-    fmt::print("\n");
+    fmt::print("\n{}", memory_text(ins));
   }
   return 0;
 }

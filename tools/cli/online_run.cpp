@@ -28,7 +28,8 @@ void catch_signals() {
   action.sa_handler = on_interrupt;  // no SA_RESTART: the wait for news is to end
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  action.sa_handler = on_resize;  // the line is drawn anew at once
+  action.sa_handler = on_resize;  // ends the wait too (poll is never restarted): the line is drawn anew at once
+  action.sa_flags = SA_RESTART;
   sigaction(SIGWINCH, &action, nullptr);
 }
 
