@@ -63,7 +63,7 @@ nlohmann::ordered_json estimate_of(const Entries& progress) {
 using Json = nlohmann::ordered_json;
 
 // What the daemon remembers of the unit that `ins` spoke to last: the run whose set is in force, and the last
-// calibration that has ended; null where there is none.
+// calibration that has ended; null where there is none. `runs`: of that unit, or of all where it is not known.
 void add_memory(Json& ins, const Json& runs) {
   ins["in_force"] = Json();
   ins["last_calibration"] = Json();
@@ -107,11 +107,6 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
   if (!instruments) {
     return tl::unexpected(instruments.error());
   }
-  const auto history = manager.history("");
-  if (!history) {
-    return tl::unexpected(history.error());
-  }
-  const Json runs = Json::parse(*history).at("runs");
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const std::string& ins : *instruments) {
     if (!options.ins.empty() && options.ins != ins) {
@@ -139,7 +134,13 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                    {"finish_in_s", entry(progress, "finish_in_s", -1.0)},
                    {"link_up", entry(progress, "link_up", true)},
                    {"estimate", estimate_of(progress)}});
-    add_memory(all.back(), runs);
+    if (snapshot->state == "idle") {  // else there is better to look at, more often
+      const auto history = manager.history(snapshot->serial);
+      if (!history) {
+        return tl::unexpected(history.error());
+      }
+      add_memory(all.back(), Json::parse(*history).at("runs"));
+    }
   }
   if (all.empty()) {
     return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
@@ -163,7 +164,7 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
                  ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
                  ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());
     }
-    fmt::print("\n{}", memory_text(ins));
+    fmt::print("\n{}", ins["state"] == "idle" ? memory_text(ins) : std::string());
   }
   return 0;
 }
