@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/quantity_text.hpp"
@@ -163,7 +162,7 @@ std::string and_more(const Gate& gate) {
 // Recording and model agree, but some of the 24 may not be used.
 Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate, const Subject& subject) {
   const Objection& first = gate.objections.front();
-  Summary s{Standing::bad, {}, and_more(gate), {}};
+  Summary s{SummaryStanding::bad, {}, and_more(gate), {}};
   const std::size_t same = count(gate, first.kind);
   const std::string those = same == 1 ? "1 of the 24 parameters is" : fmt::format("{} of the 24 parameters are", same);
   switch (first.kind) {
@@ -194,7 +193,7 @@ Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate,
 }
 
 Summary summary_of_inconsistency(const CalibrationResult& result, const Subject& subject, const Diagnosis* d) {
-  Summary s{Standing::bad, {}, {}, {}};
+  Summary s{SummaryStanding::bad, {}, {}, {}};
   if (d != nullptr && d->verdict == DiagnosisVerdict::data_fault) {
     s.verdict = "The recording is faulty, so none of the 24 values may be used.";
     s.cause = fault_cause(*d);
@@ -216,54 +215,11 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
 }
 
 Summary acceptable_summary(const CalibrationResult& result, const Subject& subject) {
-  Summary s{Standing::good, "All 24 parameters are determined to tolerance, and recording and model agree.", {}, {}};
+  Summary s{
+      SummaryStanding::good, "All 24 parameters are determined to tolerance, and recording and model agree.", {}, {}};
   s.cause = nis_text(result.consistency) + ".";
   s.next = command("report", subject, "-o report.html");
   return s;
-}
-
-constexpr const char* red = "31";
-constexpr const char* green = "32";
-constexpr const char* yellow = "33";
-
-// Breaks at spaces; a word that is longer than the line keeps a line of its own.
-std::vector<std::string> broken(const std::string& text, int columns) {
-  std::vector<std::string> lines;
-  std::string line;
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const std::size_t end = std::min(text.find(' ', at), text.size());
-    const std::string word = text.substr(at, end - at);
-    at = end + 1;
-    if (!line.empty() && columns > 0 && static_cast<int>(line.size() + 1 + word.size()) > columns) {
-      lines.push_back(line);
-      line.clear();
-    }
-    line += (line.empty() ? "" : " ") + word;
-  }
-  lines.push_back(line);
-  return lines;
-}
-
-std::string paragraph(const char* head, const std::string& text, const char* shade, int columns, int most_lines) {
-  constexpr int indent = 9;
-  constexpr int narrowest = 16;
-  if (text.empty()) {
-    return {};
-  }
-  std::vector<std::string> lines = broken(text, columns > 0 ? std::max(narrowest, columns - indent) : 0);
-  if (most_lines > 0 && static_cast<int>(lines.size()) > most_lines) {
-    lines.resize(static_cast<std::size_t>(most_lines));
-    std::string& last = lines.back();
-    const auto room = static_cast<std::size_t>(std::max(narrowest, columns - indent) - 4);
-    last = last.substr(0, last.size() > room ? last.rfind(' ', room) : last.size()) + " ...";
-  }
-  std::string out;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::string shown = shade == nullptr ? lines[i] : fmt::format("\033[{}m{}\033[0m", shade, lines[i]);
-    out += fmt::format("{:<{}}{}\n", i == 0 ? head : "", indent, shown);
-  }
-  return out;
 }
 
 }  // namespace
@@ -277,7 +233,7 @@ Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subj
     case ObjectionKind::unexplained:
     case ObjectionKind::inconsistent: return summary_of_inconsistency(result, subject, d);
     case ObjectionKind::not_converged:
-      return {Standing::bad, "The passes did not settle: none of the 24 values may be used.",
+      return {SummaryStanding::bad, "The passes did not settle: none of the 24 values may be used.",
               gate.objections.front().words + ".", command("diagnose", subject)};
     default: return summary_of_parameters(result, gate, subject);
   }
@@ -286,13 +242,13 @@ Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subj
 Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, const Subject& subject,
                            const Diagnosis& d) {
   if (gate.acceptable()) {
-    return {Standing::good,
+    return {SummaryStanding::good,
             fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d)),
             named_cause(d), command("report", subject, "-o report.html")};
   }
   switch (gate.objections.front().kind) {
     case ObjectionKind::nothing_to_amend:
-      return {Standing::bad, "Nothing to amend: no equation was named in the recording.",
+      return {SummaryStanding::bad, "Nothing to amend: no equation was named in the recording.",
               summary_of(d, subject).verdict, command("diagnose", subject)};
     case ObjectionKind::data_fault:
     case ObjectionKind::unexplained:
@@ -305,70 +261,30 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
 Summary summary_of(const Diagnosis& d, const Subject& subject) {
   switch (d.verdict) {
     case DiagnosisVerdict::adequate:
-      return {Standing::good,
+      return {SummaryStanding::good,
               "Recording and model agree: nothing that this recording can show was left out.",
               fmt::format("NIS {:.3g}, largest misfit {:.1f} sigma, innovations {}.", d.before.nis,
                           d.before.largest_sigma, whiteness_text(d.before.log_p_white)),
               {}};
     case DiagnosisVerdict::named:
-      return {Standing::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
+      return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
               subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
                               : command("diagnose", subject, "--amended amended")};
     case DiagnosisVerdict::none_of_the_above:
-      return {Standing::bad, "Recording and model differ, and nothing in the catalogue explains it.",
+      return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
               unexplained_cause(d), command("diagnose", subject, "--split-schedule next.toml")};
     case DiagnosisVerdict::not_enough_information:
-      return {Standing::open, "Recording and model may differ, but too little to say by what.",
+      return {SummaryStanding::open, "Recording and model may differ, but too little to say by what.",
               d.suspected.empty()
                   ? std::string()
                   : fmt::format("The strongest suspect is {}: {}.", effect_words(d.suspected.front().effect),
                                 figures_with_significance(d.suspected.front())),
               next_for_suspects(d, subject)};
     case DiagnosisVerdict::data_fault:
-      return {Standing::bad, "The recording is faulty: nothing else is concluded from it.", fault_cause(d),
+      return {SummaryStanding::bad, "The recording is faulty: nothing else is concluded from it.", fault_cause(d),
               "Mend the fault and record again."};
   }
   return {};
-}
-
-std::string_view name(Standing standing) {
-  switch (standing) {
-    case Standing::good: return "good";
-    case Standing::bad: return "bad";
-    case Standing::open: break;
-  }
-  return "open";
-}
-
-nlohmann::ordered_json summary_json(const Summary& summary) {
-  return {{"standing", name(summary.standing)},
-          {"verdict", summary.verdict},
-          {"cause", summary.cause},
-          {"next", summary.next}};
-}
-
-Summary read_summary(const nlohmann::ordered_json& json) {
-  const auto text = [&](const char* key) {
-    const auto found = json.find(key);
-    return found == json.end() || !found->is_string() ? std::string() : found->get<std::string>();
-  };
-  Summary summary{Standing::open, text("verdict"), text("cause"), text("next")};
-  for (const Standing standing : {Standing::good, Standing::bad}) {
-    if (text("standing") == name(standing)) {
-      summary.standing = standing;
-    }
-  }
-  return summary;
-}
-
-std::string summary_text(const Summary& summary, bool colour, int columns, int most_lines) {
-  const char* shade = !colour                              ? nullptr
-                      : summary.standing == Standing::good ? green
-                      : summary.standing == Standing::bad  ? red
-                                                           : yellow;
-  return paragraph("verdict", summary.verdict, shade, columns, most_lines) +
-         paragraph("cause", summary.cause, nullptr, columns, most_lines) +
-         paragraph("next", summary.next, nullptr, columns, 0);  // a command is of use only whole
 }
 
 }  // namespace selfcal

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "daemon/estimate/estimate_worker.hpp"
-#include "daemon/estimate/summary.hpp"
 #include "daemon/host/config.hpp"
 #include "daemon/host/task.hpp"
 #include "daemon/host/timers.hpp"
@@ -20,6 +19,7 @@
 #include "daemon/store/page_file.hpp"
 #include "daemon/store/run_store.hpp"
 #include "estimator/geometry/schedule.hpp"
+#include "protocol/document/summary.hpp"
 
 namespace selfcal {
 

@@ -32,7 +32,7 @@ std::string report_command(const RunRecord& run) {
 std::string next_of(const Summary& result, const RunRecord& run, const ordered_json& document) {
   const auto diagnosis = document.find("diagnosis");
   const bool named = diagnosis != document.end() && diagnosis->value("verdict", std::string()) == "named";
-  if (result.standing == Standing::bad && named && run.amends == 0) {
+  if (result.standing == SummaryStanding::bad && named && run.amends == 0) {
     return fmt::format("selfcal amend {}", run.id);
   }
   return result.next.find(" report ") != std::string::npos ? report_command(run) : result.next;
@@ -55,7 +55,7 @@ Summary completed_summary(const RunRecord& run, const InForce& force, RunId roll
                           const ordered_json& document) {
   if (run.rollback) {
     const std::string undone = rolled_back == 0 ? std::string() : fmt::format("Run {} was rolled back", rolled_back);
-    return {force.now ? Standing::good : Standing::open,
+    return {force.now ? SummaryStanding::good : SummaryStanding::open,
             in_force_text(run, force),
             sentence(undone.empty() ? run.force_reason : undone + ": " + run.force_reason),
             {}};
@@ -64,13 +64,14 @@ Summary completed_summary(const RunRecord& run, const InForce& force, RunId roll
     return {result.standing, sentence("Dry run, nothing was written: " + result.verdict), result.cause,
             next_of(result, run, document)};
   }
-  if (result.standing == Standing::bad) {  // written against the gate
-    return {Standing::bad, in_force_text(run, force) + " The gate had refused it.",
+  if (result.standing == SummaryStanding::bad) {  // written against the gate
+    return {SummaryStanding::bad, in_force_text(run, force) + " The gate had refused it.",
             fmt::format("{} Written for: {}", result.verdict, sentence(run.force_reason)),
             next_of(result, run, document)};
   }
   const std::string drift = drift_text(run);
-  Summary summary{force.now ? Standing::good : Standing::open, in_force_text(run, force), {}, report_command(run)};
+  Summary summary{
+      force.now ? SummaryStanding::good : SummaryStanding::open, in_force_text(run, force), {}, report_command(run)};
   summary.cause = result.verdict + (drift.empty() ? "" : " " + drift);
   return summary;
 }
@@ -150,20 +151,20 @@ Summary run_summary(const RunRecord& run, const InForce& force, RunId rolled_bac
   switch (run.state) {
     case State::completed: return completed_summary(run, force, rolled_back, result, document);
     case State::refused:
-      return {Standing::bad, "Not written: " + (result.verdict.empty() ? sentence(run.reason) : result.verdict),
+      return {SummaryStanding::bad, "Not written: " + (result.verdict.empty() ? sentence(run.reason) : result.verdict),
               result.cause, next_of(result, run, document)};
     case State::aborted:
-      return {Standing::open,
+      return {SummaryStanding::open,
               fmt::format("This {} was stopped before it wrote anything: the former set stays in force.", kind_of(run)),
               sentence(run.reason),
               fmt::format("selfcal {}", run.rollback      ? "rollback " + run.serial + " --reason REASON"
                                         : run.amends != 0 ? fmt::format("amend {}", run.amends)
                                                           : "run " + run.ins)};
     case State::failed:
-      return {Standing::bad, fmt::format("This {} failed before its set was confirmed in force.", kind_of(run)),
+      return {SummaryStanding::bad, fmt::format("This {} failed before its set was confirmed in force.", kind_of(run)),
               sentence(run.reason), fmt::format("selfcal show {}", run.id)};
     default:
-      return {Standing::open,
+      return {SummaryStanding::open,
               fmt::format("Run {} is under way: {}.", run.id, words(run.state)),
               {},
               "selfcal status " + run.ins};

@@ -4,8 +4,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "daemon/estimate/summary.hpp"
 #include "daemon/store/run_store.hpp"
+#include "protocol/document/summary.hpp"
 
 namespace selfcal {
 

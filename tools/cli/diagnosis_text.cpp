@@ -166,14 +166,16 @@ Summary summary_of_comparison(const diagnosis::Comparison& c) {
   const std::string figures = fmt::format("NIS of the difference {}, largest misfit {} sigma",
                                           number_text(d.before.nis), number_text(d.before.largest_sigma));
   if (!d.mismatch) {
-    return {Standing::good, "Recording and simulation agree.", figures + ".", {}};
+    return {SummaryStanding::good, "Recording and simulation agree.", figures + ".", {}};
   }
   if (d.findings.empty()) {
-    return {
-        Standing::bad, "Recording and simulation differ, and nothing in the catalogue explains it.", figures + ".", {}};
+    return {SummaryStanding::bad,
+            "Recording and simulation differ, and nothing in the catalogue explains it.",
+            figures + ".",
+            {}};
   }
   const Finding& first = d.findings.front();
-  return {Standing::bad,
+  return {SummaryStanding::bad,
           fmt::format("Recording and simulation differ by {}.", effect_words(first.effect)),
           fmt::format("{}: {:.0f} sigma; {}, {} with it.", first.effect, first.significance, figures,
                       number_text(d.after.nis)),

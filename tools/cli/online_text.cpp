@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/quantity_text.hpp"
-#include "daemon/estimate/summary.hpp"
+#include "protocol/document/summary.hpp"
 #include "tools/cli/finding_text.hpp"
 
 namespace selfcal::cli {

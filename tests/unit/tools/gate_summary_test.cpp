@@ -116,7 +116,7 @@ TEST(Gate, NoParameterIsOkWhereRecordingAndModelDisagree) {
 
 TEST(Summary, TheCauseIsNamedWhereTheDiagnosisKnowsIt) {
   const JudgedResult named = judged(inconsistent_result(), default_tolerance(), {}, {"my file.h5", 0}, creep());
-  EXPECT_EQ(named.summary.standing, Standing::bad);
+  EXPECT_EQ(named.summary.standing, SummaryStanding::bad);
   EXPECT_THAT(named.summary.verdict, HasSubstr("creep of the accelerometers after each turn"));
   EXPECT_THAT(named.summary.cause, HasSubstr("x 49.81 +- 0.58 ug, 85 sigma"));
   EXPECT_THAT(named.summary.cause, HasSubstr("accel_bias_x is 81.0 ug, not 100.0"));
@@ -131,23 +131,23 @@ TEST(Summary, TheCauseIsNamedWhereTheDiagnosisKnowsIt) {
 
 TEST(Summary, EveryVerdictOfTheDiagnosisHasASentence) {
   diagnosis::Diagnosis d = creep();
-  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::bad);
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, SummaryStanding::bad);
   d.verdict = diagnosis::DiagnosisVerdict::adequate;
-  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::good);
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, SummaryStanding::good);
   d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
   d.unexplained = true;
   d.rejected = d.findings;
   EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("accel_relaxation (x 49.81 +- 0.58 ug, 85 sigma)"));
   d.verdict = diagnosis::DiagnosisVerdict::not_enough_information;
-  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, Standing::open);
+  EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, SummaryStanding::open);
   d.verdict = diagnosis::DiagnosisVerdict::data_fault;
   d.faults = {{"lost_samples", "3 gaps", 17, 3}};
   EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("3 gaps"));
 }
 
 TEST(Summary, IsBrokenToTheTerminalAndItsNextStepIsNeverCut) {
-  const Summary summary{Standing::bad, "one two three four five six seven eight nine ten eleven twelve", "why so",
-                        "selfcal diagnose /a/long/path/to/a/recording.h5 --split-schedule"};
+  const Summary summary{SummaryStanding::bad, "one two three four five six seven eight nine ten eleven twelve",
+                        "why so", "selfcal diagnose /a/long/path/to/a/recording.h5 --split-schedule"};
   const std::string text = summary_text(summary, false, 40, 1);
   EXPECT_THAT(text, StartsWith("verdict  one two three four five six ...\ncause    why so\n"));
   EXPECT_THAT(text, HasSubstr("--split-schedule"));
