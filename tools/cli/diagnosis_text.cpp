@@ -109,7 +109,10 @@ std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colo
     }
     return text;
   }
-  text += "\n" + adequacy_text(d) + findings_text("left out of the model", d.findings) + corrections_text(d);
+  text += '\n';
+  text += adequacy_text(d);
+  text += findings_text("left out of the model", d.findings);
+  text += corrections_text(d);
   if (!d.before.accepted) {
     text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);
   }

@@ -101,7 +101,7 @@ std::string who_and_when(const json& run) {
                   text_of(run, "serial"), text_of(run, "ins"), text_of(run, "user"), text_of(run, "state"));
   text += fmt::format("{} to {}", text_of(run, "started_utc"), ended ? text_of(run, "ended_utc") : "now");
   if (!text_of(run, "schedule").empty()) {
-    text += ", schedule " + text_of(run, "schedule");
+    text += fmt::format(", schedule {}", text_of(run, "schedule"));
   }
   if (run.value("rolls_back", json()).is_number()) {
     text += fmt::format(", rolls back run {}", run.at("rolls_back").get<int>());
@@ -197,7 +197,9 @@ std::string run_text(const std::string& document, bool colour, int columns) {
   std::string text = summary + "\n" + who_and_when(run) + facts(run);
   if (run.at("result").is_object()) {
     const json& result = run.at("result");
-    text += "\n" + physics_lines(result, run.value("amends", json()).is_number()) + parameter_lines(result, colour);
+    text += '\n';
+    text += physics_lines(result, run.value("amends", json()).is_number());
+    text += parameter_lines(result, colour);
   }
   return text + events(run) + (columns > 0 ? "\n" + summary : "");
 }
