@@ -3,12 +3,13 @@
 #include <signal.h>
 #include <systemd/sd-daemon.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <utility>
 
 #include "daemon/host/journal.hpp"
+#include "daemon/ins/unlock_key.hpp"
 #include "daemon/service.hpp"
+#include "protocol/command_line/command_line.hpp"
 
 namespace {
 
@@ -63,22 +64,26 @@ int serve(const std::string& config_file) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"selfcald: calibrates inertial navigation systems on their own gimbals"};
+  CommandLine line("selfcald", SELFCAL_VERSION,
+                   "selfcald: calibrates inertial navigation systems on their own gimbals");
   std::string config_file = "/etc/selfcal/selfcald.toml";
   bool check_only = false;
-  app.add_option("-c,--config", config_file, "configuration file")->capture_default_str();
-  app.add_flag("--check-config", check_only, "check the configuration and end");
-  app.set_version_flag("--version", "selfcald " SELFCAL_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    const int status = app.exit(error);
-    return status == 0 ? 0 : static_cast<int>(ErrorKind::usage);
+  line.options().text("-c,--config", config_file, "configuration file");
+  line.options().flag("--check-config", check_only, "check the configuration and end");
+  if (const std::optional<int> ended = line.parse(argc, argv)) {
+    return *ended;
   }
   if (check_only) {
     const auto config = load_config(config_file);
     if (!config) {
       return complain(config.error());
+    }
+    // Credentials exist only where systemd started the service; a file that is named has to be there now.
+    for (const InsConfig& ins : config->instruments) {
+      if (const auto key = load_unlock_key(ins); !ins.key_file.empty() && !key) {
+        return complain(
+            {key.error().kind, fmt::format("{}: ins.{}: key_file: {}", config_file, ins.name, key.error().message)});
+      }
     }
     fmt::print("{}: well-formed, {} INS\n", config_file, config->instruments.size());
     return 0;

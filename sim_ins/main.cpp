@@ -2,14 +2,16 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
+#include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <map>
 
+#include "protocol/command_line/command_line.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
 #include "sim_ins/device/bus_node.hpp"
 #include "sim_ins/simulate.hpp"
@@ -23,7 +25,7 @@ struct Arguments {
   std::string config, key, flash, truth, physics, scenario;
   std::uint64_t seed = 1;
   std::vector<std::string> faults;
-  std::uint32_t arbitration_rate = 1'000'000, data_rate = 5'000'000;
+  std::uint64_t arbitration_rate = 1'000'000, data_rate = 5'000'000;
   NodeOptions node;
 };
 
@@ -80,6 +82,9 @@ Expected<void> take_fault(const std::string& text, const SimConfig& config, Scen
 
 Expected<uds::SecurityKey> read_key(const std::string& path) {
   std::ifstream file(path);
+  if (!file) {
+    return fail(ErrorKind::bad_input, fmt::format("key file {}: cannot open: {}", path, std::strerror(errno)));
+  }
   std::string digits;
   file >> digits;
   uds::SecurityKey key{};
@@ -95,36 +100,35 @@ Expected<uds::SecurityKey> read_key(const std::string& path) {
   return key;
 }
 
-void configure(CLI::App& app, Arguments& a) {
+void configure(Options& options, Arguments& a) {
   NodeOptions& node = a.node;
   node.request_id = ins::can_id::request;
   node.response_id = ins::can_id::response;
   node.functional_id = ins::can_id::functional;
   node.status_id = ins::can_id::status;
-  app.add_option("--interface", node.interface, "CAN interface")->capture_default_str();
-  app.add_option("--config", a.config, "sim.toml: site, attitude, sensors, gimbal");
-  app.add_option("--seed", a.seed, "of every random draw: the same seed gives the same bits")->capture_default_str();
-  app.add_option("--key", a.key, "file with the SecurityAccess key, 32 hexadecimal digits")->required();
-  app.add_option("--flash", a.flash, "file that holds the FLASH; without it nothing outlives the process");
-  app.add_option("--truth", a.truth, "write the true sensor errors to this JSON file");
-  app.add_option("--physics", a.physics, "concealed physics, TOML");
-  app.add_option("--scenario", a.scenario, "faults by time, TOML (see sim_ins/README.md)");
-  app.add_option("--speed", node.speed, "INS seconds per second")->check(CLI::Range(0.01, 1e5))->capture_default_str();
-  app.add_option("--patience", node.patience, "stretches the time-outs of ISO-TP and session, for slow testers")
-      ->check(CLI::Range(1.0, 1000.0))
-      ->capture_default_str();
-  app.add_option("--turnaround", node.turnaround_ms, "of the tester in an upload, ms of INS time for each request")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->capture_default_str();
-  app.add_flag("--fd", node.fd, "CAN FD with bit rate switch");
-  app.add_option("--bit-rate", a.arbitration_rate, "bit/s")->capture_default_str();
-  app.add_option("--data-bit-rate", a.data_rate, "bit/s, FD data phase")->capture_default_str();
-  app.add_option("--request-id", node.request_id, "CAN identifier of requests");
-  app.add_option("--response-id", node.response_id, "CAN identifier of responses");
-  app.add_option("--functional-id", node.functional_id, "CAN identifier of functional requests");
-  app.add_option("--status-id", node.status_id, "CAN identifier of the state frame; the gimbal frame has the next");
-  app.add_flag("--extended-ids", node.extended_ids, "29-bit identifiers");
-  app.add_option(
+  options.text("--interface", node.interface, "CAN interface");
+  options.text("--config", a.config, "sim.toml: site, attitude, sensors, gimbal");
+  options.whole("--seed", a.seed, range::seed, "of every random draw: the same seed gives the same bits");
+  options.text("--key", a.key, "file with the SecurityAccess key, 32 hexadecimal digits", Needed::yes);
+  options.text("--flash", a.flash, "file that holds the FLASH; without it nothing outlives the process");
+  options.text("--truth", a.truth, "write the true sensor errors to this JSON file");
+  options.text("--physics", a.physics, "concealed physics, TOML");
+  options.text("--scenario", a.scenario, "faults by time, TOML (see sim_ins/README.md)");
+  options.number("--speed", node.speed, range::speed, "INS seconds per second");
+  options.number("--patience", node.patience, range::patience,
+                 "stretches the time-outs of ISO-TP and session, for slow testers");
+  options.number("--turnaround", node.turnaround_ms, range::turnaround,
+                 "of the tester in an upload, ms of INS time for each request");
+  options.flag("--fd", node.fd, "CAN FD with bit rate switch");
+  options.whole("--bit-rate", a.arbitration_rate, range::bit_rate, "bit/s");
+  options.whole("--data-bit-rate", a.data_rate, range::data_bit_rate, "bit/s, FD data phase");
+  options.can_identifier("--request-id", node.request_id, "CAN identifier of requests, hexadecimal");
+  options.can_identifier("--response-id", node.response_id, "CAN identifier of responses, hexadecimal");
+  options.can_identifier("--functional-id", node.functional_id, "CAN identifier of functional requests, hexadecimal");
+  options.can_identifier("--status-id", node.status_id,
+                         "CAN identifier of the state frame, hexadecimal; the gimbal frame has the next");
+  options.flag("--extended-ids", node.extended_ids, "29-bit identifiers");
+  options.texts(
       "--fault", a.faults,
       "KEY=VALUE, repeated. nrc=0x22: refuse every request so; crc=P: page P arrives spoilt once; "
       "stuck=T, frozen=T, saturated=T: gimbal, IMU, accelerometers (at 0.5 g) from T s of the rotation on; reset=T: at "
@@ -173,7 +177,7 @@ Expected<int> run(Arguments& a) {
   if (!instrument) {
     return tl::unexpected(instrument.error());
   }
-  a.node.rates = {a.arbitration_rate, a.data_rate};
+  a.node.rates = {static_cast<std::uint32_t>(a.arbitration_rate), static_cast<std::uint32_t>(a.data_rate)};
   a.node.diagnostics.key = *key;
   a.node.diagnostics.longest_response = a.node.fd ? 65535 : 4095;
   auto node = BusNode::open(a.node, **instrument);
@@ -190,13 +194,11 @@ Expected<int> run(Arguments& a) {
 }
 
 int configure_and_run(int argc, char** argv) {
-  CLI::App app{"A virtual INS with its own two-axis gimbal, on a CAN interface"};
+  CommandLine line("sim_ins", SELFCAL_VERSION, "A virtual INS with its own two-axis gimbal, on a CAN interface");
   Arguments arguments;
-  configure(app, arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : static_cast<int>(ErrorKind::usage);
+  configure(line.options(), arguments);
+  if (const std::optional<int> ended = line.parse(argc, argv)) {
+    return *ended;
   }
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };

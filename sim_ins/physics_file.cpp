@@ -4,13 +4,23 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "estimator/geometry/units.hpp"
+#include "protocol/toml_file/nearest_word.hpp"
 #include "sim_ins/physics.hpp"
 #include "sim_ins/toml_reader.hpp"
 
 namespace selfcal::sim {
 namespace {
+
+std::vector<std::string_view> known_ids() {
+  std::vector<std::string_view> ids;
+  for (const EffectDescription& description : physics_effects()) {
+    ids.push_back(description.id);
+  }
+  return ids;
+}
 
 void read_effect(TomlTable& table, ConcealedPhysics& physics) {
   PhysicsEffect effect;
@@ -20,7 +30,10 @@ void read_effect(TomlTable& table, ConcealedPhysics& physics) {
     known = description.id == effect.id ? &description : known;
   }
   if (known == nullptr) {
-    table.refuse("id", effect.id.empty() ? "missing" : fmt::format("no effect is called {}", effect.id));
+    table.refuse("id", effect.id.empty()
+                           ? "missing"
+                           : fmt::format("no effect is called {}{}", effect.id,
+                                         did_you_mean(effect.id, std::span<const std::string_view>(known_ids()))));
     return;
   }
   for (const EffectParameter& parameter : known->parameters) {

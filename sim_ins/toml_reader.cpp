@@ -4,6 +4,10 @@
 
 #include <cmath>
 #include <iterator>
+#include <span>
+#include <vector>
+
+#include "protocol/toml_file/nearest_word.hpp"
 
 namespace selfcal::sim {
 
@@ -134,7 +138,8 @@ Expected<void> TomlTable::finish() {
   if (!problem_) {
     for (const auto& [key, node] : table_) {
       if (!known_.contains(key.str())) {
-        refuse(key.str(), "no such key");
+        const std::vector<std::string> known(known_.begin(), known_.end());
+        refuse(key.str(), "no such key" + did_you_mean(key.str(), std::span<const std::string>(known)));
         break;
       }
     }

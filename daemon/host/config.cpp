@@ -6,8 +6,10 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <span>
 #include <sstream>
 
+#include "protocol/toml_file/nearest_word.hpp"
 #include "protocol/toml_file/toml_text.hpp"
 
 namespace selfcal {
@@ -159,7 +161,12 @@ class Reader {
         }
       }
       if (known == nullptr) {
-        complain(key.source().begin.line, full, "unknown key");
+        std::vector<std::string_view> names;
+        for (const auto& candidate : keys) {
+          names.push_back(candidate.name);
+        }
+        complain(key.source().begin.line, full,
+                 "unknown key" + did_you_mean(key.str(), std::span<const std::string_view>(names)));
       } else if (const std::string complaint = known->set(node, target); !complaint.empty()) {
         complain(key.source().begin.line, full, complaint);
       }

@@ -9,7 +9,6 @@ Time BusClock::transmit(const CanFrame& frame, Time now) {
   free_at_ = std::max(free_at_, now) + duration;
   busy_ += duration;
   ++frames_;
-  data_bytes_ += frame.remote ? 0U : frame.size;
   return free_at_;
 }
 

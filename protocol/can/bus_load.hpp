@@ -18,7 +18,6 @@ class BusClock {
   Time free_at() const { return free_at_; }
   Time busy() const { return busy_; }  // sum of all frames so far
   std::uint64_t frames() const { return frames_; }
-  std::uint64_t data_bytes() const { return data_bytes_; }
   const BitRates& rates() const { return rates_; }
 
  private:
@@ -26,7 +25,6 @@ class BusClock {
   Time free_at_{0};
   Time busy_{0};
   std::uint64_t frames_ = 0;
-  std::uint64_t data_bytes_ = 0;
 };
 
 }  // namespace selfcal::can

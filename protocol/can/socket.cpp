@@ -191,13 +191,6 @@ int Socket::fd() const { return impl_->fd; }
 std::uint64_t Socket::lost_frames() const { return impl_->lost; }
 const std::string& Socket::interface() const { return impl_->interface; }
 
-int Socket::receive_buffer_granted() const {
-  int size = 0;
-  socklen_t length = sizeof size;
-  ::getsockopt(impl_->fd, SOL_SOCKET, SO_RCVBUF, &size, &length);
-  return size;
-}
-
 Expected<std::span<const ReceivedFrame>> Socket::receive() {
   Impl& s = *impl_;
   const int count = ::recvmmsg(s.fd, s.headers.data(), static_cast<unsigned>(s.headers.size()), MSG_DONTWAIT, nullptr);

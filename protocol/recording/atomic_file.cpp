@@ -97,7 +97,7 @@ Expected<void> write_file_atomically(const std::filesystem::path& path, std::str
   constexpr mode_t mode = 0644;
   FileDescriptor descriptor(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode));
   if (descriptor.get() < 0) {
-    return io_error(path, "cannot create", ErrorKind::internal);
+    return io_error(path, "cannot create", ErrorKind::bad_input);
   }
   Expected<void> written = write_all(descriptor.get(), contents, path);
   if (written && !descriptor.close()) {

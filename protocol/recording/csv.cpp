@@ -87,6 +87,11 @@ int slot_of(std::string_view column) {
 
 Expected<Header> parse_header(std::string_view line, const std::string& name) {
   Header header;
+  for (const auto& [separator, words] : {std::pair{';', "semicolons"}, std::pair{'\t', "tabs"}}) {
+    if (line.find(separator) != std::string_view::npos && line.find(',') == std::string_view::npos) {
+      return bad(name, 1, fmt::format("{} between the fields; commas are expected, and points in numbers", words));
+    }
+  }
   std::array<bool, required_count + most_temperature_channels> seen{};
   for (bool more = true; more;) {
     const std::string_view column = next_field(line, more);
@@ -157,6 +162,10 @@ void append_row(const std::vector<double>& v, Recording& recording) {
 }
 
 Expected<void> parse_samples(std::string_view csv, const std::string& name, Recording& recording) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";  // spreadsheets begin their UTF-8 with it
+  if (csv.starts_with(byte_order_mark)) {
+    csv.remove_prefix(byte_order_mark.size());
+  }
   const Expected<Header> header = parse_header(next_line(csv), name);
   if (!header) {
     return tl::unexpected(header.error());

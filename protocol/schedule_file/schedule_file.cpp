@@ -1,10 +1,13 @@
 #include "protocol/schedule_file/schedule_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 
 #include "protocol/recording/atomic_file.hpp"
+#include "protocol/toml_file/nearest_word.hpp"
 #include "protocol/toml_file/toml_file.hpp"
 
 namespace selfcal {
@@ -12,6 +15,8 @@ namespace {
 
 // Two turns either way: no gimbal of ours turns further, and the cosine of a slip like 27000 would not show.
 constexpr double max_angle_deg = 720.0;
+
+constexpr std::array<std::string_view, 2> schedule_names = {"horizontal", "table2"};
 
 Expected<void> check_positions(const TomlFile& file, const std::vector<std::array<double, 2>>& positions) {
   if (positions.empty() || positions.size() > max_schedule_positions) {
@@ -121,7 +126,8 @@ Expected<Schedule> find_schedule(const std::string& name_or_file, std::optional<
     std::error_code ignored;
     if (!std::filesystem::exists(name_or_file, ignored)) {
       return fail(ErrorKind::usage,
-                  fmt::format("schedule {}: neither a file nor one of table2, horizontal", name_or_file));
+                  fmt::format("schedule {}: neither a file nor one of {}{}", name_or_file,
+                              fmt::join(schedule_names, ", "), did_you_mean(name_or_file, schedule_names)));
     }
     auto read = read_schedule(name_or_file);
     if (!read) {

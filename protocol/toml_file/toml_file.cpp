@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <sstream>
 #include <utility>
 
+#include "protocol/toml_file/nearest_word.hpp"
 #include "protocol/toml_file/toml_text.hpp"
 
 namespace selfcal {
@@ -92,8 +94,10 @@ bool TomlFile::is_array(std::string_view key) const {
 Expected<void> TomlFile::only(std::initializer_list<std::string_view> known) const {
   for (const auto& [key, node] : document_->table) {
     if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
-      return tl::unexpected(error_of(document_->name, &node, key.str(),
-                                     fmt::format("no such key; known are {}", fmt::join(known, ", "))));
+      return tl::unexpected(error_of(
+          document_->name, &node, key.str(),
+          fmt::format("no such key{}; known are {}", did_you_mean(key.str(), std::span(known.begin(), known.size())),
+                      fmt::join(known, ", "))));
     }
   }
   return {};

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -152,22 +151,21 @@ Expected<int> decode_log(const DecodeArguments& arguments) {
   return 0;
 }
 
-CommandRun configure(CLI::App& app) {
-  app.require_subcommand(1);
+CommandRun configure(Options& options) {
   auto log = std::make_shared<LogArguments>();
-  CLI::App* log_app = app.add_subcommand("log", "every frame of the bus, as `candump -L` writes it; until Ctrl-C");
-  log_app->add_option("INTERFACE", log->interface, "CAN interface, for example can0")->required();
-  log_app->add_option("--count", log->count, "stop after so many frames");
-  log_app->add_option("--seconds", log->seconds, "stop after so long")->check(CLI::PositiveNumber);
+  auto log_options = std::make_shared<Options>(
+      options.command("log", "every frame of the bus, as `candump -L` writes it; until Ctrl-C"));
+  log_options->text("INTERFACE", log->interface, "CAN interface, for example can0", Needed::yes);
+  log_options->whole("--count", log->count, range::frames, "stop after so many frames");
+  log_options->number("--seconds", log->seconds, range::waiting, "stop after so long");
   auto decode = std::make_shared<DecodeArguments>();
-  CLI::App* decode_app = app.add_subcommand("decode", "UDS messages and status frames of a log, by name");
-  decode_app->add_option("LOG", decode->file, "`candump -L` log; - for standard input")->required();
-  decode_app->add_option("--request-id", decode->decoder.request_id, "CAN identifier, tester to INS")
-      ->capture_default_str();
-  decode_app->add_option("--response-id", decode->decoder.response_id, "INS to tester")->capture_default_str();
-  decode_app->add_option("--functional-id", decode->decoder.functional_id, "tester to all")->capture_default_str();
-  decode_app->add_flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
-  return [log_app, log, decode]() -> Expected<int> { return log_app->parsed() ? log_bus(*log) : decode_log(*decode); };
+  Options decoding = options.command("decode", "UDS messages and status frames of a log, by name");
+  decoding.text("LOG", decode->file, "`candump -L` log; - for standard input", Needed::yes);
+  decoding.can_identifier("--request-id", decode->decoder.request_id, "CAN identifier, tester to INS, hexadecimal");
+  decoding.can_identifier("--response-id", decode->decoder.response_id, "INS to tester, hexadecimal");
+  decoding.can_identifier("--functional-id", decode->decoder.functional_id, "tester to all, hexadecimal");
+  decoding.flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
+  return [log_options, log, decode] { return log_options->chosen() ? log_bus(*log) : decode_log(*decode); };
 }
 
 const CommandRegistration registration{{"bus", "log and decode the CAN bus", configure}};

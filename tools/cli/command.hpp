@@ -1,10 +1,10 @@
 // The commands of `selfcal`: each file of this folder that holds one registers it, and main.cpp offers them all.
 //
 //   namespace {
-//   CommandRun configure(CLI::App& app) {
-//     auto options = std::make_shared<Options>();
-//     app.add_option("FILE", options->file, "...")->required();
-//     return [options]() -> Expected<int> { ...; return 0; };
+//   CommandRun configure(Options& options) {
+//     auto arguments = std::make_shared<Arguments>();
+//     options.text("FILE", arguments->file, "...", Needed::yes);
+//     return [arguments]() -> Expected<int> { ...; return 0; };
 //   }
 //   const CommandRegistration registration{{"estimate", "the 24 sensor errors of a recording", configure}};
 //   }  // namespace
@@ -14,11 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "protocol/command_line/command_line.hpp"
 #include "protocol/error.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace selfcal::cli {
 
@@ -29,7 +26,7 @@ using CommandRun = std::function<Expected<int>()>;
 struct Command {
   std::string name;
   std::string description;
-  std::function<CommandRun(CLI::App&)> configure;  // adds options to the subcommand's parser
+  std::function<CommandRun(Options&)> configure;  // adds its options
 };
 
 class CommandRegistration {

@@ -1,7 +1,6 @@
 // selfcal diagnose: where recording and model differ, which physics was left out, and the proof.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -262,30 +261,27 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   return diagnosis.mismatch ? 1 : 0;
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   auto arguments = std::make_shared<DiagnoseArguments>();
-  app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
-  app.add_flag("--json", arguments->json, "one JSON document on standard output");
-  app.add_option("--physics", arguments->physics, "write what was named as a physics file for the simulation");
-  app.add_option("--amended", arguments->amended,
-                 "write physics.toml, sim.toml (with the 24 as fitted) and schedule.toml into this folder");
-  app.add_option("--against", arguments->against,
-                 "compare with this simulation of the same schedule instead of the fitted model");
-  app.add_option("--split-schedule", arguments->split_schedule,
-                 "where effects cannot be told apart: plan experiments that would, write the best one's schedule");
-  app.add_option("--holdout", arguments->holdout, "try what was named on this second recording of the same unit")
-      ->excludes("--against");
-  app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of a whole recording")
-      ->check(CLI::Range(1e-6, 0.2))
-      ->capture_default_str();
-  app.add_option("--arw", arguments->arw_deg_per_sqrt_h, "angle random walk the simulation assumes, deg/sqrt(h)")
-      ->capture_default_str();
-  app.add_option("--vrw", arguments->vrw_ug_per_sqrt_hz, "velocity random walk it assumes, ug/sqrt(Hz)")
-      ->capture_default_str();
-  app.add_option("--gyro-lsb", arguments->gyro_lsb_arcsec, "quantum of the gyros it assumes, arcsec")
-      ->capture_default_str();
-  app.add_option("--accel-lsb", arguments->accel_lsb_mps, "quantum of the accelerometers it assumes, m/s")
-      ->capture_default_str();
+  options.text("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file", Needed::yes);
+  options.flag("--json", arguments->json, "one JSON document on standard output");
+  options.text("--physics", arguments->physics, "write what was named as a physics file for the simulation");
+  options.text("--amended", arguments->amended,
+               "write physics.toml, sim.toml (with the 24 as fitted) and schedule.toml into this folder");
+  options.text("--against", arguments->against,
+               "compare with this simulation of the same schedule instead of the fitted model");
+  options.text("--split-schedule", arguments->split_schedule,
+               "where effects cannot be told apart: plan experiments that would, write the best one's schedule");
+  options.text("--holdout", arguments->holdout, "try what was named on this second recording of the same unit");
+  options.exclude("--holdout", "--against");
+  options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of a whole recording");
+  options.number("--arw", arguments->arw_deg_per_sqrt_h, range::arw,
+                 "angle random walk the simulation assumes, deg/sqrt(h)");
+  options.number("--vrw", arguments->vrw_ug_per_sqrt_hz, range::vrw, "velocity random walk it assumes, ug/sqrt(Hz)");
+  options.number("--gyro-lsb", arguments->gyro_lsb_arcsec, range::gyro_quantum,
+                 "quantum of the gyros it assumes, arcsec");
+  options.number("--accel-lsb", arguments->accel_lsb_mps, range::accel_quantum,
+                 "quantum of the accelerometers it assumes, m/s");
   return [arguments] { return diagnose(*arguments); };
 }
 

@@ -1,7 +1,6 @@
 // selfcal estimate: the 24 sensor errors of a recording.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 
@@ -22,7 +21,7 @@ struct EstimateArguments {
   bool curves = false;
   bool no_diagnosis = false;
   std::string covariance = "once";
-  int max_passes = CalibrationOptions{}.max_passes;
+  std::uint64_t max_passes = static_cast<std::uint64_t>(CalibrationOptions{}.max_passes);
   double convergence_sigma = CalibrationOptions{}.convergence_sigma;
   std::vector<std::string> tolerance;
   NoiseArguments noise;
@@ -31,7 +30,7 @@ struct EstimateArguments {
 Expected<CalibrationOptions> options_from(const EstimateArguments& arguments) {
   CalibrationOptions options;
   options.noise = arguments.noise.in_si();
-  options.max_passes = arguments.max_passes;
+  options.max_passes = static_cast<int>(arguments.max_passes);
   options.convergence_sigma = arguments.convergence_sigma;
   options.carried_covariance = arguments.covariance == "carried";
   const Expected<ParameterVector> tolerance = tolerance_from(arguments.tolerance);
@@ -82,27 +81,21 @@ Expected<int> estimate(const EstimateArguments& arguments) {
   return judged->gate.acceptable() ? 0 : 1;
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   auto arguments = std::make_shared<EstimateArguments>();
-  app.add_option("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file")->required();
-  app.add_flag("--json", arguments->json, "one JSON document on standard output");
-  app.add_flag("--curves", arguments->curves, "with --json: convergence within the passes, and the correlations");
-  app.add_flag("--no-diagnosis", arguments->no_diagnosis,
+  options.text("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file", Needed::yes);
+  options.flag("--json", arguments->json, "one JSON document on standard output");
+  options.flag("--curves", arguments->curves, "with --json: convergence within the passes, and the correlations");
+  options.flag("--no-diagnosis", arguments->no_diagnosis,
                "do not look for the cause where recording and model disagree (some seconds)");
-  arguments->noise.add_to(app);
-  app.add_option("--covariance", arguments->covariance,
-                 "once: every datum counts once; carried: kept from pass to pass (overconfident, for comparison)")
-      ->check(CLI::IsMember({"once", "carried"}))
-      ->capture_default_str();
-  app.add_option("--max-passes", arguments->max_passes, "stop after so many passes")
-      ->check(CLI::Range(3, 99))
-      ->capture_default_str();
-  app.add_option("--convergence", arguments->convergence_sigma,
-                 "stop when no parameter moves by more than this fraction of its sigma")
-      ->check(CLI::Range(1e-6, 1.0))
-      ->capture_default_str();
-  app.add_option("--tolerance", arguments->tolerance,
-                 "NAME=VALUE: sigma beyond which a parameter (gyro_scale_y) or group (gyro_scale) is not determined");
+  arguments->noise.add_to(options);
+  options.choice("--covariance", arguments->covariance, {"once", "carried"},
+                 "once: every datum counts once; carried: kept from pass to pass (overconfident, for comparison)");
+  options.whole("--max-passes", arguments->max_passes, range::passes, "stop after so many passes");
+  options.number("--convergence", arguments->convergence_sigma, range::convergence,
+                 "stop when no parameter moves by more than this fraction of its sigma");
+  options.texts("--tolerance", arguments->tolerance,
+                "NAME=VALUE: sigma beyond which a parameter (gyro_scale_y) or group (gyro_scale) is not determined");
   return [arguments] { return estimate(*arguments); };
 }
 

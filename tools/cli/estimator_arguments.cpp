@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <charconv>
+#include <set>
+#include <span>
 
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
+#include "protocol/toml_file/nearest_word.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -24,13 +26,13 @@ std::optional<double> positive_number(std::string_view text) {
 
 }  // namespace
 
-void NoiseArguments::add_to(CLI::App& app) {
-  app.add_option("--arw", arw_deg_per_sqrt_h, "gyro angle random walk, deg/sqrt(h); else found in the data")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--vrw", vrw_ug_per_sqrt_hz, "accelerometer velocity random walk, ug/sqrt(Hz); else found")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--position-noise", position_sigma_m, "1 sigma of the known position at 1 Hz, m; else found")
-      ->check(CLI::PositiveNumber);
+void NoiseArguments::add_to(Options& options) {
+  options.number("--arw", arw_deg_per_sqrt_h, range::arw,
+                 "gyro angle random walk, deg/sqrt(h); else found in the data");
+  options.number("--vrw", vrw_ug_per_sqrt_hz, range::vrw,
+                 "accelerometer velocity random walk, ug/sqrt(Hz); else found");
+  options.number("--position-noise", position_sigma_m, range::position_noise,
+                 "1 sigma of the known position at 1 Hz, m; else found");
 }
 
 NoiseOptions NoiseArguments::in_si() const {
@@ -45,25 +47,47 @@ NoiseOptions NoiseArguments::in_si() const {
   return noise;
 }
 
+Expected<std::vector<std::size_t>> parameters_called(std::string_view name, const std::string& option, Units allowed) {
+  std::vector<std::size_t> called;
+  std::vector<std::string> covered;
+  std::set<std::string_view> units, known;
+  for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
+    const std::string_view parameter = sensor_parameters[k].name;
+    known.insert(parameter);
+    known.insert(parameter.substr(0, parameter.rfind('_')));  // its group
+    if (in_group(parameter, name)) {
+      called.push_back(k);
+      units.insert(sensor_parameters[k].unit);
+      covered.push_back(fmt::format("{} ({})", parameter, sensor_parameters[k].unit));
+    }
+  }
+  if (called.empty()) {
+    const std::vector<std::string_view> words(known.begin(), known.end());
+    return fail(ErrorKind::usage, fmt::format("{}: no parameter or group is called {}{}", option, name,
+                                              did_you_mean(name, std::span<const std::string_view>(words))));
+  }
+  if (units.size() > 1 && allowed == Units::one) {
+    return fail(ErrorKind::usage,
+                fmt::format("{}: {} are parameters of different units: {}", option, name, fmt::join(covered, ", ")));
+  }
+  return called;
+}
+
 Expected<ParameterVector> tolerance_from(const std::vector<std::string>& arguments) {
   ParameterVector tolerance = default_tolerance();
   for (const std::string& argument : arguments) {
     const std::size_t equals = argument.find('=');
-    const std::string_view name = std::string_view(argument).substr(0, equals);
     const auto value =
         equals == std::string::npos ? std::nullopt : positive_number(std::string_view(argument).substr(equals + 1));
     if (!value) {
       return fail(ErrorKind::usage, fmt::format("--tolerance {}: NAME=VALUE with VALUE > 0 expected", argument));
     }
-    bool found = false;
-    for (std::size_t k = 0; k < sensor_parameter_count; ++k) {
-      if (in_group(sensor_parameters[k].name, name)) {
-        tolerance[static_cast<Eigen::Index>(k)] = *value * sensor_parameters[k].si_per_unit;
-        found = true;
-      }
+    const auto called = parameters_called(std::string_view(argument).substr(0, equals), "--tolerance " + argument);
+    if (!called) {
+      return tl::unexpected(called.error());
     }
-    if (!found) {
-      return fail(ErrorKind::usage, fmt::format("--tolerance {}: no parameter or group is named {}", argument, name));
+    for (const std::size_t k : *called) {
+      tolerance[static_cast<Eigen::Index>(k)] = *value * sensor_parameters[k].si_per_unit;
     }
   }
   return tolerance;

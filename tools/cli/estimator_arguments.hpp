@@ -3,14 +3,12 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/passes/calibration.hpp"
+#include "protocol/command_line/command_line.hpp"
 #include "protocol/error.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace selfcal::cli {
 
@@ -20,11 +18,17 @@ struct NoiseArguments {
   std::optional<double> vrw_ug_per_sqrt_hz;
   std::optional<double> position_sigma_m;
 
-  void add_to(CLI::App& app);
+  void add_to(Options& options);
   NoiseOptions in_si() const;
 };
 
-// --tolerance NAME=VALUE, repeated: NAME is a parameter (gyro_scale_y) or a group (gyro_scale), VALUE in its unit.
+// The parameters that NAME means: one (gyro_scale_y) or a group (gyro_scale). An error, with OPTION before it, where
+// there is none, or where NAME covers several units (gyro) and one value is meant for all.
+enum class Units { one, any };
+Expected<std::vector<std::size_t>> parameters_called(std::string_view name, const std::string& option,
+                                                     Units units = Units::one);
+
+// --tolerance NAME=VALUE, repeated, VALUE in the parameters' unit.
 Expected<ParameterVector> tolerance_from(const std::vector<std::string>& arguments);
 
 }  // namespace selfcal::cli

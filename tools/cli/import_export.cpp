@@ -1,12 +1,12 @@
 // selfcal import, selfcal export: CSV to HDF5 and back, with every check that a reader makes.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "protocol/recording/csv.hpp"
 #include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/output_file.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -22,7 +22,11 @@ constexpr CheckPolicy lenient{.gaps_are_errors = false, .gimbal_contradiction_is
 using Reader = Expected<LoadedRecording> (*)(const std::filesystem::path&, const CheckPolicy&);
 using Writer = Expected<void> (*)(const Recording&, const std::filesystem::path&);
 
-Expected<int> convert(const std::string& command, const ConvertArguments& arguments, Reader read, Writer write) {
+Expected<int> convert(const std::string& command, const ConvertArguments& arguments,
+                      std::initializer_list<std::string_view> endings, Reader read, Writer write) {
+  if (const auto known = check_output(arguments.to, endings); !known) {
+    return tl::unexpected(known.error());
+  }
   const Expected<LoadedRecording> loaded = read(arguments.from, lenient);
   if (!loaded) {
     return tl::unexpected(loaded.error());
@@ -33,21 +37,23 @@ Expected<int> convert(const std::string& command, const ConvertArguments& argume
   return write(loaded->recording, arguments.to).map([] { return 0; });
 }
 
-std::shared_ptr<ConvertArguments> add_arguments(CLI::App& app, const char* from, const char* to) {
+std::shared_ptr<ConvertArguments> add_arguments(Options& options, const char* from, const char* to) {
   auto arguments = std::make_shared<ConvertArguments>();
-  app.add_option("RECORDING", arguments->from, from)->required();
-  app.add_option("-o,--output", arguments->to, to)->required();
+  options.text("RECORDING", arguments->from, from, Needed::yes);
+  options.text("-o,--output", arguments->to, to, Needed::yes);
   return arguments;
 }
 
-CommandRun configure_import(CLI::App& app) {
-  const auto arguments = add_arguments(app, "CSV file; its attributes in a TOML file of the same stem", "HDF5 file");
-  return [arguments] { return convert("import", *arguments, read_csv, write_hdf5); };
+CommandRun configure_import(Options& options) {
+  const auto arguments =
+      add_arguments(options, "CSV file; its attributes in a TOML file of the same stem", "HDF5 file: .h5 or .hdf5");
+  return [arguments] { return convert("import", *arguments, {".h5", ".hdf5"}, read_csv, write_hdf5); };
 }
 
-CommandRun configure_export(CLI::App& app) {
-  const auto arguments = add_arguments(app, "HDF5 file", "CSV file; the attributes go to a TOML file of the same stem");
-  return [arguments] { return convert("export", *arguments, read_hdf5, write_csv); };
+CommandRun configure_export(Options& options) {
+  const auto arguments =
+      add_arguments(options, "HDF5 file", "CSV file (.csv); the attributes go to a TOML file of the same stem");
+  return [arguments] { return convert("export", *arguments, {".csv"}, read_hdf5, write_csv); };
 }
 
 const CommandRegistration import_registration{{"import", "CSV recording to HDF5", configure_import}};

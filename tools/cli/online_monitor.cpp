@@ -4,8 +4,8 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
+#include <chrono>
 #include <lcm/lcm-cpp.hpp>
 #include <memory>
 #include <optional>
@@ -23,9 +23,10 @@ volatile sig_atomic_t ended = 0;
 constexpr int frame_ms = 100;
 constexpr int most_per_frame = 1000;  // messages
 
-struct Options {
+struct Arguments {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   bool once = false;
+  double wait_s = 10.0;  // the service tells its state every second
 };
 
 // Keeps the latest of everything; where the output is no terminal each message is one line.
@@ -70,7 +71,7 @@ class Listener {
 };
 
 // Draws at most ten times a second, however fast messages come, and at least so often.
-Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Options& options) {
+Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Arguments& options) {
   const bool log = options.url.starts_with("file://");
   std::optional<MonitorTerminal> terminal;
   if (isatty(STDOUT_FILENO) != 0) {
@@ -78,12 +79,19 @@ Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Options& opti
   }
   std::size_t selected = 0;
   bool over = false;  // a log has an end; what it left stays on the screen
+  const auto began = std::chrono::steady_clock::now();
   while (ended == 0 && !(options.once && listener.heard() > 0) && !(over && !terminal)) {
     if (!over && lcm.handleTimeout(frame_ms) < 0 && errno != EINTR) {
       if (!log) {
         return ended != 0 ? Expected<int>(0) : fail(ErrorKind::device, "LCM: receiving failed");
       }
       over = true;
+    }
+    const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - began;
+    if (options.once && listener.heard() == 0 && (over || waited.count() > options.wait_s)) {
+      return fail(ErrorKind::device,
+                  over ? fmt::format("{}: holds no message of selfcald", options.url)
+                       : fmt::format("{}: no message of selfcald within {:g} s", options.url, options.wait_s));
     }
     if (!terminal) {
       continue;
@@ -106,7 +114,7 @@ Expected<int> watch(lcm::LCM& lcm, const Listener& listener, const Options& opti
   return 0;
 }
 
-Expected<int> monitor(const Options& options) {
+Expected<int> monitor(const Arguments& options) {
   lcm::LCM lcm(options.url);
   if (!lcm.good()) {
     return fail(ErrorKind::device, fmt::format("LCM: {} cannot be opened (no multicast route? "
@@ -122,12 +130,13 @@ Expected<int> monitor(const Options& options) {
   return watch(lcm, listener, options);
 }
 
-CommandRun configure(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.add_option("--url", options->url, "LCM provider; file://LOG?speed=1 replays an lcm-logger log")
-      ->capture_default_str();
-  app.add_flag("--once", options->once, "end after the first message");
-  return [options] { return monitor(*options); };
+CommandRun configure(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  options.text("--url", arguments->url, "LCM provider; file://LOG?speed=1 replays an lcm-logger log");
+  options.flag("--once", arguments->once, "end after the first message");
+  options.number("--wait", arguments->wait_s, range::waiting,
+                 "with --once: end with status 4 where none has come after so many seconds");
+  return [arguments] { return monitor(*arguments); };
 }
 
 const CommandRegistration registration{{"monitor", "show the daemon's LCM messages live", configure}};

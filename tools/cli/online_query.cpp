@@ -1,13 +1,14 @@
 // selfcal status, abort, show, history, db: one question to the daemon, one answer.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/host/state_lock.hpp"
 #include "daemon/store/database_copies.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/document/document_head.hpp"
+#include "protocol/toml_file/nearest_word.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_text.hpp"
@@ -16,7 +17,7 @@
 namespace selfcal::cli {
 namespace {
 
-struct Options {
+struct Arguments {
   std::string ins, reason, serial, name;
   std::string state_directory = "/var/lib/selfcal";
   bool offline = false;
@@ -24,10 +25,10 @@ struct Options {
   bool json = false, csv = false;
 };
 
-using Body = Expected<int> (*)(ManagerClient&, const Options&);
+using Body = Expected<int> (*)(ManagerClient&, const Arguments&);
 
 // Connects, then does it.
-CommandRun online(const std::shared_ptr<Options>& options, Body body) {
+CommandRun online(const std::shared_ptr<Arguments>& options, Body body) {
   return [options, body]() -> Expected<int> {
     auto manager = ManagerClient::connect();
     if (!manager) {
@@ -102,7 +103,7 @@ std::string memory_text(const Json& ins) {
   return text + "\n";
 }
 
-Expected<int> status(ManagerClient& manager, const Options& options) {
+Expected<int> status(ManagerClient& manager, const Arguments& options) {
   const auto instruments = manager.instruments();
   if (!instruments) {
     return tl::unexpected(instruments.error());
@@ -143,7 +144,8 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
     }
   }
   if (all.empty()) {
-    return fail(ErrorKind::usage, fmt::format("no INS \"{}\"", options.ins));
+    return fail(ErrorKind::usage, fmt::format("no INS \"{}\"{}; configured: {}", options.ins,
+                                              did_you_mean(options.ins, *instruments), fmt::join(*instruments, ", ")));
   }
   if (options.json) {
     fmt::print("{}\n", document::with_head(document::status, {{"instruments", all}}).dump());
@@ -169,14 +171,14 @@ Expected<int> status(ManagerClient& manager, const Options& options) {
   return 0;
 }
 
-CommandRun configure_status(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.add_option("INS", options->ins, "one INS; all if left out");
-  app.add_flag("--json", options->json, "as JSON");
-  return online(options, status);
+CommandRun configure_status(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  options.text("INS", arguments->ins, "one INS; all if left out");
+  options.flag("--json", arguments->json, "as JSON");
+  return online(arguments, status);
 }
 
-Expected<int> abort_run(ManagerClient& manager, const Options& options) {
+Expected<int> abort_run(ManagerClient& manager, const Arguments& options) {
   const auto ins = choose_ins(manager, options.ins);
   if (!ins) {
     return tl::unexpected(ins.error());
@@ -190,15 +192,15 @@ Expected<int> abort_run(ManagerClient& manager, const Options& options) {
   return 0;
 }
 
-CommandRun configure_abort(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.add_option("INS", options->ins, "which INS; may be left out where there is one");
-  app.add_option("--reason", options->reason, "why; it is recorded");
-  app.add_flag("--json", options->json, "as JSON");
-  return online(options, abort_run);
+CommandRun configure_abort(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  options.text("INS", arguments->ins, "which INS; may be left out where there is one");
+  options.text("--reason", arguments->reason, "why; it is recorded");
+  options.flag("--json", arguments->json, "as JSON");
+  return online(arguments, abort_run);
 }
 
-Expected<int> show(ManagerClient& manager, const Options& options) {
+Expected<int> show(ManagerClient& manager, const Arguments& options) {
   const auto document = manager.show(options.run);
   if (!document) {
     return tl::unexpected(document.error());
@@ -207,32 +209,40 @@ Expected<int> show(ManagerClient& manager, const Options& options) {
   return 0;
 }
 
-CommandRun configure_show(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.add_option("RUN", options->run, "number of the run")->required();
-  app.add_flag("--json", options->json, "as JSON");
-  return online(options, show);
+CommandRun configure_show(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  options.whole("RUN", arguments->run, range::run, "number of the run", Needed::yes);
+  options.flag("--json", arguments->json, "as JSON");
+  return online(arguments, show);
 }
 
-Expected<int> history(ManagerClient& manager, const Options& options) {
+Expected<int> history(ManagerClient& manager, const Arguments& options) {
   const auto document = manager.history(options.serial);
   if (!document) {
     return tl::unexpected(document.error());
+  }
+  if (!options.serial.empty() && nlohmann::json::parse(*document).at("runs").empty()) {
+    fmt::print(stderr, "selfcal history: no run of an INS with serial number {} is known\n", options.serial);
+    if (options.json) {
+      fmt::print("{}\n", *document);
+    }
+    return 1;
   }
   fmt::print("{}", options.json ? *document + "\n" : options.csv ? history_csv(*document) : history_text(*document));
   return 0;
 }
 
-CommandRun configure_history(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.add_option("SERIAL", options->serial, "serial number of the INS; the runs of all if left out");
-  auto* json = app.add_flag("--json", options->json, "as JSON");
-  app.add_flag("--csv", options->csv, "each value of each parameter, as CSV")->excludes(json);
-  return online(options, history);
+CommandRun configure_history(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  options.text("SERIAL", arguments->serial, "serial number of the INS; the runs of all if left out");
+  options.flag("--json", arguments->json, "as JSON");
+  options.flag("--csv", arguments->csv, "each value of each parameter, as CSV");
+  options.exclude("--csv", "--json");
+  return online(arguments, history);
 }
 
 // Sound, or what is wrong with it (status 1).
-Expected<int> check_database(ManagerClient& manager, const Options& options) {
+Expected<int> check_database(ManagerClient& manager, const Arguments& options) {
   const auto complaint = manager.check_database();
   if (!complaint) {
     return tl::unexpected(complaint.error());
@@ -247,7 +257,7 @@ Expected<int> check_database(ManagerClient& manager, const Options& options) {
   return complaint->empty() ? 0 : 1;
 }
 
-Expected<int> backup_database(ManagerClient& manager, const Options& options) {
+Expected<int> backup_database(ManagerClient& manager, const Arguments& options) {
   const auto path = manager.backup_database(options.name);
   if (!path) {
     return tl::unexpected(path.error());
@@ -256,14 +266,14 @@ Expected<int> backup_database(ManagerClient& manager, const Options& options) {
   return 0;
 }
 
-Expected<int> say_restored(const std::string& kept, const Options& options) {
+Expected<int> say_restored(const std::string& kept, const Arguments& options) {
   fmt::print("{}\n", options.json   ? document::with_head(document::database, {{"kept", kept}}).dump()
                      : kept.empty() ? std::string("restored")
                                     : "restored; the former database is " + kept);
   return 0;
 }
 
-Expected<int> restore_online(ManagerClient& manager, const Options& options) {
+Expected<int> restore_online(ManagerClient& manager, const Arguments& options) {
   const auto kept = manager.restore_database(options.name);
   if (!kept) {
     return tl::unexpected(kept.error());
@@ -271,7 +281,7 @@ Expected<int> restore_online(ManagerClient& manager, const Options& options) {
   return say_restored(*kept, options);
 }
 
-Expected<int> restore_offline(const Options& options) {
+Expected<int> restore_offline(const Arguments& options) {
   const auto lock = StateLock::take(options.state_directory);
   if (!lock) {
     return tl::unexpected(lock.error());
@@ -283,25 +293,26 @@ Expected<int> restore_offline(const Options& options) {
   return say_restored(kept->string(), options);
 }
 
-CommandRun configure_database(CLI::App& app) {
-  auto options = std::make_shared<Options>();
-  app.require_subcommand(1);
-  auto* check = app.add_subcommand("check", "integrity, and rows that belong to no run");
-  auto* backup = app.add_subcommand("backup", "copy the database while the daemon uses it");
-  backup->add_option("NAME", options->name, "name of the copy, in the state directory's folder backups")->required();
-  auto* restore = app.add_subcommand("restore", "put a backup in the database's place; the former one is kept");
-  restore->add_option("NAME", options->name, "name of the copy, in the state directory's folder backups")->required();
-  restore->add_flag("--offline", options->offline, "the daemon is stopped (it does not start on a damaged database)");
-  restore->add_option("--state-directory", options->state_directory, "with --offline")->capture_default_str();
-  app.add_flag("--json", options->json, "as JSON");
-  const CommandRun run_restore = online(options, restore_online);
-  const CommandRun run_check = online(options, check_database);
-  const CommandRun run_backup = online(options, backup_database);
+CommandRun configure_database(Options& options) {
+  auto arguments = std::make_shared<Arguments>();
+  constexpr const char* name = "name of the copy, in the state directory's folder backups";
+  auto check = std::make_shared<Options>(options.command("check", "integrity, and rows that belong to no run"));
+  Options backup = options.command("backup", "copy the database while the daemon uses it");
+  backup.text("NAME", arguments->name, name, Needed::yes);
+  auto restore = std::make_shared<Options>(
+      options.command("restore", "put a backup in the database's place; the former one is kept"));
+  restore->text("NAME", arguments->name, name, Needed::yes);
+  restore->flag("--offline", arguments->offline, "the daemon is stopped (it does not start on a damaged database)");
+  restore->text("--state-directory", arguments->state_directory, "with --offline");
+  options.flag("--json", arguments->json, "as JSON");
+  const CommandRun run_restore = online(arguments, restore_online);
+  const CommandRun run_check = online(arguments, check_database);
+  const CommandRun run_backup = online(arguments, backup_database);
   return [=] {
-    if (restore->parsed()) {
-      return options->offline ? restore_offline(*options) : run_restore();
+    if (restore->chosen()) {
+      return arguments->offline ? restore_offline(*arguments) : run_restore();
     }
-    return check->parsed() ? run_check() : run_backup();
+    return check->chosen() ? run_check() : run_backup();
   };
 }
 

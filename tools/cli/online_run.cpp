@@ -3,7 +3,6 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -208,16 +207,16 @@ Expected<int> run(const RunOptions& options) {
   return report(**manager, *id, *ending, options.json);
 }
 
-CommandRun configure_run(CLI::App& app) {
-  auto options = std::make_shared<RunOptions>();
-  app.add_option("INS", options->ins, "which INS (a section of selfcald.toml); may be left out where there is one");
-  app.add_option("--schedule", options->schedule, "table2, horizontal, or a file that the daemon can read");
-  app.add_flag("--dry-run", options->dry_run, "estimate and judge, write nothing to the INS");
-  app.add_flag("--stop-when-met", options->stop_when_met, "end the rotation as soon as every tolerance is met");
-  app.add_option("--force", options->force, "write a result that the gate refuses; the reason is recorded");
-  app.add_flag("--detach", options->detach, "print the run's number and do not wait");
-  app.add_flag("--json", options->json, "the run's document on standard output");
-  return [options] { return run(*options); };
+CommandRun configure_run(Options& options) {
+  auto arguments = std::make_shared<RunOptions>();
+  options.text("INS", arguments->ins, "which INS (a section of selfcald.toml); may be left out where there is one");
+  options.text("--schedule", arguments->schedule, "table2, horizontal, or a file that the daemon can read");
+  options.flag("--dry-run", arguments->dry_run, "estimate and judge, write nothing to the INS");
+  options.flag("--stop-when-met", arguments->stop_when_met, "end the rotation as soon as every tolerance is met");
+  options.text("--force", arguments->force, "write a result that the gate refuses; the reason is recorded");
+  options.flag("--detach", arguments->detach, "print the run's number and do not wait");
+  options.flag("--json", arguments->json, "the run's document on standard output");
+  return [arguments] { return run(*arguments); };
 }
 
 // Follows a run that is of another's making; its document says which INS.
@@ -259,13 +258,13 @@ Expected<int> amend(const AmendOptions& options) {
   return follow_begun(**manager, (*manager)->amend(options.run, wanted), options.json);
 }
 
-CommandRun configure_amend(CLI::App& app) {
-  auto options = std::make_shared<AmendOptions>();
-  app.add_option("RUN", options->run, "the run whose recording it is")->required();
-  app.add_flag("--dry-run", options->dry_run, "diagnose, estimate and judge, write nothing to the INS");
-  app.add_option("--force", options->force, "write a result that the gate refuses; the reason is recorded");
-  app.add_flag("--json", options->json, "the run's document on standard output");
-  return [options] { return amend(*options); };
+CommandRun configure_amend(Options& options) {
+  auto arguments = std::make_shared<AmendOptions>();
+  options.whole("RUN", arguments->run, range::run, "the run whose recording it is", Needed::yes);
+  options.flag("--dry-run", arguments->dry_run, "diagnose, estimate and judge, write nothing to the INS");
+  options.text("--force", arguments->force, "write a result that the gate refuses; the reason is recorded");
+  options.flag("--json", arguments->json, "the run's document on standard output");
+  return [arguments] { return amend(*arguments); };
 }
 
 struct RollbackOptions {
@@ -282,12 +281,12 @@ Expected<int> rollback(const RollbackOptions& options) {
   return follow_begun(**manager, (*manager)->rollback(options.serial, options.reason), options.json);
 }
 
-CommandRun configure_rollback(CLI::App& app) {
-  auto options = std::make_shared<RollbackOptions>();
-  app.add_option("SERIAL", options->serial, "serial number of the INS")->required();
-  app.add_option("--reason", options->reason, "why; it is recorded")->required();
-  app.add_flag("--json", options->json, "the run's document on standard output");
-  return [options] { return rollback(*options); };
+CommandRun configure_rollback(Options& options) {
+  auto arguments = std::make_shared<RollbackOptions>();
+  options.text("SERIAL", arguments->serial, "serial number of the INS", Needed::yes);
+  options.text("--reason", arguments->reason, "why; it is recorded", Needed::yes);
+  options.flag("--json", arguments->json, "the run's document on standard output");
+  return [arguments] { return rollback(*arguments); };
 }
 
 const CommandRegistration run_registration{{"run", "calibrate an INS through the daemon", configure_run}};

@@ -1,7 +1,6 @@
 // selfcal plan: predicted sigma of the 24 before anything turns, and the search for a schedule.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "protocol/schedule_file/schedule_file.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/estimator_arguments.hpp"
+#include "tools/cli/output_file.hpp"
 #include "tools/cli/page_writer.hpp"
 #include "tools/cli/terminal.hpp"
 
@@ -53,15 +53,12 @@ Expected<Installation> installation_from(const PlanArguments& a) {
   }
   installation.tolerance = *tolerance;
   for (const std::string& name : a.ignored) {
-    bool found = false;
-    for (int i = 0; i < sensor_parameter_count; ++i) {
-      if (sensor_parameters[static_cast<std::size_t>(i)].name.starts_with(name)) {
-        installation.tolerance(i) = HUGE_VAL;
-        found = true;
-      }
+    const auto called = parameters_called(name, "--ignore " + name, Units::any);
+    if (!called) {
+      return tl::unexpected(called.error());
     }
-    if (!found) {
-      return fail(ErrorKind::usage, fmt::format("--ignore {}: no parameter or group of this name", name));
+    for (const std::size_t k : *called) {
+      installation.tolerance(static_cast<Eigen::Index>(k)) = HUGE_VAL;
     }
   }
   return installation;
@@ -182,6 +179,11 @@ Expected<int> plan(const PlanArguments& a) {
   if (!installation) {
     return tl::unexpected(installation.error());
   }
+  if (!a.output.empty()) {
+    if (const auto known = check_output(a.output, {".html", ".pdf", ".toml"}); !known) {
+      return tl::unexpected(known.error());
+    }
+  }
   if (!a.compared.empty() && !is_page(a.output)) {
     return fail(ErrorKind::usage, "--compare: for a page only (-o NAME.html or NAME.pdf)");
   }
@@ -243,36 +245,27 @@ Expected<int> plan(const PlanArguments& a) {
   return result.meets_tolerances() ? 0 : 1;
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   auto a = std::make_shared<PlanArguments>();
-  app.add_option("--schedule", a->schedule, "table2, horizontal, or a TOML file")->capture_default_str();
-  app.add_option("--dwell", a->dwell_s, "seconds at each position")->check(CLI::PositiveNumber);
-  app.add_option("--rotation", a->rotation_s, "seconds for each move")->check(CLI::PositiveNumber);
-  app.add_option("--attitude", a->attitude_deg, "of the vehicle: roll,pitch,heading in degrees")
-      ->delimiter(',')
-      ->expected(3);
-  app.add_option("--latitude", a->latitude_deg, "degrees")->check(CLI::Range(-89.0, 89.0))->capture_default_str();
-  app.add_option("--height", a->height_m, "metres above the ellipsoid")->check(CLI::Range(-500.0, 9000.0));
-  app.add_option("--arw", a->arw_deg_per_sqrt_h, "angle random walk, deg/sqrt(h)")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--vrw", a->vrw_ug_per_sqrt_hz, "velocity random walk, ug/sqrt(Hz)")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--position-noise", a->position_sigma_m, "of the known position, m at 1 Hz")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--tolerance", a->tolerance, "NAME=VALUE: sigma that a parameter or group must reach");
-  app.add_option("--ignore", a->ignored, "parameter or group whose tolerance does not count");
-  app.add_flag("--optimize", a->optimize, "search the shortest schedule that meets the tolerances");
-  app.add_option("--longest", a->longest_s, "with --optimize: no schedule beyond so many seconds")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("-o,--output", a->output,
-                 "file to write: .html or .pdf a page with plots, else the schedule as TOML, ready to run");
-  app.add_option("--compare", a->compared,
-                 "with a page: a second schedule (table2, horizontal, or a TOML file) beside it");
-  app.add_flag("--json", a->json, "one JSON document on standard output");
+  options.text("--schedule", a->schedule, "table2, horizontal, or a TOML file");
+  options.number("--dwell", a->dwell_s, range::dwell, "seconds at each position");
+  options.number("--rotation", a->rotation_s, range::rotation, "seconds for each move");
+  options.numbers("--attitude", a->attitude_deg, 3, range::angle, "of the vehicle: roll,pitch,heading in degrees");
+  options.number("--latitude", a->latitude_deg, range::latitude, "degrees");
+  options.number("--height", a->height_m, range::height, "metres above the ellipsoid");
+  options.number("--arw", a->arw_deg_per_sqrt_h, range::arw, "angle random walk, deg/sqrt(h)");
+  options.number("--vrw", a->vrw_ug_per_sqrt_hz, range::vrw, "velocity random walk, ug/sqrt(Hz)");
+  options.number("--position-noise", a->position_sigma_m, range::position_noise, "of the known position, m at 1 Hz");
+  options.texts("--tolerance", a->tolerance, "NAME=VALUE: sigma that a parameter or group must reach");
+  options.texts("--ignore", a->ignored, "parameter or group whose tolerance does not count");
+  options.flag("--optimize", a->optimize, "search the shortest schedule that meets the tolerances");
+  options.number("--longest", a->longest_s, range::longest_schedule,
+                 "with --optimize: no schedule beyond so many seconds");
+  options.text("-o,--output", a->output,
+               "file to write: .html or .pdf a page with plots, .toml the schedule, ready to run");
+  options.text("--compare", a->compared,
+               "with a page: a second schedule (table2, horizontal, or a TOML file) beside it");
+  options.flag("--json", a->json, "one JSON document on standard output");
   return [a] { return plan(*a); };
 }
 

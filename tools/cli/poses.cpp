@@ -1,7 +1,6 @@
 // selfcal poses: diagnosis of sensors turned by hand between static poses: raw counts, no gimbal, no Earth rate.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -152,17 +151,13 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   return d.accel_adequate && d.gyro_named.empty() ? 0 : 1;
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   auto arguments = std::make_shared<PosesArguments>();
-  app.add_option("FILE", arguments->file, "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw")
-      ->required();
-  app.add_option("--gyro-unit", arguments->gyro_unit, "nominal rad/s of one raw unit of the gyros")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of the whole diagnosis")
-      ->check(CLI::Range(1e-6, 0.2))
-      ->capture_default_str();
-  app.add_flag("--json", arguments->json, "one JSON document on standard output");
+  options.text("FILE", arguments->file, "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw",
+               Needed::yes);
+  options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
+  options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
+  options.flag("--json", arguments->json, "one JSON document on standard output");
   return [arguments] { return diagnose_by_poses(*arguments); };
 }
 

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -20,6 +19,7 @@
 #include "tools/cli/diagnose_output.hpp"
 #include "tools/cli/estimator_arguments.hpp"
 #include "tools/cli/online_client.hpp"
+#include "tools/cli/output_file.hpp"
 #include "tools/cli/page_writer.hpp"
 #include "tools/cli/terminal.hpp"
 #include "tools/report/calibration_document.hpp"
@@ -246,6 +246,9 @@ Expected<int> page_written(const ReportArguments& arguments) {
 
 // The page is the answer, whatever it says; `estimate` and `diagnose` have the status that a script asks for.
 Expected<int> write_report(ReportArguments arguments) {
+  if (const auto known = check_output(arguments.output, {".html", ".pdf"}); !known) {
+    return tl::unexpected(known.error());
+  }
   if (arguments.fleet) {
     if (arguments.fleet_options.as_of_utc.empty()) {
       arguments.fleet_options.as_of_utc = utc_now();
@@ -270,27 +273,24 @@ Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& sched
   return write_page_of_now(report::plan_document(schedules, installation), file);
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   plan_page_writer() = write_plan_page;
   auto arguments = std::make_shared<ReportArguments>();
-  app.add_option(
-      "RUN", arguments->subjects,
-      "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
-      "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
-      "of the daemon");
-  app.add_option("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)")->required();
-  app.add_flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
-  app.add_option("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
-  app.add_option("--interval", arguments->fleet_options.interval_days, "with --history: days between calibrations")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--as-of", arguments->fleet_options.as_of_utc, "with --history: UTC of the page; now if left out");
-  app.add_flag("--no-diagnosis", arguments->no_diagnosis, "leave out the comparison of recording and model");
-  app.add_option("--false-alarm-rate", arguments->false_alarm_rate, "of the diagnosis, of a whole recording")
-      ->check(CLI::Range(1e-6, 0.2))
-      ->capture_default_str();
-  app.add_option("--tolerance", arguments->tolerance, "NAME=VALUE, as for estimate");
-  arguments->noise.add_to(app);
+  options.texts("RUN", arguments->subjects,
+                "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
+                "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
+                "of the daemon");
+  options.text("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)", Needed::yes);
+  options.flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
+  options.text("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
+  options.number("--interval", arguments->fleet_options.interval_days, range::interval,
+                 "with --history: days between calibrations");
+  options.text("--as-of", arguments->fleet_options.as_of_utc, "with --history: UTC of the page; now if left out");
+  options.flag("--no-diagnosis", arguments->no_diagnosis, "leave out the comparison of recording and model");
+  options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate,
+                 "of the diagnosis, of a whole recording");
+  options.texts("--tolerance", arguments->tolerance, "NAME=VALUE, as for estimate");
+  arguments->noise.add_to(options);
   return [arguments] { return write_report(*arguments); };
 }
 

@@ -1,5 +1,4 @@
 // selfcal simulate: a recording from the same model as the virtual INS.
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <memory>
 
@@ -8,6 +7,7 @@
 #include "sim_ins/physics.hpp"
 #include "sim_ins/simulate.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/output_file.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -30,6 +30,9 @@ Expected<int> simulate_recording(const SimulateArguments& arguments) {
   }
   if (!config) {
     return tl::unexpected(config.error());
+  }
+  if (const auto known = check_output(arguments.output, {".h5", ".hdf5", ".csv"}); !known) {
+    return tl::unexpected(known.error());
   }
   const Expected<Schedule> schedule = find_schedule(arguments.schedule, arguments.dwell_s, arguments.rotation_s);
   if (!schedule) {
@@ -54,18 +57,17 @@ Expected<int> simulate_recording(const SimulateArguments& arguments) {
   return write_recording(*recording, arguments.output).map([] { return 0; });
 }
 
-CommandRun configure(CLI::App& app) {
+CommandRun configure(Options& options) {
   auto arguments = std::make_shared<SimulateArguments>();
-  app.add_option("--config", arguments->config, "sim.toml: site, attitude, sensors, gimbal");
-  app.add_option("--schedule", arguments->schedule, "table2, horizontal, or a TOML file")->capture_default_str();
-  app.add_option("--dwell", arguments->dwell_s, "seconds at each position, in place of the schedule's")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--rotation", arguments->rotation_s, "seconds for each move, in place of the schedule's")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--seed", arguments->seed, "same seed, same bits")->capture_default_str();
-  app.add_option("--physics", arguments->physics, "TOML file of effects outside the 24-parameter model");
-  app.add_option("-o,--output", arguments->output, "recording to write: HDF5, or CSV by its ending")->required();
-  app.add_option("--truth", arguments->truth, "also write what the sensors' errors truly are, as JSON");
+  options.text("--config", arguments->config, "sim.toml: site, attitude, sensors, gimbal");
+  options.text("--schedule", arguments->schedule, "table2, horizontal, or a TOML file");
+  options.number("--dwell", arguments->dwell_s, range::dwell, "seconds at each position, in place of the schedule's");
+  options.number("--rotation", arguments->rotation_s, range::rotation,
+                 "seconds for each move, in place of the schedule's");
+  options.whole("--seed", arguments->seed, range::seed, "same seed, same bits");
+  options.text("--physics", arguments->physics, "TOML file of effects outside the 24-parameter model");
+  options.text("-o,--output", arguments->output, "recording to write: .h5 or .hdf5, or .csv", Needed::yes);
+  options.text("--truth", arguments->truth, "also write what the sensors' errors truly are, as JSON");
   return [arguments] { return simulate_recording(*arguments); };
 }
 

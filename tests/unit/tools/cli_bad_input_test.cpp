@@ -20,7 +20,6 @@ using ::testing::HasSubstr;
 
 constexpr int usage = 2;
 constexpr int bad_input = 3;
-constexpr int internal = 5;
 
 struct Fault {
   const char* name;
@@ -131,7 +130,7 @@ TEST(BadFile, SimulationFilesNameLineAndKey) {
   EXPECT_THAT(finished.error, HasSubstr("no_such_key"));
   EXPECT_EQ(
       failure_fault(run_selfcal({"simulate", "--schedule", "table2", "--dwell", "3", "-o", folder / "absent/r.h5"}),
-                    internal),
+                    bad_input),
       "");
 }
 
