@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -290,6 +291,14 @@ std::optional<int> CommandLine::parse(int argc, char** argv) {
     const bool of_help_itself = arguments.size() > 1 && arguments[1].starts_with('-');
     if (!arguments.empty() && arguments.front() == "help" && !of_help_itself) {
       arguments.erase(arguments.begin());
+      // --help would be obeyed before a wrong word is noticed.
+      for (const CLI::App* at = &app; const std::string& word : arguments) {
+        const std::vector<std::string> below = command_names(*at);
+        if (std::find(below.begin(), below.end(), word) == below.end()) {
+          return parser_->tell(fmt::format("help: no command {}{}", shortened(word), did_you_mean(word, below)));
+        }
+        at = at->get_subcommand(word);
+      }
       arguments.emplace_back("--help");
     } else if (arguments == std::vector<std::string>{"version"}) {
       arguments = {"--version"};

@@ -29,7 +29,7 @@ TEST(DidYouMean, TheNearestWithinAThirdOfTheLetters) {
   EXPECT_EQ(did_you_mean("jsn", known), "; did you mean json?");
   EXPECT_EQ(did_you_mean("xml", known), "");
   EXPECT_EQ(did_you_mean("w", std::array<std::string_view, 2>{"x", "id"}), "");  // nothing in common
-  EXPECT_EQ(did_you_mean(std::string(1'000'000, 'j'), known), "");  // and does not take for ever
+  EXPECT_EQ(did_you_mean(std::string(1'000'000, 'j'), known), "");               // and does not take for ever
 }
 
 }  // namespace
