@@ -207,6 +207,13 @@ Expected<std::span<const ReceivedFrame>> Socket::receive() {
   return std::span<const ReceivedFrame>(s.received.data(), frames);
 }
 
+int Socket::receive_buffer_granted() const {
+  int size = 0;
+  socklen_t length = sizeof size;
+  ::getsockopt(impl_->fd, SOL_SOCKET, SO_RCVBUF, &size, &length);
+  return size;
+}
+
 Expected<std::size_t> Socket::send(std::span<const CanFrame> frames) {
   Impl& s = *impl_;
   const std::size_t wanted = std::min(frames.size(), s.headers_out.size());

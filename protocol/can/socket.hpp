@@ -55,7 +55,8 @@ class Socket {
   // on POLLOUT or after a millisecond (ENOBUFS has no event).
   [[nodiscard]] Expected<std::size_t> send(std::span<const CanFrame> frames);
 
-  std::uint64_t lost_frames() const;  // by receive overrun since open (SO_RXQ_OVFL)
+  std::uint64_t lost_frames() const;   // by receive overrun since open (SO_RXQ_OVFL)
+  int receive_buffer_granted() const;  // bytes, as the kernel accounts them
   const std::string& interface() const;
 
  private:
