@@ -41,7 +41,7 @@ double value_of(const PhysicsEffect& effect, std::string_view parameter);
 // Effects add up. The same effect may stand twice (two spectral lines, two settlings).
 struct ConcealedPhysics {
   std::vector<PhysicsEffect> effects;
-  std::vector<Law> laws;
+  std::vector<Law> laws = {};
 };
 
 // Reads a physics file:
