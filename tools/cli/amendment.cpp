@@ -195,14 +195,14 @@ Schedule schedule_of(const Recording& recording, const ImuData& data) {
 }
 
 Expected<void> write_amendment(const std::filesystem::path& folder, const Diagnosis& d,
-                               const diagnosis::AssumedNoise& assumed, const Recording& recording,
-                               const ImuData& data) {
+                               const diagnosis::AssumedNoise& assumed, const Recording& recording, const ImuData& data,
+                               const std::string& laws) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", folder.string(), error.message()));
   }
-  return write_file_atomically(folder / "physics.toml", physics_text(d, assumed, data.site.latitude))
+  return write_file_atomically(folder / "physics.toml", physics_text(d, assumed, data.site.latitude) + laws)
       .and_then([&] { return write_file_atomically(folder / "sim.toml", sim_config_text(d, assumed, recording)); })
       .and_then([&] {
         return write_file_atomically(folder / "schedule.toml", format_schedule(schedule_of(recording, data)));

@@ -23,8 +23,9 @@ std::string sim_config_text(const diagnosis::Diagnosis& diagnosis, const diagnos
 // The schedule that the recording followed, at the angles that the gimbal reached (its read-outs).
 Schedule schedule_of(const Recording& recording, const ImuData& data);
 
-// physics.toml, sim.toml and schedule.toml in `folder`, which is made where it is not there.
+// physics.toml with `laws` behind what was named, sim.toml and schedule.toml in `folder`, which is made where it is not there.
 Expected<void> write_amendment(const std::filesystem::path& folder, const diagnosis::Diagnosis& diagnosis,
-                               const diagnosis::AssumedNoise& assumed, const Recording& recording, const ImuData& data);
+                               const diagnosis::AssumedNoise& assumed, const Recording& recording, const ImuData& data,
+                               const std::string& laws = {});
 
 }  // namespace selfcal::cli

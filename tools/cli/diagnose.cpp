@@ -14,6 +14,7 @@
 #include "tools/cli/amendment.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/diagnose_output.hpp"
+#include "tools/cli/discovery_run.hpp"
 #include "tools/cli/dwell_table.hpp"
 #include "tools/cli/terminal.hpp"
 
@@ -27,6 +28,7 @@ struct DiagnoseArguments {
   std::string against;
   std::string split_schedule;
   std::string holdout;
+  DiscoveryArguments discovery;
   bool json = false;
   double false_alarm_rate = diagnosis::DiagnosisOptions{}.false_alarm_rate;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
@@ -114,21 +116,29 @@ Expected<std::optional<diagnosis::Holdout>> held_out(const DiagnoseArguments& ar
   return std::move(outcome.holdout);
 }
 
-Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
-                           const diagnosis::DiagnosisOptions& options, const Opened& opened) {
+Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& found,
+                           const BeyondCatalogue& beyond, const diagnosis::DiagnosisOptions& options,
+                           const Opened& opened) {
+  diagnosis::Diagnosis diagnosis = found;
+  std::string laws;
+  if (beyond.explains()) {
+    diagnosis.value_as_named = beyond.found->parameters;
+    laws = format_laws(laws_of(*beyond.found));
+  }
   Expected<void> written;
   if (!arguments.physics.empty()) {
-    written =
-        write_file_atomically(arguments.physics, physics_text(diagnosis, options.assumed, opened.data.site.latitude));
+    written = write_file_atomically(arguments.physics,
+                                    physics_text(diagnosis, options.assumed, opened.data.site.latitude) + laws);
   }
-  if (diagnosis.unexplained && !(arguments.physics.empty() && arguments.amended.empty())) {
+  if (diagnosis.unexplained && !beyond.explains() && !(arguments.physics.empty() && arguments.amended.empty())) {
     fmt::print(stderr,
                "selfcal diagnose: warning: nothing explains {}: the 24 values written are BIASED, and a simulation "
                "with them will not agree with the recording\n",
                arguments.recording);
   }
   if (written && !arguments.amended.empty()) {
-    written = write_amendment(arguments.amended, diagnosis, options.assumed, opened.loaded.recording, opened.data);
+    written =
+        write_amendment(arguments.amended, diagnosis, options.assumed, opened.loaded.recording, opened.data, laws);
   }
   return written;
 }
@@ -232,8 +242,12 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!splits) {
     return tl::unexpected(splits.error());
   }
+  const Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, data, diagnosis);
+  if (!beyond) {
+    return tl::unexpected(beyond.error());
+  }
   std::optional<diagnosis::EmpiricalDescription> description;
-  if (diagnosis.unexplained) {
+  if (diagnosis.unexplained && !beyond->explains()) {
     description = diagnosis::describe_empirically(data, diagnosis, arguments.false_alarm_rate);
   }
   if (arguments.json) {
@@ -241,6 +255,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     if (*holdout) {
       json["holdout"] = holdout_json(**holdout);
     }
+    beyond->add_to(json);
     if (description) {
       json["empirical"] = empirical_json(*description);
     }
@@ -249,13 +264,13 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     }
     fmt::print("{}\n", json.dump());
   } else {
-    fmt::print("{}{}{}{}{}",
+    fmt::print("{}{}{}{}{}{}",
                diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout)),
-               diagnosis.unexplained ? dwell_table(data, diagnosis) : std::string(),
+               diagnosis.unexplained ? dwell_table(data, diagnosis) : std::string(), beyond->text(),
                description ? empirical_text(*description) : std::string(), splits_text(*splits),
                *holdout ? holdout_text(**holdout) : std::string());
   }
-  if (const auto written = write_files(arguments, diagnosis, options, **opened); !written) {
+  if (const auto written = write_files(arguments, diagnosis, *beyond, options, **opened); !written) {
     return tl::unexpected(written.error());
   }
   return diagnosis.mismatch ? 1 : 0;
@@ -274,6 +289,7 @@ CommandRun configure(Options& options) {
                "where effects cannot be told apart: plan experiments that would, write the best one's schedule");
   options.text("--holdout", arguments->holdout, "try what was named on this second recording of the same unit");
   options.exclude("--holdout", "--against");
+  add_discovery_options(options, arguments->discovery);
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of a whole recording");
   options.number("--arw", arguments->arw_deg_per_sqrt_h, range::arw,
                  "angle random walk the simulation assumes, deg/sqrt(h)");

@@ -1,0 +1,138 @@
+#include "tools/cli/discovery_run.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/named_effects.hpp"
+#include "protocol/recording/atomic_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
+#include "tools/cli/terminal.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+struct LawsToTry {
+  std::vector<discovery::LawTerm> terms;
+  std::vector<double> stated;
+};
+
+// A `?` begins at 1, in the unit that it stands for: Gauss-Newton finds the rest or says so by its sigma.
+Expected<LawsToTry> read_terms(const std::string& file) {
+  constexpr double first_guess = 1.0;
+  const Expected<std::vector<LawText>> texts = read_laws(file);
+  if (!texts) {
+    return tl::unexpected(texts.error());
+  }
+  LawsToTry laws;
+  for (std::size_t k = 0; k < texts->size(); ++k) {
+    const LawText& text = (*texts)[k];
+    if (!text.process.empty()) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: law {}: process \"{}\": only expressions are tried; --discover looks for processes",
+                              file, k + 1, text.process));
+    }
+    auto expression = laws::Expression::parse(text.expression);
+    if (!expression) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: law {}: expression: column {}: {}", file, k + 1,
+                                                    expression.error().column, expression.error().words));
+    }
+    std::vector<double> constants(expression->free_constants(), first_guess);
+    laws.terms.push_back({text.axis, std::move(*expression), std::move(constants)});
+    laws.stated.push_back(text.coefficient.value_or(NAN));
+  }
+  return laws;
+}
+
+Expected<void> try_them(const std::string& file, const ImuData& data, const CalibrationResult& calibration,
+                        BeyondCatalogue& result) {
+  const Expected<LawsToTry> laws = read_terms(file);
+  if (!laws) {
+    return tl::unexpected(laws.error());
+  }
+  auto tried = discovery::try_laws(data, calibration, laws->terms, laws->stated);
+  if (!tried) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: law {}: expression: {}", file, tried.error().law + 1, tried.error().words));
+  }
+  result.tried = std::move(*tried);
+  return {};
+}
+
+Expected<void> plan_next(const std::string& file, const ImuData& data, const CalibrationResult& calibration,
+                         BeyondCatalogue& result) {
+  for (const discovery::DiscoveredLaw& law : result.found->laws) {
+    const auto next = discovery::plan_experiment(data, calibration, law, {});
+    if (next && (!result.next || next->separation_now < result.next->separation_now)) {
+      result.next = next;
+    }
+  }
+  if (file.empty()) {
+    return {};
+  }
+  if (!result.next) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: not written: no equations that another rotation would tell apart", file));
+  }
+  return write_file_atomically(
+      file, fmt::format("# Tells the equation found from {}: {:.1f} sigma, {:.1f} now.\n{}", result.next->closest,
+                        result.next->separation, result.next->separation_now, format_schedule(result.next->schedule)));
+}
+
+}  // namespace
+
+void add_discovery_options(Options& options, DiscoveryArguments& arguments) {
+  options.flag("--discover", arguments.discover,
+               "look for equations beyond the catalogue also where the catalogue leaves nothing");
+  options.text("--law", arguments.laws, "try the laws of this file beside the 24 and what was named");
+  options.text("--next-experiment", arguments.next_experiment,
+               "write the schedule that would tell the equations found from their rivals");
+}
+
+std::string BeyondCatalogue::text() const {
+  return (found ? discovery_text(*found, next) : std::string()) + (tried.empty() ? std::string() : trial_text(tried));
+}
+
+void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {
+  if (found) {
+    add_discovery(document, *found, next);
+  }
+  if (!tried.empty()) {
+    document["laws"] = trial_json(tried);
+  }
+}
+
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const ImuData& data,
+                                      const diagnosis::Diagnosis& diagnosis) {
+  BeyondCatalogue result;
+  const bool discover = arguments.discover || diagnosis.unexplained || !arguments.next_experiment.empty();
+  if (!discover && arguments.laws.empty()) {
+    return result;
+  }
+  const discovery::Increments increments = discovery::without_named(data, diagnosis);
+  ImuData rest = data;
+  rest.delta_theta = increments.delta_theta;
+  rest.delta_v = increments.delta_v;
+  const CalibrationOutcome calibration = selfcal::diagnosis::calibrate_still(rest, {});
+  if (!calibration.result) {
+    return fail(ErrorKind::bad_input, calibration.failure.message);
+  }
+  if (!arguments.laws.empty()) {
+    if (const auto tried = try_them(arguments.laws, rest, *calibration.result, result); !tried) {
+      return tl::unexpected(tried.error());
+    }
+  }
+  if (discover) {
+    ProgressLine line;
+    result.found =
+        discovery::discover(rest, *calibration.result, {}, [&line](const std::string& words) { line.show(words); });
+    if (const auto planned = plan_next(arguments.next_experiment, rest, *calibration.result, result); !planned) {
+      return tl::unexpected(planned.error());
+    }
+  }
+  return result;
+}
+
+}  // namespace selfcal::cli

@@ -1,0 +1,40 @@
+// selfcal diagnose beyond the catalogue: discovery, a user's own laws, the next experiment.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "protocol/error.hpp"
+#include "tools/cli/command.hpp"
+#include "tools/cli/discovery_output.hpp"
+
+namespace selfcal::cli {
+
+struct DiscoveryArguments {
+  bool discover = false;        // also where the catalogue leaves nothing
+  std::string laws;             // file of laws to try
+  std::string next_experiment;  // schedule file to write
+};
+
+void add_discovery_options(Options& options, DiscoveryArguments& arguments);
+
+struct BeyondCatalogue {
+  std::optional<discovery::Discovery> found;
+  std::optional<discovery::NextExperiment> next;
+  std::vector<discovery::TriedLaw> tried;
+
+  // Whether equations or processes were found.
+  bool explains() const { return found && (!found->laws.empty() || !found->processes.empty()); }
+  std::string text() const;
+  void add_to(nlohmann::ordered_json& document) const;
+};
+
+// Looks where the diagnosis left something unexplained, or where asked to. Errors: a file of laws that is wrong (file, law,
+// column), a schedule that cannot be written, or that was asked for and that nothing calls for.
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const ImuData& data,
+                                      const diagnosis::Diagnosis& diagnosis);
+
+}  // namespace selfcal::cli
