@@ -33,7 +33,7 @@ struct BeyondCatalogue {
 };
 
 // Looks where the diagnosis left something unexplained, or where asked to. Errors: a file of laws that is wrong (file, law,
-// column), a schedule that cannot be written, or that was asked for and that nothing calls for.
+// column), a schedule that cannot be written.
 Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const ImuData& data,
                                       const diagnosis::Diagnosis& diagnosis);
 
