@@ -104,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(
         Silence{"commit", State::committing, start_of(ins::routine::commit_coefficients), "RoutineControl start",
                 "the commit was asked for and not confirmed"},
         Silence{"reset", State::resetting, {0x11}, "ECUReset", "the new set is committed"}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 // Response-pending keeps a request going for a minute at a time.
 TEST_F(HostileInsTest, ARequestThatIsPendingForEverEndsInTheBudgetToo) {
@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(
             {},
             "1000000 pages written"},
         Lie{"first_page", [](auto& r) { r.first_page = r.pages_written; }, {}, "page 0 is lost"}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 TEST_F(HostileInsTest, AForgedStatusFrameAsksForNothing) {
   begin();
@@ -268,7 +268,7 @@ INSTANTIATE_TEST_SUITE_P(Run, DriftLies,
                          testing::Values(Drift{"huge", 1e308, 30, "1e+308"}, Drift{"negative", -5.0, 30, "is -5"},
                                          Drift{"beyond_free_fall", 1e6, 30, "1e+06 m away"},
                                          Drift{"too_soon", 50, 3, "done after 3 s, 30 s were asked for"}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 // --- who answers, and what it holds -----------------------------------------------------------------------------------
 
@@ -301,7 +301,7 @@ TEST_P(AnotherOne, IsNoticedByItsPowerCycles) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Run, AnotherOne, testing::Values(State::erasing, State::writing, State::committing),
-                         [](const auto& info) { return std::string(name(info.param)); });
+                         [](const auto& tested) { return std::string(name(tested.param)); });
 
 TEST_F(HostileInsTest, AnEraseThatWasNotDoneIsNoticedBeforeTheWrite) {
   ins_.erases = false;
