@@ -322,7 +322,7 @@ class Scene : public RunObserver {
     if ((case_.ending == Ending::failed && completed) || (case_.ending == Ending::completed && !completed)) {
       violation("{}, expected {}: '{}'", outcome_.state, completed ? "failed" : "completed", reason);
     }
-    // Pages renew the budget of a rotation: the schedule may pass as well. The end of the session is no state of its own.
+    // The first page of a rotation may be as late as its schedule is long. The end of the session is no state of its own.
     for (const auto& [state, stay] : stays_) {
       const double turning =
           state == State::rotating || state == State::ending_early ? short_schedule().duration_s() : 0.0;
@@ -369,12 +369,21 @@ class Scene : public RunObserver {
     if (run.state == last_) {  // a lost link, found again: the state and its budget go on
       return;
     }
+    note_stay();
+    last_ = run.state;
+  }
+  // A page more is progress, which renews the budget of the state.
+  void on_progress(const RunRecord&) override {
+    if (run_->progress().pages_pulled > pages_) {
+      pages_ = run_->progress().pages_pulled;
+      note_stay();
+    }
+  }
+  void note_stay() {
     double& longest = stays_[last_];
     longest = std::max(longest, seconds(timers_.now() - entered_));
     entered_ = timers_.now();
-    last_ = run.state;
   }
-  void on_progress(const RunRecord&) override {}
   void on_warning(const RunRecord&, const std::string&) override {}
   void on_finished(const RunRecord&) override { ++finished_; }
 
@@ -394,6 +403,7 @@ class Scene : public RunObserver {
   std::uint8_t alive_ = 0;
   int finished_ = 0;
   State last_ = State::connecting;
+  std::uint32_t pages_ = 0;  // pulled
   SteadyTime entered_{};
   std::map<State, double> stays_;
 };
