@@ -73,8 +73,9 @@ Expected<void> plan_next(const std::string& file, const ImuData& data, const Cal
     return {};
   }
   if (!result.next) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: not written: no equations that another rotation would tell apart", file));
+    fmt::print(stderr, "selfcal diagnose: {} is not written: no equations that another rotation would tell apart\n",
+               file);
+    return {};
   }
   return write_file_atomically(
       file, fmt::format("# Tells the equation found from {}: {:.1f} sigma, {:.1f} now.\n{}", result.next->closest,
