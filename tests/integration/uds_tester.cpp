@@ -45,6 +45,7 @@ std::string text_of(const uds::Outcome& outcome) {
     case uds::Outcome::Kind::negative: return "negative " + uds::describe_nrc(outcome.nrc);
     case uds::Outcome::Kind::timeout: return "no answer in time";
     case uds::Outcome::Kind::transport: return fmt::format("transport: {}", isotp::name(outcome.why));
+    case uds::Outcome::Kind::too_long: return fmt::format("an answer of {} bytes is announced", outcome.announced);
     case uds::Outcome::Kind::malformed: return "malformed answer";
   }
   return "unknown";
