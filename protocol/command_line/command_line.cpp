@@ -314,7 +314,9 @@ std::optional<int> CommandLine::parse(int argc, char** argv) {
   } catch (const CLI::RequiredError& error) {
     const CLI::App& at = deepest(app);
     const bool command_missing = !command_names(at).empty() && at.get_subcommands().empty();
-    return parser_->tell(command_missing ? about_missing_command(app) : error.what());
+    const std::vector<std::string> left = at.remaining();
+    const bool misspelt = !left.empty() && left.front().starts_with('-');  // what is missing may be what it was to be
+    return parser_->tell(misspelt ? about_unknown(app) : command_missing ? about_missing_command(app) : error.what());
   } catch (const CLI::ParseError& error) {
     return parser_->tell(error.what());
   }

@@ -27,7 +27,7 @@ inline constexpr std::string_view fields = {};
 template <>
 inline constexpr std::string_view fields<selfcal_lcm::service_status> = "ilsiid";
 template <>
-inline constexpr std::string_view fields<selfcal_lcm::ins_status> = "ilssslbddiidiiil";
+inline constexpr std::string_view fields<selfcal_lcm::ins_status> = "ilssslbddiidiiils";
 template <>
 inline constexpr std::string_view fields<selfcal_lcm::estimate> = "ilslidnSSDDDibddd";
 template <>

@@ -109,10 +109,10 @@ TEST(UdsDecode, LogOfFrames) {
   EXPECT_EQ(decoder.on_frame(frame("648#100862F18C414243"), ms(2)), std::nullopt);
   EXPECT_EQ(decoder.on_frame(frame("640#300000"), ms(3)), std::nullopt);
   EXPECT_EQ(decoder.on_frame(frame("648#214445CCCCCCCCCC"), ms(4)),
-            "(0.004000) INS     positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): 41 42 43 44 45");
+            "(0.004000) INS     positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"ABCDE\"");
   EXPECT_EQ(
       decoder.on_frame(frame("650#12041303020100AB"), ms(5)),
-      "(0.005000) status   State=2 GimbalMoving=1 Unlocked=0 Session=0 Faults=4 Position=19 PagesWritten=66051page "
+      "(0.005000) status   State=rotating GimbalMoving=1 Unlocked=0 Session=0 Faults=4 Position=19 PagesWritten=66051 "
       "StateAlive=171");
   EXPECT_EQ(decoder.malformed(), 0U);
   EXPECT_EQ(decoder.on_frame(frame("648#2200"), ms(6)),
