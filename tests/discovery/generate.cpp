@@ -35,8 +35,8 @@ int complain(const Error& error) {
 std::optional<int> to_number(const char* text) {
   char* end = nullptr;
   const long value = std::strtol(text, &end, 10);
-  return end != text && *end == '\0' && value >= 0 && value < 1000000 ? std::optional<int>(static_cast<int>(value))
-                                                                      : std::nullopt;
+  return end != text && *end == '\0' && value >= 0 && value < 1000000000 ? std::optional<int>(static_cast<int>(value))
+                                                                         : std::nullopt;
 }
 
 ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
