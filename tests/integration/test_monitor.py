@@ -89,12 +89,12 @@ class Monitor(case.OnBench):
         self.assertIn("TEST-0001: idle, run 1", text)
         met = sum(p["sigma"] <= p["tolerance"] for p in parameters)
         self.assertIn(f"{met} of 24 within tolerance", text)
-        # Two columns of twelve, in the order of the document: sigma, unit, bar, and "ok" where it is met.
+        # Two columns of twelve, in the order of the document: sigma, unit, bar, and "in" where it is within its tolerance.
         rows = [line for line in text.split("\n") if re.match(r"(accel|gyro) ", line)]
         self.assertEqual(len(rows), 12, text)
         for k, parameter in enumerate(parameters):
             cell = rows[k % 12][41 * (k // 12):][:41]
-            words = re.match(r"(.{15}) *([-+.e\d]+) (\S+) *([#-]{5})( ok)?", cell)
+            words = re.match(r"(.{15}) *([-+.e\d]+) (\S+) *([#-]{5})( in)?", cell)
             self.assertIsNotNone(words, cell)
             self.assertTrue(nearly(words[2], parameter["sigma"]), f"{cell}: {parameter}")
             self.assertEqual(words[3], parameter["unit"], cell)
