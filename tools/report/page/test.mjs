@@ -20,6 +20,7 @@ const recording_of = {creep: 'creep.h5', unexplained: 'creep.h5'};
 const expect = (good, words) => good || failures.push(words);
 
 const largest_page = 3e6;
+const patience_ms = 180e3;   // of a machine that others keep busy; no criterion
 const slowest_plot_ms = Number(process.env.SELFCAL_FIRST_PLOT_MS || Infinity);
 
 // [name, share of its pixels that are drawn: not transparent and not the colour of the first] of every plot, and of every
@@ -390,6 +391,7 @@ async function check_width(page, where) {
 async function open(browser, page_file, where, width, scheme) {
   const context = await browser.newContext({viewport: {width, height: 1000}, colorScheme: scheme, offline: true});
   const page = await context.newPage();
+  page.setDefaultTimeout(patience_ms);
   page.on('console', (message) => failures.push(`${where}: console: ${message.text()}`));
   page.on('pageerror', (error) => failures.push(`${where}: ${error.message}`));
   page.on('request', (request) => expect(/^(file|data|blob):/.test(request.url()), `${where}: asks for ${request.url()}`));
