@@ -113,6 +113,7 @@ class Search {
         said("what the laws leave", [&] { return sum_over_pieces(motion_, input, options_.stop); });
     raw_score_ = sums_.sums.score;
     raw_square_ = sums_.sums.square;
+    raw_model_ = std::move(model_);
     sums_.sums.score = settled.sums.score;
     sums_.sums.square = settled.sums.square;
     model_ = std::make_unique<PieceModel>(sums_, dictionary_);
@@ -127,6 +128,7 @@ class Search {
     if (raw_score_.size() > 0) {
       sums_.sums.score = raw_score_;
       sums_.sums.square = raw_square_;
+      raw_model_.reset();
     }
     model_ = std::make_unique<PieceModel>(sums_, dictionary_);
     take_processes();
@@ -255,15 +257,16 @@ class Search {
   }
 
   // Projects out all terms but one, with the derivatives by their constants.
-  void choose(std::size_t left_out) {
+  void project_out(PieceModel& model, std::size_t left_out) const {
     std::vector<Eigen::VectorXd> columns;
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
       if (k != left_out) {
-        shortlist_.add_columns(*model_, state_.terms[k], columns);
+        shortlist_.add_columns(model, state_.terms[k], columns);
       }
     }
-    model_->choose(columns);
+    model.choose(columns);
   }
+  void choose(std::size_t left_out) { project_out(*model_, left_out); }
 
   std::vector<LawTerm> all_but(std::size_t k) const {
     std::vector<LawTerm> others = state_.terms;
@@ -273,9 +276,10 @@ class Search {
 
   // What explains the recording in the place of term k, exactly; the term itself as it stands has gain `own`.
   std::vector<Candidate> rivals(std::size_t k, std::size_t most, double& own) {
-    choose(k);
-    std::vector<Candidate> candidates = shortlist_.best(*model_, most);
-    choose(state_.terms.size());
+    PieceModel& model = raw_model_ ? *raw_model_ : *model_;  // what settle() took out is what the rivals are to explain
+    project_out(model, k);
+    std::vector<Candidate> candidates = shortlist_.best(model, most);
+    project_out(model, state_.terms.size());
     const std::vector<LawTerm> others = all_but(k);
     own = exact_gains(motion_, sums_, input_, others, {state_.terms[k]}, options_.stop).front();
     make_exact(candidates, others);
@@ -386,6 +390,7 @@ class Search {
   PieceSums sums_;
   Dictionary dictionary_;
   std::unique_ptr<PieceModel> model_;
+  std::unique_ptr<PieceModel> raw_model_;  // of the recording with its laws, once settle() took them out
   Shortlist shortlist_;
   Discovery result_;
   State empty_, state_;
