@@ -46,9 +46,11 @@ bool Client::request(std::span<const std::uint8_t> message, Time now, std::size_
   }
   waiting_ = true;
   service_ = message[0];
-  answered_by_size_ = std::min(message.size(), 1 + identifier_size(service_));
-  std::copy_n(message.begin(), answered_by_size_, answered_by_.begin());
-  answered_by_[0] = static_cast<std::uint8_t>(service_ + positive_offset);
+  answered_by_ = {};
+  answered_by_.size = std::min(message.size(), 1 + identifier_size(service_));
+  std::copy_n(message.begin(), answered_by_.size, answered_by_.bytes.begin());
+  answered_by_.bytes[0] = static_cast<std::uint8_t>(service_ + positive_offset);
+  held_nrc_.reset();
   longest_answer_ = longest_answer;
   passed_over_ = 0;
   deadline_.reset();
@@ -57,6 +59,9 @@ bool Client::request(std::span<const std::uint8_t> message, Time now, std::size_
 }
 
 void Client::cancel() {
+  if (waiting_ && held_nrc_) {  // given up before it was clear: asked again, it is believed at once
+    refusals_[service_] = {answered_by_, *held_nrc_};
+  }
   waiting_ = false;
   deadline_.reset();
   transport_.reset();
@@ -86,7 +91,7 @@ std::optional<Outcome> Client::on_time(Time now) {
     return outcome;
   }
   if (waiting_ && deadline_ && now >= *deadline_) {
-    return finish({.kind = Outcome::Kind::timeout});
+    return held_nrc_ ? refused() : finish({.kind = Outcome::Kind::timeout});
   }
   return std::nullopt;
 }
@@ -126,8 +131,9 @@ std::optional<Outcome> Client::handle(const isotp::Events& events, Time now) {
 }
 
 bool Client::answers_request(std::span<const std::uint8_t> message) const {
-  const std::size_t compared = std::min(message.size(), answered_by_size_);
-  return std::equal(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(compared), answered_by_.begin());
+  const std::size_t compared = std::min(message.size(), answered_by_.size);
+  return std::equal(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(compared),
+                    answered_by_.bytes.begin());
 }
 
 // A message longer than the answer can be. Another tester's is its own affair.
@@ -149,7 +155,8 @@ std::optional<Outcome> Client::judge_message(Time now) {
   if (!deadline_ && !transport_.sending()) {
     deadline_ = now + timings_.p2;  // the stranger was a long message, which had stopped the clock
   }
-  if (message[0] != service::negative_response || message.size() < 2 || message[1] != service_) {
+  const bool refuses = message[0] == service::negative_response && message.size() >= 2 && message[1] == service_;
+  if (!refuses || transport_.sending()) {  // what comes before the request is out answers an earlier one
     ++passed_over_;
     return std::nullopt;
   }
@@ -157,11 +164,28 @@ std::optional<Outcome> Client::judge_message(Time now) {
     return finish({.kind = Outcome::Kind::malformed, .response = message});
   }
   if (message[2] != static_cast<std::uint8_t>(Nrc::response_pending)) {
-    return finish({.kind = Outcome::Kind::negative, .response = message, .nrc = message[2]});
+    return judge_refusal(message[2]);
   }
   pending_until_ = pending_until_.value_or(now + timings_.pending_limit);
   deadline_ = std::min(now + timings_.p2_star, *pending_until_);
   return std::nullopt;
+}
+
+// The same service has refused another request for the same reason.
+bool Client::may_be_a_copy(std::uint8_t nrc) const {
+  const auto last = refusals_.find(service_);
+  return last != refusals_.end() && last->second.nrc == nrc && last->second.request != answered_by_;
+}
+
+std::optional<Outcome> Client::judge_refusal(std::uint8_t nrc) {
+  held_nrc_ = nrc;
+  return may_be_a_copy(nrc) ? std::nullopt : std::optional(refused());
+}
+
+Outcome Client::refused() {
+  refusals_[service_] = {answered_by_, *held_nrc_};
+  refusal_message_ = {service::negative_response, service_, *held_nrc_};
+  return finish({.kind = Outcome::Kind::negative, .response = refusal_message_, .nrc = *held_nrc_});
 }
 
 Outcome Client::finish(Outcome outcome) {

@@ -1,12 +1,17 @@
 // The tester's side of UDS over ISO-TP, without I/O: one request at a time, P2 and P2* with response-pending,
 // TesterPresent on the functional identifier while a session is to be kept.
 //
+// Answers are matched with requests: a positive response by service and identifier. A negative response repeats only the
+// service. One that equals the refusal of an earlier request with another identifier may be a second copy of it: it is held
+// until P2 is over, and is the outcome only if no other answer came.
+//
 // Drive it as isotp::Transport: on_frame / on_time / pending / sent / next_deadline.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 
@@ -71,16 +76,34 @@ class Client {
  private:
   std::optional<Outcome> handle(const isotp::Events& events, Time now);
   std::optional<Outcome> judge_message(Time now);
+  std::optional<Outcome> judge_refusal(std::uint8_t nrc);
+  bool may_be_a_copy(std::uint8_t nrc) const;
+  Outcome refused();
   bool answers_request(std::span<const std::uint8_t> message) const;
   std::optional<Outcome> judge_announcement(Time now);
   Outcome finish(Outcome outcome);
+
+  // How the positive response to a request begins: service and identifier. It tells one request from another.
+  struct Answer {
+    std::array<std::uint8_t, 4> bytes{};
+    std::size_t size = 0;
+    bool operator==(const Answer&) const = default;
+  };
+  // The last refusal of a service. A negative response names the service and not the identifier, so that a second copy
+  // of it could pass for the answer to the next request of that service.
+  struct Refusal {
+    Answer request;
+    std::uint8_t nrc = 0;
+  };
 
   isotp::Transport transport_;
   ClientTimings timings_;
   bool waiting_ = false;
   std::uint8_t service_ = 0;
-  std::array<std::uint8_t, 4> answered_by_{};  // how the positive response begins: service and identifier
-  std::size_t answered_by_size_ = 0;
+  Answer answered_by_;
+  std::map<std::uint8_t, Refusal> refusals_;  // by service
+  std::optional<std::uint8_t> held_nrc_;      // of a refusal of the present request, which may be a copy
+  std::array<std::uint8_t, 3> refusal_message_{};
   std::size_t longest_answer_ = 0;
   unsigned passed_over_ = 0;
   std::optional<Time> deadline_;       // P2 or P2*, runs while nothing is being received

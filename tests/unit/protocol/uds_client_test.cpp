@@ -171,6 +171,57 @@ TEST_F(UdsClient, AnAnswerThatArrivesTwiceIsNotTheNextOne) {
   EXPECT_TRUE(client.on_frame(frame("648#026702CCCCCCCCCC"), now));
 }
 
+// A negative response repeats the service alone: a second copy of it looks like the answer to the next request of the
+// service. It is held until that one's own answer is here.
+TEST_F(UdsClient, ARefusalThatArrivesTwiceIsNotTheNextOne) {
+  ask(read_request(0x0211), ms(0));
+  auto outcome = client.on_frame(frame("648#037F2222"), ms(1));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::negative);
+  ask(read_request(0xF18C), ms(2));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2222"), ms(3)));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2222"), ms(4)));  // nor a third one
+  outcome = client.on_frame(frame("648#0562F18C4142"), ms(5));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::positive);
+  // Another service in between changes nothing.
+  ask(session_request(Session::extended), ms(6));
+  ASSERT_TRUE(client.on_frame(frame("648#065003003201F4CC"), ms(7)));
+  ask(read_request(0x0200), ms(8));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2222"), ms(9)));
+  EXPECT_TRUE(client.on_frame(frame("648#0462020001"), ms(10)));
+}
+
+// Where no other answer comes within P2 (150 ms), the refusal is this request's own; another reason is it at once, and so
+// is the same request refused again.
+TEST_F(UdsClient, ARefusalOfItsOwnIsTheOutcome) {
+  ask(read_request(0x0211), ms(0));
+  ASSERT_TRUE(client.on_frame(frame("648#037F2222"), ms(1)));
+  ask(read_request(0x0200), ms(10));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2222"), ms(20)));
+  EXPECT_FALSE(client.on_time(ms(159)));
+  auto outcome = client.on_time(ms(160));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->kind, Outcome::Kind::negative);
+  EXPECT_EQ(outcome->nrc, 0x22);
+  EXPECT_THAT(outcome->response, ElementsAre(0x7F, 0x22, 0x22));
+
+  ask(read_request(0x0200), ms(200));
+  EXPECT_TRUE(client.on_frame(frame("648#037F2222"), ms(201)));
+  ask(read_request(0xF18C), ms(210));
+  outcome = client.on_frame(frame("648#037F2231"), ms(211));
+  ASSERT_TRUE(outcome);
+  EXPECT_EQ(outcome->nrc, 0x31);
+}
+
+// A request that is not out yet can have no answer.
+TEST_F(UdsClient, WhatComesBeforeTheRequestIsOutAnswersNone) {
+  ASSERT_TRUE(client.request(read_request(0x0200), ms(0)));
+  EXPECT_FALSE(client.on_frame(frame("648#037F2231"), ms(0)));
+  take_all(client, ms(1));
+  EXPECT_TRUE(client.on_frame(frame("648#0462020001"), ms(2)));
+}
+
 TEST(UdsClientTimings, WhatTheServerStatesIsTakenUpWithinBounds) {
   ClientTimings configured;
   configured.p2 = ms(1000);
