@@ -17,6 +17,14 @@ constexpr std::size_t crc_at = 256;
 
 }  // namespace
 
+const std::array<std::string_view, coefficient_count> coefficient_names = {
+    "accel_bias_x",          "accel_bias_y",          "accel_bias_z",          "gyro_drift_x",
+    "gyro_drift_y",          "gyro_drift_z",          "accel_scale_pos_x",     "accel_scale_pos_y",
+    "accel_scale_pos_z",     "accel_scale_neg_x",     "accel_scale_neg_y",     "accel_scale_neg_z",
+    "accel_misalignment_yx", "accel_misalignment_zx", "accel_misalignment_zy", "gyro_scale_x",
+    "gyro_scale_y",          "gyro_scale_z",          "gyro_misalignment_xy",  "gyro_misalignment_xz",
+    "gyro_misalignment_yx",  "gyro_misalignment_yz",  "gyro_misalignment_zx",  "gyro_misalignment_zy"};
+
 CoefficientsBytes encode(const Coefficients& coefficients) {
   CoefficientsBytes bytes{};
   ByteWriter out(bytes);
@@ -62,7 +70,8 @@ Expected<Coefficients> decode_coefficients(std::span<const std::uint8_t> bytes) 
   for (std::size_t i = 0; i < coefficient_count; ++i) {
     result.value[i] = in.get_double();
     if (!std::isfinite(result.value[i])) {
-      return fail(ErrorKind::bad_input, fmt::format("coefficient record: value {} is not finite", i));
+      return fail(ErrorKind::bad_input, fmt::format("coefficient record: {} is {}, not a finite number",
+                                                    coefficient_names[i], result.value[i]));
     }
   }
   return result;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "protocol/error.hpp"
 
@@ -17,6 +18,9 @@ namespace selfcal::ins {
 inline constexpr std::size_t coefficient_count = 24;
 inline constexpr std::size_t coefficients_bytes = 260;
 inline constexpr std::size_t author_bytes = 32;
+
+// Of each value, in the record's order; the same as geometry's sensor_parameters (a test compares).
+extern const std::array<std::string_view, coefficient_count> coefficient_names;
 
 struct Coefficients {
   std::uint32_t version = 0;                      // counts up with every calibration; 0: factory

@@ -13,7 +13,8 @@ namespace selfcal::ins {
 namespace {
 
 constexpr std::int32_t full_turn_mdeg = 360'000;
-constexpr double half_way_round_m = 2.1e7;  // the Earth: no two places are farther apart
+constexpr double half_way_round_m = 2.1e7;        // the Earth: no two places are farther apart
+constexpr double longest_check_s = 4294967295.0;  // 32 bits of seconds can be asked for
 
 template <typename... Fields>
 Bytes pack(const Fields&... fields) {
@@ -260,17 +261,21 @@ Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes) {
     return wrong("navigation check", "completeness", done);
   }
   r.done = done == 1;
-  for (double* value : {&r.elapsed_s, &r.north_m, &r.east_m, &r.max_horizontal_m}) {
-    *value = in.get_double();
-    if (!(std::abs(*value) <= half_way_round_m)) {  // written so that NaN fails too
-      return wrong("navigation check", "a time or distance", *value);
+  struct Quantity {
+    std::string_view name;
+    double& value;
+    double least, most;
+  };
+  for (const auto& [name, value, least, most] :
+       {Quantity{"time passed in s", r.elapsed_s, 0.0, longest_check_s},
+        Quantity{"distance north in m", r.north_m, -half_way_round_m, half_way_round_m},
+        Quantity{"distance east in m", r.east_m, -half_way_round_m, half_way_round_m},
+        Quantity{"largest distance in m", r.max_horizontal_m, 0.0, half_way_round_m}}) {
+    value = in.get_double();
+    if (!(value >= least && value <= most)) {  // written so that NaN fails too
+      return fail(ErrorKind::bad_input, fmt::format("navigation check record: {} is {}, must lie between {:g} and {:g}",
+                                                    name, value, least, most));
     }
-  }
-  if (r.elapsed_s < 0.0) {
-    return wrong("navigation check", "time passed in s", r.elapsed_s);
-  }
-  if (r.max_horizontal_m < 0.0) {
-    return wrong("navigation check", "largest distance in m", r.max_horizontal_m);
   }
   return r;
 }

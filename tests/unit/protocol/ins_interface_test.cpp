@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <set>
 #include <sstream>
 
+#include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/ins_interface/dbc.hpp"
 #include "protocol/ins_interface/identifiers.hpp"
@@ -51,10 +53,18 @@ TEST(Coefficients, NotFiniteAndNotAsciiAreRefused) {
   c.value[23] = std::numeric_limits<double>::quiet_NaN();
   const auto read = decode_coefficients(encode(c));
   ASSERT_FALSE(read);
-  EXPECT_THAT(read.error().message, HasSubstr("value 23"));
+  EXPECT_THAT(read.error().message, HasSubstr("gyro_misalignment_zy is nan, not a finite number"));
   c = sample_coefficients();
   c.author = "a\nb";
   EXPECT_FALSE(decode_coefficients(encode(c)));
+}
+
+// The record's order is that of the 24 everywhere else, by name.
+TEST(Coefficients, NamesAreThoseOfTheSensorParameters) {
+  ASSERT_EQ(coefficient_names.size(), sensor_parameters.size());
+  for (std::size_t i = 0; i < coefficient_names.size(); ++i) {
+    EXPECT_EQ(coefficient_names[i], sensor_parameters[i].name);
+  }
 }
 
 TEST(StatusFrames, LiteralBytes) {
@@ -165,7 +175,10 @@ TEST(Records, BadValuesAreNamed) {
     return read ? std::string("taken") : read.error().message;
   };
   EXPECT_EQ(of_check({true, 3600, -1.5, 2.5, 3.0}), "taken");
-  EXPECT_THAT(of_check({true, 3600, 0, 0, 1e308}), HasSubstr("is 1e+308"));
+  EXPECT_THAT(of_check({true, 3600, 0, 0, 1e308}), HasSubstr("largest distance in m is 1e+308"));
+  EXPECT_THAT(of_check({true, 3600, 1e308, 0, 0}), HasSubstr("distance north in m is 1e+308"));
+  EXPECT_THAT(of_check({true, 3600, 0, -1e308, 0}), HasSubstr("distance east in m is -1e+308"));
+  EXPECT_THAT(of_check({true, std::nan(""), 0, 0, 0}), HasSubstr("time passed in s is nan"));
   EXPECT_THAT(of_check({true, 3600, 0, 0, -5}), HasSubstr("largest distance in m is -5"));
   EXPECT_THAT(of_check({true, -1, 0, 0, 0}), HasSubstr("time passed in s is -1"));
   EXPECT_THAT(decode_site(encode(SiteRecord{0, 0, 1e9})).error().message, HasSubstr("height in m is 1000000000"));
