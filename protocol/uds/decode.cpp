@@ -28,24 +28,46 @@ std::string signal_text(const ins::Signal& signal, std::uint32_t raw) {
   return fmt::format("{:g}{}{}", raw * signal.factor, count ? "" : " ", count ? "" : signal.unit);
 }
 
-std::string status_line(const can::CanFrame& frame, Time time) {
-  std::string line = fmt::format("{} status  ", stamp(time));
+LogEntry status_entry(const can::CanFrame& frame, Time time) {
+  LogEntry entry;
+  entry.time = time;
+  entry.kind = LogEntry::Kind::status;
+  entry.sender = LogEntry::Sender::ins;
   for (const ins::Signal& signal : ins::status_signals) {
     if (signal.frame_id == frame.id) {
-      line += fmt::format(" {}={}", signal.name, signal_text(signal, ins::raw_signal(signal, frame.payload())));
+      const std::uint32_t raw = ins::raw_signal(signal, frame.payload());
+      entry.signals.push_back({signal.name, raw * signal.factor, signal_text(signal, raw)});
+      entry.words += fmt::format("{}{}={}", entry.words.empty() ? "" : " ", signal.name, entry.signals.back().text);
     }
   }
-  return line;
+  return entry;
+}
+
+std::string_view label(const LogEntry& entry) {
+  if (entry.kind == LogEntry::Kind::status) {
+    return "status  ";
+  }
+  switch (entry.sender) {
+    case LogEntry::Sender::tester: return "tester ";
+    case LogEntry::Sender::tester_to_all: return "tester*";
+    default: return "INS    ";
+  }
 }
 
 }  // namespace
 
+std::string line(const LogEntry& entry) {
+  return fmt::format("{} {} {}{}", stamp(entry.time), label(entry),
+                     entry.kind == LogEntry::Kind::broken ? "broken: " : "", entry.words);
+}
+
 LogDecoder::LogDecoder(const DecoderOptions& options)
     : options_(options),
-      streams_{Stream{options.request_id, "tester ", {}, 0, 0}, Stream{options.response_id, "INS    ", {}, 0, 0},
-               Stream{options.functional_id, "tester*", {}, 0, 0}} {}
+      streams_{Stream{options.request_id, LogEntry::Sender::tester, {}, 0, 0},
+               Stream{options.response_id, LogEntry::Sender::ins, {}, 0, 0},
+               Stream{options.functional_id, LogEntry::Sender::tester_to_all, {}, 0, 0}} {}
 
-std::optional<std::string> LogDecoder::on_frame(const can::CanFrame& frame, Time time) {
+std::optional<LogEntry> LogDecoder::on_frame(const can::CanFrame& frame, Time time) {
   if (frame.remote) {
     return std::nullopt;
   }
@@ -56,26 +78,26 @@ std::optional<std::string> LogDecoder::on_frame(const can::CanFrame& frame, Time
   }
   const bool is_status = frame.id == ins::can_id::status || frame.id == ins::can_id::gimbal;
   if (is_status && !frame.extended && frame.size == 8) {
-    return status_line(frame, time);
+    return status_entry(frame, time);
   }
   return std::nullopt;
 }
 
-std::optional<std::string> LogDecoder::on_stream(Stream& stream, const can::CanFrame& frame, Time time) {
+std::optional<LogEntry> LogDecoder::on_stream(Stream& stream, const can::CanFrame& frame, Time time) {
   const auto pdu = isotp::decode(frame.payload());
   if (!pdu) {
-    return broken_line(stream, "malformed frame", time);
+    return broken(stream, "malformed frame", time);
   }
   if (std::holds_alternative<isotp::FlowControl>(*pdu)) {
     return std::nullopt;
   }
   if (const auto* next = std::get_if<isotp::ConsecutiveFrame>(&*pdu)) {
     if (stream.length == 0) {
-      return broken_line(stream, "consecutive frame without a first one", time);
+      return broken(stream, "consecutive frame without a first one", time);
     }
     if (next->sequence != stream.sequence) {
       stream.length = 0;
-      return broken_line(stream, "frame lost or doubled", time);
+      return broken(stream, "frame lost or doubled", time);
     }
     stream.sequence = static_cast<std::uint8_t>((stream.sequence + 1) & 0x0F);
     const std::size_t part = std::min(next->payload.size(), stream.length - stream.bytes.size());
@@ -84,31 +106,32 @@ std::optional<std::string> LogDecoder::on_stream(Stream& stream, const can::CanF
       return std::nullopt;
     }
     stream.length = 0;
-    return message_line(stream, stream.bytes, time);
+    return whole(stream, stream.bytes, time);
   }
   const bool interrupted = stream.length != 0;
   stream.length = 0;
   malformed_ += interrupted ? 1 : 0;
   if (const auto* first = std::get_if<isotp::FirstFrame>(&*pdu)) {
     if (first->length > longest_message) {
-      return broken_line(stream, "announced length beyond 65535", time);
+      return broken(stream, "announced length beyond 65535", time);
     }
     stream.bytes.assign(first->payload.begin(), first->payload.end());
     stream.length = first->length;
     stream.sequence = 1;
     return std::nullopt;
   }
-  return message_line(stream, std::get<isotp::SingleFrame>(*pdu).payload, time);
+  return whole(stream, std::get<isotp::SingleFrame>(*pdu).payload, time);
 }
 
-std::string LogDecoder::message_line(const Stream& stream, std::span<const std::uint8_t> message, Time time) {
+LogEntry LogDecoder::whole(const Stream& stream, std::span<const std::uint8_t> message, Time time) {
   ++messages_;
-  return fmt::format("{} {} {}", stamp(time), stream.label, describe_message(message));
+  return {time, LogEntry::Kind::message,  stream.sender, {message.begin(), message.end()},
+          {},   describe_message(message)};
 }
 
-std::string LogDecoder::broken_line(const Stream& stream, std::string_view why, Time time) {
+LogEntry LogDecoder::broken(const Stream& stream, std::string_view why, Time time) {
   ++malformed_;
-  return fmt::format("{} {} broken: {}", stamp(time), stream.label, why);
+  return {time, LogEntry::Kind::broken, stream.sender, {}, {}, std::string(why)};
 }
 
 }  // namespace selfcal::uds

@@ -24,14 +24,39 @@ struct DecoderOptions {
   bool extended = false;
 };
 
+// What the frames of a log come to.
+struct LogEntry {
+  enum class Kind : std::uint8_t {
+    message,  // a whole UDS message
+    broken,   // one that came in parts which do not fit: words
+    status,   // a status frame of the INS: signals
+  };
+  enum class Sender : std::uint8_t { tester, tester_to_all, ins };
+  struct Signal {
+    std::string_view name;
+    double value = 0.0;
+    std::string text;  // with its unit, or its name: "90 deg", "idle"
+  };
+
+  Time time{0};  // of the last frame
+  Kind kind = Kind::message;
+  Sender sender = Sender::tester;
+  std::vector<std::uint8_t> message;
+  std::vector<Signal> signals;
+  std::string words;  // as describe_message; of a status frame each signal
+};
+
+// "(1436509052.249713) tester  ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)"
+std::string line(const LogEntry& entry);
+
 // Puts ISO-TP messages together by listening only (it sends no flow control).
 class LogDecoder {
  public:
   explicit LogDecoder(const DecoderOptions& options);
 
-  // A line when the frame completes a message, breaks one, or is a status frame; nullopt in the midst of a message and
+  // An entry when the frame completes a message, breaks one, or is a status frame; nullopt in the midst of a message and
   // for frames of others.
-  std::optional<std::string> on_frame(const can::CanFrame& frame, Time time);
+  std::optional<LogEntry> on_frame(const can::CanFrame& frame, Time time);
 
   std::uint64_t messages() const { return messages_; }
   std::uint64_t malformed() const { return malformed_; }
@@ -39,14 +64,14 @@ class LogDecoder {
  private:
   struct Stream {
     std::uint32_t id = 0;
-    std::string_view label;
+    LogEntry::Sender sender = LogEntry::Sender::tester;
     std::vector<std::uint8_t> bytes;
     std::size_t length = 0;  // 0: no message under way
     std::uint8_t sequence = 0;
   };
-  std::optional<std::string> on_stream(Stream& stream, const can::CanFrame& frame, Time time);
-  std::string message_line(const Stream& stream, std::span<const std::uint8_t> message, Time time);
-  std::string broken_line(const Stream& stream, std::string_view why, Time time);
+  std::optional<LogEntry> on_stream(Stream& stream, const can::CanFrame& frame, Time time);
+  LogEntry whole(const Stream& stream, std::span<const std::uint8_t> message, Time time);
+  LogEntry broken(const Stream& stream, std::string_view why, Time time);
 
   DecoderOptions options_;
   std::array<Stream, 3> streams_;

@@ -5,6 +5,7 @@ from pathlib import Path
 from jsonschema import Draft202012Validator, RefResolver
 
 FOLDER = Path(__file__).resolve().parents[2] / "protocol" / "document" / "schemas"
+HEAD = ("schema", "program", "input")
 SCHEMAS = {schema["$id"]: schema for schema in
            (json.loads(file.read_text(encoding="utf-8")) for file in sorted(FOLDER.glob("*.schema.json")))}
 
@@ -17,6 +18,9 @@ def faults(document):
     identifier = f"urn:selfcal:schema:{str(head['name']).removeprefix('selfcal.')}:{head['version']}"
     if identifier not in SCHEMAS:
         return [f"schema {head['name']} version {head['version']}: no file in {FOLDER.name}/"]
+    heads = [key for key in document if key in HEAD]
+    if list(document)[:len(heads)] != [key for key in HEAD if key in document]:
+        return [f"the head is not first, in its order: {', '.join(list(document)[:4])}"]
     schema = SCHEMAS[identifier]
     validator = Draft202012Validator(schema, resolver=RefResolver.from_schema(schema, store=SCHEMAS))
     return [f"{'.'.join(str(part) for part in error.absolute_path) or 'document'}: {error.message[:200]}"

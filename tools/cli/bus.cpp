@@ -16,6 +16,7 @@
 #include "protocol/can/bus_log.hpp"
 #include "protocol/can/socket.hpp"
 #include "protocol/uds/decode.hpp"
+#include "tools/cli/bus_document.hpp"
 #include "tools/cli/command.hpp"
 
 namespace selfcal::cli {
@@ -29,6 +30,7 @@ struct LogArguments {
 
 struct DecodeArguments {
   std::string file;
+  bool json = false;
   uds::DecoderOptions decoder;
 };
 
@@ -118,6 +120,8 @@ Expected<int> log_bus(const LogArguments& arguments) {
   return 0;
 }
 
+double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
+
 Expected<int> decode_log(const DecodeArguments& arguments) {
   std::ifstream file;
   if (arguments.file != "-") {
@@ -126,8 +130,16 @@ Expected<int> decode_log(const DecodeArguments& arguments) {
       return fail(ErrorKind::bad_input, fmt::format("{}: cannot open: {}", arguments.file, std::strerror(errno)));
     }
   }
+  Expected<document::InputFile> input;
+  if (arguments.json && arguments.file != "-") {
+    input = document::identify_file(arguments.file);
+    if (!input) {
+      return tl::unexpected(input.error());
+    }
+  }
   can::LogReader reader(arguments.file == "-" ? std::cin : file);
   uds::LogDecoder decoder(arguments.decoder);
+  BusDocument answer;
   for (;;) {
     const auto entry = reader.next();
     if (!entry) {
@@ -137,11 +149,15 @@ Expected<int> decode_log(const DecodeArguments& arguments) {
       break;
     }
     if ((*entry)->error_frame) {
-      fmt::print("({:.6f}) error frame: {}\n", std::chrono::duration<double>((*entry)->time).count(),
-                 can::name(can::decode_error_frame((*entry)->frame.id, (*entry)->frame.payload())));
-    } else if (const auto line = decoder.on_frame((*entry)->frame, (*entry)->time)) {
-      fmt::print("{}\n", *line);
+      const std::string_view words = can::name(can::decode_error_frame((*entry)->frame.id, (*entry)->frame.payload()));
+      arguments.json ? answer.add_error_frame((*entry)->time, words)
+                     : fmt::print("({:.6f}) error frame: {}\n", seconds((*entry)->time), words);
+    } else if (const auto decoded = decoder.on_frame((*entry)->frame, (*entry)->time)) {
+      arguments.json ? answer.add(*decoded) : fmt::print("{}\n", uds::line(*decoded));
     }
+  }
+  if (arguments.json) {
+    fmt::print("{}\n", answer.text(*input, decoder.malformed()));
   }
   if (decoder.malformed() > 0) {
     fmt::print(stderr, "selfcal bus decode: {}: {} of {} messages malformed\n", arguments.file, decoder.malformed(),
@@ -164,6 +180,7 @@ CommandRun configure(Options& options) {
   decoding.can_identifier("--request-id", decode->decoder.request_id, "CAN identifier, tester to INS, hexadecimal");
   decoding.can_identifier("--response-id", decode->decoder.response_id, "INS to tester, hexadecimal");
   decoding.can_identifier("--functional-id", decode->decoder.functional_id, "tester to all, hexadecimal");
+  decoding.flag("--json", decode->json, "as JSON");
   decoding.flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
   return [log_options, log, decode] { return log_options->chosen() ? log_bus(*log) : decode_log(*decode); };
 }

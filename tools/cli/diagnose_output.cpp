@@ -28,8 +28,11 @@ ordered_json to_json(const diagnosis::HeldOutState& s) {
 
 ordered_json comparison_json(const diagnosis::Comparison& c, double false_alarm_rate,
                              const document::InputFile& recording) {
-  ordered_json j = diagnosis_json(c.diagnosis, false_alarm_rate);
-  j.update(document::head(document::comparison, recording));
+  ordered_json of_difference = diagnosis_json(c.diagnosis, false_alarm_rate);
+  for (const char* head : {"schema", "program"}) {  // its own comes first, with the input
+    of_difference.erase(head);
+  }
+  ordered_json j = document::with_head(document::comparison, of_difference, recording);
   j["summary"] = summary_json(summary_of_comparison(c));
   for (int k = 0; k < sensor_parameter_count; ++k) {
     const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];

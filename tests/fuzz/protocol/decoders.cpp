@@ -108,8 +108,8 @@ void listen(Bytes bytes) {
   can::CanFrame frame;
   Time now{0};
   while (next_frame(bytes, frame, now)) {
-    if (const auto line = decoder.on_frame(frame, now)) {
-      must(line->find('\n') == std::string::npos);
+    if (const auto entry = decoder.on_frame(frame, now)) {
+      must(uds::line(*entry).find('\n') == std::string::npos);
     }
     static_cast<void>(can::decode_error_frame(frame.id, frame.payload()));
     if (ins::apply_status_frame(frame, status)) {

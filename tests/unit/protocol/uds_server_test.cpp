@@ -104,20 +104,22 @@ TEST(UdsDecode, MessagesByName) {
 
 TEST(UdsDecode, LogOfFrames) {
   LogDecoder decoder(DecoderOptions{});
-  EXPECT_EQ(decoder.on_frame(frame("640#0322F18C"), ms(1)),
-            "(0.001000) tester  ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)");
-  EXPECT_EQ(decoder.on_frame(frame("648#100862F18C414243"), ms(2)), std::nullopt);
-  EXPECT_EQ(decoder.on_frame(frame("640#300000"), ms(3)), std::nullopt);
-  EXPECT_EQ(decoder.on_frame(frame("648#214445CCCCCCCCCC"), ms(4)),
+  const auto told = [&decoder](const char* text, Time now) {
+    const auto entry = decoder.on_frame(frame(text), now);
+    return entry ? line(*entry) : std::string("nothing");
+  };
+  EXPECT_EQ(told("640#0322F18C", ms(1)), "(0.001000) tester  ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)");
+  EXPECT_EQ(told("648#100862F18C414243", ms(2)), "nothing");
+  EXPECT_EQ(told("640#300000", ms(3)), "nothing");
+  EXPECT_EQ(told("648#214445CCCCCCCCCC", ms(4)),
             "(0.004000) INS     positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"ABCDE\"");
   EXPECT_EQ(
-      decoder.on_frame(frame("650#12041303020100AB"), ms(5)),
+      told("650#12041303020100AB", ms(5)),
       "(0.005000) status   State=rotating GimbalMoving=1 Unlocked=0 Session=0 Faults=4 Position=19 PagesWritten=66051 "
       "StateAlive=171");
   EXPECT_EQ(decoder.malformed(), 0U);
-  EXPECT_EQ(decoder.on_frame(frame("648#2200"), ms(6)),
-            "(0.006000) INS     broken: consecutive frame without a first one");
-  EXPECT_EQ(decoder.on_frame(frame("123#00"), ms(7)), std::nullopt);
+  EXPECT_EQ(told("648#2200", ms(6)), "(0.006000) INS     broken: consecutive frame without a first one");
+  EXPECT_EQ(told("123#00", ms(7)), "nothing");
   EXPECT_EQ(decoder.messages(), 2U);
   EXPECT_EQ(decoder.malformed(), 1U);
 }

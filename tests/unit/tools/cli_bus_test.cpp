@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "protocol/recording/atomic_file.hpp"
 #include "tests/unit/recording/sample_recording.hpp"
@@ -30,6 +31,32 @@ TEST(BusDecode, NamesRequestResponseAndRefusal) {
   EXPECT_THAT(finished.out, HasSubstr("ecuSerialNumber (0xF18C): \"SIM-0001\""));
   EXPECT_THAT(finished.out, HasSubstr("onditionsNotCorrect"));  // NRC 0x22
   EXPECT_EQ(std::count(finished.out.begin(), finished.out.end(), '\n'), 3) << finished.out;
+}
+
+// The same as JSON: of a seed only that it is one, and how long.
+TEST(BusDecode, AsJsonWithHeadAndWithoutSecrets) {
+  const test::TemporaryFolder folder;
+  const std::string seed = "(1436509052.254713) can0 648#066701DEADBEEFCC\n";
+  ASSERT_TRUE(write_file_atomically(folder / "bus.log", read_serial_number + seed));
+  const auto finished = run_selfcal({"bus", "decode", "--json", folder / "bus.log"});
+  EXPECT_EQ(finished.status, 0) << finished.error;
+  const auto document = nlohmann::ordered_json::parse(finished.out);
+  EXPECT_EQ(document.begin().key(), "schema");
+  EXPECT_EQ(document.at("schema").at("name"), "selfcal.bus");
+  EXPECT_EQ(document.at("input").at("sha256").get<std::string>().size(), 64U);
+  const auto& entries = document.at("entries");
+  ASSERT_EQ(entries.size(), 4U);
+  EXPECT_EQ(entries[0].at("from"), "tester");
+  EXPECT_EQ(entries[0].at("kind"), "request");
+  EXPECT_EQ(entries[0].at("bytes"), "22F18C");
+  EXPECT_EQ(entries[1].at("kind"), "response");
+  EXPECT_EQ(entries[1].at("service"), "ReadDataByIdentifier");
+  EXPECT_EQ(entries[1].at("bytes"), "62F18C53494D2D30303031");
+  EXPECT_EQ(entries[2].at("kind"), "refusal");
+  EXPECT_EQ(entries[2].at("nrc").at("code"), 0x22);
+  EXPECT_EQ(entries[3].at("bytes"), "6701");
+  EXPECT_EQ(entries[3].at("length"), 6);
+  EXPECT_THAT(finished.out, testing::Not(HasSubstr("DEAD")));
 }
 
 TEST(BusDecode, OtherIdentifiersAreOthersBusiness) {
