@@ -176,6 +176,17 @@ class OperatorService::Ins : public sdbus::AdaptorInterfaces<org::selfcal::Ins1_
             {"set_version", standing.set_version}};
   }
 
+  // The answer takes as long as the INS does; the loop goes on meanwhile.
+  void AskBus(sdbus::Result<std::string>&& result) override {
+    const auto kept = std::make_shared<sdbus::Result<std::string>>(std::move(result));
+    operations_.ask_bus(ins_, [kept](const std::string& words) {
+      try {
+        kept->returnResults(words);
+      } catch (const sdbus::Error&) {  // the bus is gone, and whoever asked with it
+      }
+    });
+  }
+
   Operations& operations_;
   std::string ins_;
 };

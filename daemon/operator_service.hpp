@@ -31,7 +31,7 @@ struct StartRequest {
 
 // What is known of an INS without asking it.
 struct Standing {
-  std::string bus;  // "up", or what is wrong with the interface
+  std::string bus;  // "can0: up", what is wrong with the interface, or how a run fares on it
   std::string serial;
   RunId last_calibration = 0;  // the latest run that wrote its set; 0: none
   std::string last_calibration_utc;
@@ -65,6 +65,8 @@ class Operations {
   virtual const RunProgress* progress(const std::string& ins) const = 0;
   virtual const RunRecord* record(const std::string& ins) const = 0;
   virtual Standing standing(const std::string& ins) const = 0;
+  // Standing::bus, after an INS without a run was asked. `done` comes from the loop, or at once.
+  virtual void ask_bus(const std::string& ins, std::function<void(const std::string&)> done) = 0;
 };
 
 class OperatorService {

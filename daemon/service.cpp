@@ -67,7 +67,15 @@ Service::Service(EventLoop& loop, Config config, std::string config_file, StateL
   prune_every_hour();
 }
 
-Service::~Service() = default;
+Service::~Service() { drop_questions(); }
+
+// Whoever waits for an answer waits on the connection, which is about to go.
+void Service::drop_questions() {
+  for (auto& [name, session] : sessions_) {
+    session.question.reset();
+    session.asking.clear();
+  }
+}
 
 Expected<void> Service::connect_bus() {
   auto connection = open_bus(config_.bus);
@@ -92,6 +100,7 @@ void Service::bus_lost() {
     journal::write(journal::Level::warning, "D-Bus is gone: runs go on, the bus is tried again");
   }
   bus_.reset();
+  drop_questions();
   try {
     operator_service_.reset();
   } catch (const sdbus::Error&) {

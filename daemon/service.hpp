@@ -11,6 +11,7 @@
 #include "daemon/host/config.hpp"
 #include "daemon/host/event_loop.hpp"
 #include "daemon/host/state_lock.hpp"
+#include "daemon/ins/bus_question.hpp"
 #include "daemon/lcm_publisher.hpp"
 #include "daemon/operator_service.hpp"
 #include "daemon/run/calibration_run.hpp"
@@ -37,6 +38,8 @@ class Service : public Operations, public RunObserver {
     std::unique_ptr<InsPort> port;
     std::unique_ptr<EstimateWorker> estimators;
     std::unique_ptr<CalibrationRun> run;
+    std::unique_ptr<BusQuestion> question;
+    std::vector<std::function<void(const std::string&)>> asking;  // who waits for its answer
     bool active() const { return run && !is_final(run->record().state); }
     bool ending() const { return run && !active() && !run->over(); }
     bool busy() const { return active() || ending(); }
@@ -45,6 +48,7 @@ class Service : public Operations, public RunObserver {
   Service(EventLoop& loop, Config config, std::string config_file, StateLock lock, std::unique_ptr<RunStore> store);
   Expected<void> connect_bus();
   void bus_lost();
+  void drop_questions();
   template <typename Call>
   void tell_bus(Call call);
   void publish();
@@ -71,6 +75,8 @@ class Service : public Operations, public RunObserver {
   const RunProgress* progress(const std::string& ins) const override;
   const RunRecord* record(const std::string& ins) const override;
   Standing standing(const std::string& ins) const override;
+  void ask_bus(const std::string& ins, std::function<void(const std::string&)> done) override;
+  std::string bus_words(const Session& session) const;
 
   void on_state(const RunRecord& run) override;
   void on_progress(const RunRecord& run) override;

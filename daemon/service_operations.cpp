@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/host/journal.hpp"
 #include "daemon/host/wall_clock.hpp"
@@ -11,7 +12,7 @@
 #include "daemon/store/database_copies.hpp"
 #include "daemon/store/recording_store.hpp"
 #include "daemon/store/run_documents.hpp"
-#include "protocol/can/socket.hpp"
+#include "protocol/can/link.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/operator_api/names.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -318,14 +319,45 @@ const RunRecord* Service::record(const std::string& ins) const {
   return chosen == nullptr || !chosen->run ? nullptr : &chosen->run->record();
 }
 
+// Without asking the INS.
+std::string Service::bus_words(const Session& session) const {
+  const can::Link link = can::link_of(session.config.interface);
+  const std::string words = can::link_text(session.config.interface, link);
+  if (link != can::Link::up || !session.active()) {
+    return words;
+  }
+  const RunProgress& progress = session.run->progress();
+  return progress.link_up ? words + ", the INS answers"
+                          : fmt::format("{}, the link to the INS is lost ({})", words, progress.link_trouble);
+}
+
+// One question at a time to each INS; a run that begins meanwhile has a socket of its own, and takes no answer to this one
+// for its own.
+void Service::ask_bus(const std::string& ins, std::function<void(const std::string&)> done) {
+  Session* chosen = session(ins);
+  if (chosen == nullptr || chosen->busy() || can::link_of(chosen->config.interface) != can::Link::up) {
+    return done(chosen == nullptr ? std::string() : bus_words(*chosen));
+  }
+  chosen->asking.push_back(std::move(done));
+  if (chosen->question) {
+    return;
+  }
+  chosen->question = std::make_unique<BusQuestion>(loop_, chosen->config, [this, ins](const std::string& words) {
+    loop_.after(std::chrono::nanoseconds(0), [this, ins, words] {
+      if (Session* asked = session(ins)) {
+        asked->question.reset();
+        for (const auto& told : std::exchange(asked->asking, {})) {
+          told(words);
+        }
+      }
+    });
+  });
+}
+
 Standing Service::standing(const std::string& ins) const {
   Standing standing;
   if (const Session* chosen = session(ins)) {
-    can::SocketOptions options;
-    options.interface = chosen->config.interface;
-    options.fd = chosen->config.fd;
-    const auto socket = can::Socket::open(options);
-    standing.bus = socket ? "up" : socket.error().message;
+    standing.bus = bus_words(*chosen);
   }
   const auto runs = store_->runs_of_serial("");
   if (!runs) {

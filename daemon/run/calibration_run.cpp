@@ -215,7 +215,7 @@ void CalibrationRun::perform(Action action) {
   if (action == Action::recover_link && progress_.link_up) {
     progress_.link_up = false;
     lost_at_ = context_.timers.now();
-    const std::string text = fmt::format("link lost while {}: {}", words(record_.state), link_trouble_);
+    const std::string text = fmt::format("link lost while {}: {}", words(record_.state), progress_.link_trouble);
     // Before the first answer there is no link to lose: that nobody answers is the run's reason, if it stays so.
     record_.serial.empty() ? remember("link", text) : warn(text);
   }
@@ -256,7 +256,7 @@ void CalibrationRun::settle(const Step& step) {
   if (step) {
     return post(*step);
   }
-  link_trouble_ = step.error().message;
+  progress_.link_trouble = step.error().message;
   if (step.error().kind == PortError::Kind::link) {
     return post(Event::link_lost);
   }

@@ -14,6 +14,7 @@
 #include "daemon/ins/ins_client.hpp"
 #include "daemon/ins/session_end.hpp"
 #include "daemon/run/budget_watch.hpp"
+#include "daemon/run/rotation_clock.hpp"
 #include "daemon/run/running_estimates.hpp"
 #include "daemon/run/transition_table.hpp"
 #include "daemon/store/page_file.hpp"
@@ -42,6 +43,7 @@ struct RunProgress {
   double met_at_s = -1.0;     // and every tolerance is foreseen to be met so far into the schedule; -1: not
   double finish_in_s = -1.0;  // until the rotation ends, on the operator's clock; -1: it does not turn
   bool link_up = true;
+  std::string link_trouble;  // why the last request had no answer
   std::uint64_t lost_frames = 0;
   Summary summary;  // of the run, once it has ended; empty sentences before
 };
@@ -133,6 +135,7 @@ class CalibrationRun {
 
   // Parts of steps.
   Task<Answer<Done>> check_serial();
+  Task<Answer<ins::StateRecord>> ask_state();  // and takes it for the time that the rotation takes
   // The INS's state and the set in force.
   Task<Answer<Done>> take_stock();
   Task<Answer<Done>> confirm_identity(
@@ -143,6 +146,7 @@ class CalibrationRun {
   Answer<Done> check_ring(const ins::DirectoryRecord& directory);
   Task<Answer<Done>> learn_pages_written();
   Task<Answer<Done>> await_completion();
+  Task<Answer<bool>> confirm_standing();
   Task<Answer<Done>> check_erased();
   Task<Answer<Done>> check_space();
   Task<Answer<Done>> poll_state();
@@ -199,18 +203,19 @@ class CalibrationRun {
   ins::SampleFormatRecord format_;
   std::uint32_t pages_known_ = 0;              // written, by the directory
   std::optional<std::uint32_t> power_cycles_;  // as this run knows them
+  RotationClock rotation_clock_;
   std::optional<Estimate> estimate_;
   std::vector<std::string> objections_;
   ins::StateRecord stock_;  // the INS as it was found after recovery
   RunningEstimates running_;
   double page_s_ = 0.0;  // of data in a full page
   bool out_of_reach_said_ = false;
-  Bytes in_force_;  // coefficient records, as on the bus
+  bool contradiction_said_ = false;  // of status frames and answers
+  Bytes in_force_;                   // coefficient records, as on the bus
   Bytes new_set_;
   SteadyTime lost_at_{};
   SteadyTime status_at_{};
   SteadyTime reported_at_{};
-  std::string link_trouble_;
   int failure_status_ = static_cast<int>(ErrorKind::device);
   int last_nrc_ = -1;
   int sessions_lost_ = 0;

@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 constexpr int reads_of_a_bad_page = 5;
 constexpr std::uint32_t pages_per_upload = 64;  // what a lost link costs at most
 constexpr double stop_limit_s = 30.0;           // of the INS's clock
-constexpr auto status_silence = 1s;             // then the INS is asked
+constexpr auto state_interval = 1s;             // from one question how far the rotation is to the next
 constexpr auto completion_interval = 200ms;
 constexpr int completion_looks = 25;  // the last page is programmed in far less than 5 s
 
@@ -69,6 +69,9 @@ Task<Answer<ins::DirectoryRecord>> CalibrationRun::read_checked_directory() {
     co_return tl::unexpected(all_there.error());
   }
   pages_known_ = directory->pages_written;
+  if (pages_) {
+    pages_->learn_samples(directory->samples);
+  }
   co_return *directory;
 }
 
@@ -125,6 +128,7 @@ Task<CalibrationRun::Step> CalibrationRun::write_schedule() {
 Task<CalibrationRun::Step> CalibrationRun::start_rotation() {
   Bytes number(4);
   ByteWriter(number).put(record_.rotation);
+  rotation_clock_.start_asked(context_.timers.now());
   const auto started =
       co_await client_.routine(uds::RoutineAction::start, ins::routine::self_calibration, std::move(number));
   if (!started) {
@@ -163,7 +167,7 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
     co_return local_trouble(kept.error());
   }
   if (!pages_) {
-    auto pages = PageFile::open(page_path(folder_), record_.rotation);
+    auto pages = PageFile::open(page_path(folder_), {record_.rotation, format->samples_per_page, directory->samples});
     if (!pages) {
       co_return local_trouble(pages.error());
     }
@@ -180,8 +184,17 @@ Task<Answer<Done>> CalibrationRun::open_pages() {
   co_return Done{};
 }
 
+Task<Answer<ins::StateRecord>> CalibrationRun::ask_state() {
+  const SteadyTime asked = context_.timers.now();
+  const auto state = co_await client_.read_state();
+  if (state) {
+    rotation_clock_.state_told(state->state == ins::State::rotating, asked, context_.timers.now());
+  }
+  co_return state;
+}
+
 Task<Answer<Done>> CalibrationRun::poll_state() {
-  auto state = co_await client_.read_state();
+  auto state = co_await ask_state();
   if (!state) {
     co_return tl::unexpected(state.error());
   }
@@ -190,7 +203,7 @@ Task<Answer<Done>> CalibrationRun::poll_state() {
     co_return tl::unexpected(directory.error());
   }
   if (directory->complete && state->state == ins::State::rotating) {  // it may have ended between the two answers
-    state = co_await client_.read_state();
+    state = co_await ask_state();
     if (!state) {
       co_return tl::unexpected(state.error());
     }
@@ -207,43 +220,43 @@ Task<Answer<Done>> CalibrationRun::poll_state() {
   co_return Done{};
 }
 
-// Pages are pulled as they are written; between two pulls the last status says how far the INS is.
+// Pages are pulled as they are written. What the INS answers says how far it is: a status frame, which anybody may send,
+// only makes the daemon ask sooner.
 Task<CalibrationRun::Step> CalibrationRun::follow_rotation() {
   if (auto opened = co_await open_pages(); !opened) {
     co_return tl::unexpected(opened.error());
   }
-  // Status frames from before the start are stale: the first look is a question.
-  SteadyTime asked = context_.timers.now() - 2 * status_silence;
-  const SteadyTime began = context_.timers.now();
-  int position = progress_.ins.position;  // the last one that it got to
+  std::optional<SteadyTime> asked;
+  int position = progress_.ins.position;  // the last one that it got to, for the words
   while (true) {
     const SteadyTime now = context_.timers.now();
-    const bool heard = status_at_ > began && now - status_at_ < status_silence;
-    if (!heard && now - asked > status_silence) {
+    if (!asked || now - *asked >= state_interval || progress_.ins.state != ins::State::rotating) {
       if (auto polled = co_await poll_state(); !polled) {
         co_return tl::unexpected(polled.error());
       }
       asked = now;
     }
-    if (progress_.ins.state == ins::State::rotating) {
-      if (progress_.ins.position > 0) {
-        position = progress_.ins.position;
-      }
-    } else if (auto polled = co_await poll_state(); !polled) {  // what a status frame says is not enough to end a run
-      co_return tl::unexpected(polled.error());
+    if (progress_.ins.position > 0) {
+      position = progress_.ins.position;
     }
-    if (progress_.ins.state != ins::State::rotating) {
+    if (stock_.state != ins::State::rotating) {
       // An INS that restarted before anybody saw it complete is idle, and its FLASH has everything.
-      if (progress_.ins.state == ins::State::complete || data_complete_) {
+      if (stock_.state == ins::State::complete || data_complete_) {
         co_return Event::rotation_ended;
       }
       co_return senseless(fmt::format("the rotation ended before its time, at position {} of {}: the INS is {}{}",
-                                      position, progress_.positions, ins::name(progress_.ins.state),
+                                      position, progress_.positions, ins::name(stock_.state),
                                       words_of_faults(stock_.faults)));
     }
     estimate_meanwhile();
     if (may_end_early()) {
-      co_return Event::tolerances_met;
+      const auto confirmed = co_await confirm_standing();
+      if (!confirmed) {
+        co_return tl::unexpected(confirmed.error());
+      }
+      if (*confirmed) {
+        co_return Event::tolerances_met;
+      }
     }
     // A status frame says that there may be more; the directory says how much there is.
     if (progress_.ins.pages_written > pages_known_) {
@@ -270,6 +283,9 @@ Task<Answer<Done>> CalibrationRun::await_completion() {
     }
     const bool all = record_.early_end_s >= 0 || directory->pages_written >= directory->pages_expected;
     if (directory->complete && all) {
+      if (const Complaint complaint = check_rotation_time(*directory, format_, rotation_clock_.time(), config_)) {
+        co_return senseless(*complaint);
+      }
       co_return Done{};
     }
     if (look == completion_looks) {
@@ -297,8 +313,8 @@ Task<CalibrationRun::Step> CalibrationRun::pull_last_pages() {
   if (end == 0) {
     co_return senseless("the INS stored no data");
   }
-  remember("data", fmt::format("{} pages pulled, {} fetched again for a wrong CRC, {} frames lost", end,
-                               progress_.pages_refetched, context_.port.lost_frames()));
+  remember("data", fmt::format("{} pages pulled, {} fetched again, {} frames lost", end, progress_.pages_refetched,
+                               context_.port.lost_frames()));
   co_return Event::pages_complete;
 }
 
@@ -327,7 +343,7 @@ Task<Answer<Done>> CalibrationRun::pull(std::uint32_t end) {
   }
   for (const auto& [page, bad] : bad_pages_) {
     if (bad.times >= reads_of_a_bad_page && !pages_->has(page)) {
-      co_return senseless(fmt::format("page {}: {} in {} readings: the data are incomplete", page, bad.why, bad.times));
+      co_return senseless(fmt::format("page {}: {} ({} readings): the data are incomplete", page, bad.why, bad.times));
     }
   }
   co_return Done{};
@@ -345,7 +361,7 @@ void CalibrationRun::note_bad_page(std::uint32_t page, const std::string& why) {
 Task<Answer<Done>> CalibrationRun::await_state(ins::State unwanted, double limit_s, std::string what) {
   const SteadyTime end = context_.timers.now() + ins_time(limit_s) + 1s;
   while (true) {
-    const auto state = co_await client_.read_state();
+    const auto state = co_await ask_state();
     if (!state) {
       co_return tl::unexpected(state.error());
     }
@@ -361,7 +377,7 @@ Task<Answer<Done>> CalibrationRun::await_state(ins::State unwanted, double limit
 }
 
 Task<Answer<Done>> CalibrationRun::bring_to_rest() {
-  if (auto state = co_await client_.read_state(); !state) {
+  if (auto state = co_await ask_state(); !state) {
     co_return tl::unexpected(state.error());
   } else if (state->state == ins::State::rotating) {
     const auto stopped = co_await client_.routine(uds::RoutineAction::stop, ins::routine::self_calibration, {});

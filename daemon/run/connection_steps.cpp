@@ -28,7 +28,7 @@ Task<Answer<Done>> CalibrationRun::check_serial() {
 }
 
 Task<Answer<Done>> CalibrationRun::take_stock() {
-  const auto state = co_await client_.read_state();
+  const auto state = co_await ask_state();
   if (!state) {
     co_return tl::unexpected(state.error());
   }
@@ -151,10 +151,10 @@ Task<CalibrationRun::Step> CalibrationRun::recover_link() {
     if (back.error().kind != PortError::Kind::link) {
       co_return tl::unexpected(back.error());
     }
-    link_trouble_ = back.error().message;
+    progress_.link_trouble = back.error().message;
     if (context_.timers.now() - lost_at_ > limit) {
       fail_with(fmt::format("link lost for more than {} s while {}: {}", config_.lost_after_s, words(record_.state),
-                            link_trouble_));
+                            progress_.link_trouble));
       co_return Event::link_gone;
     }
     co_await Sleep(context_.timers, recovery_interval);

@@ -16,6 +16,11 @@ constexpr double pages_slack = 0.1;
 constexpr double pages_rounding = 2.0;
 // A part of a second at either end of the check.
 constexpr double check_slack_s = 2.0;
+// Two quartz clocks differ by 1e-4 of the time at the most; ten times that.
+constexpr double clock_tolerance = 1e-3;
+// An INS may say that it rotates while it still makes room in its FLASH, and while it writes the last page: 16 MiB in blocks
+// of 64 KiB at 30 ms each take 8 s.
+constexpr double make_room_s = 10.0;
 // Free fall, which no platform at rest exceeds.
 constexpr double gravity_mps2 = 9.81;
 
@@ -47,6 +52,24 @@ Complaint check_directory(const ins::DirectoryRecord& directory, const ins::Samp
   if (directory.samples > full || directory.samples < but_last) {
     return fmt::format("directory: {} samples in {} pages of {}", directory.samples, directory.pages_written,
                        format.samples_per_page);
+  }
+  return std::nullopt;
+}
+
+Complaint check_rotation_time(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
+                              const RotationTime& took, const InsConfig& config) {
+  const double data_s = static_cast<double>(directory.samples) / format.sample_rate_hz;
+  const auto complaint = [&](std::string_view bound, double seconds) {
+    return fmt::format("directory: {} samples at {:g} Hz are {:.1f} s of data, but the rotation took {} {:.1f} s",
+                       directory.samples, format.sample_rate_hz, data_s, bound, seconds);
+  };
+  const double age_s = config.request_timeout_s * config.time_scale;
+  const double most_s = took.most_s.value_or(0.0) * config.time_scale;
+  if (took.most_s && data_s > most_s * (1.0 + clock_tolerance) + age_s) {
+    return complaint("at most", most_s);
+  }
+  if (config.time_scale == 1.0 && data_s < took.least_s * (1.0 - clock_tolerance) - age_s - make_room_s) {
+    return complaint("at least", took.least_s);
   }
   return std::nullopt;
 }

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "daemon/host/config.hpp"
+#include "daemon/run/rotation_clock.hpp"
 #include "estimator/geometry/schedule.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/ins_interface/records.hpp"
@@ -25,6 +27,12 @@ bool holds_whole_rotation(const ins::DirectoryRecord& directory);
 // Samples against pages, pages against the schedule.
 Complaint check_directory(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
                           const Schedule& schedule);
+
+// The data of a rotation that is over, samples over rate, against the time that the rotation took on the operator's clock.
+// Neither clock is wrong by more than a quartz is, and an answer is as old as a request may wait. The clock of a virtual INS
+// (time_scale above 1) may stand, so that only too many data contradict it.
+Complaint check_rotation_time(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
+                              const RotationTime& took, const InsConfig& config);
 
 // The first value (SI, order of sensor_parameters) outside what is physically possible.
 Complaint check_coefficients(const std::array<double, sensor_parameter_count>& value, std::string_view whose);

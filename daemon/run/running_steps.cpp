@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "daemon/run/calibration_run.hpp"
 
@@ -13,16 +14,19 @@ namespace {
 constexpr double status_age_s = 1.0;
 constexpr double round_trip_s = 0.2;
 
-// Whether the gimbal stands in a dwell at `elapsed_s` and for `margin_s` more.
-bool stands(const Schedule& schedule, double elapsed_s, double margin_s) {
+// The last page's samples may be on their way into the FLASH.
+constexpr double flash_lag_s = 1.0;
+
+// The position (1 is the first) at which the gimbal stands at `elapsed_s` and for `margin_s` more; 0: at none.
+int position_at(const Schedule& schedule, double elapsed_s, double margin_s) {
   double begin = 0.0;
-  for (const double dwell : schedule.dwell_s) {
-    if (elapsed_s >= begin && elapsed_s + margin_s < begin + dwell) {
-      return true;
+  for (std::size_t i = 0; i < schedule.dwell_s.size(); ++i) {
+    if (elapsed_s >= begin && elapsed_s + margin_s < begin + schedule.dwell_s[i]) {
+      return static_cast<int>(i) + 1;
     }
-    begin += dwell + schedule.rotation_s;
+    begin += schedule.dwell_s[i] + schedule.rotation_s;
   }
-  return false;
+  return 0;
 }
 
 }  // namespace
@@ -91,8 +95,8 @@ void CalibrationRun::foresee_finish() {
   progress_.finish_in_s = left / config_.time_scale;
 }
 
-// Where the gimbal stands at a position of the schedule, by its own word and by the clock. A gimbal that was never
-// heard of is not stopped before its time.
+// Where the gimbal stands at a position of the schedule, by its status frames. A gimbal that was never heard of is not
+// stopped before its time.
 bool CalibrationRun::may_end_early() const {
   if (!record_.stop_when_met || !running_.latest() || !running_.latest()->met) {
     return false;
@@ -102,7 +106,42 @@ bool CalibrationRun::may_end_early() const {
     return false;
   }
   const double elapsed = schedule_.duration_s() - progress_.ins.time_left_s;
-  return stands(schedule_, elapsed, status_age_s + (heard_s + round_trip_s) * config_.time_scale);
+  return position_at(schedule_, elapsed, status_age_s + (heard_s + round_trip_s) * config_.time_scale) > 0;
+}
+
+// Anybody may send a status frame: the INS is asked itself, for the position that it is at (result of the routine) and for the
+// time that its data cover (directory), before its rotation is ended on such a frame's word.
+Task<Answer<bool>> CalibrationRun::confirm_standing() {
+  const double told_s = schedule_.duration_s() - progress_.ins.time_left_s;
+  const SteadyTime heard_at = status_at_;
+  const auto result = co_await client_.routine(uds::RoutineAction::result, ins::routine::self_calibration, {});
+  if (!result) {
+    co_return tl::unexpected(result.error());
+  }
+  const auto answered = ins::decode_run(*result);
+  if (!answered) {
+    co_return senseless(answered.error().message);
+  }
+  const auto directory = co_await read_checked_directory();
+  if (!directory) {
+    co_return tl::unexpected(directory.error());
+  }
+  const double since_s = std::chrono::duration<double>(context_.timers.now() - heard_at).count() * config_.time_scale;
+  const double data_s = static_cast<double>(directory->samples) / format_.sample_rate_hz;
+  const bool time_fits = told_s <= data_s + page_s_ + flash_lag_s && told_s + since_s >= data_s - flash_lag_s;
+  const bool ours = answered->state == ins::State::rotating && answered->run_id == record_.rotation;
+  const int told_position = position_at(schedule_, told_s, 0.0);  // it may have gone on to the next one since
+  const bool place_fits = answered->position == told_position || answered->position == told_position + 1;
+  if (ours && time_fits && place_fits) {
+    co_return position_at(schedule_, told_s + since_s, status_age_s + round_trip_s * config_.time_scale) > 0;
+  }
+  if (!std::exchange(contradiction_said_, true)) {
+    remember("ins",
+             fmt::format("status frames say that {:.1f} s of the rotation are over; the INS answers that it is {} at "
+                         "position {} with {:.1f} s of data: it is not ended early on their word",
+                         told_s, ins::name(answered->state), answered->position, data_s));
+  }
+  co_return false;
 }
 
 Task<CalibrationRun::Step> CalibrationRun::end_rotation_early() {

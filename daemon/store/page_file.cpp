@@ -5,18 +5,19 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
 namespace selfcal {
 
-Expected<PageFile> PageFile::open(const std::filesystem::path& path, std::uint32_t rotation) {
+Expected<PageFile> PageFile::open(const std::filesystem::path& path, const PageLayout& layout) {
   const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640);
   if (fd < 0) {
     return fail(ErrorKind::device, fmt::format("{}: {}", path.string(), std::strerror(errno)));
   }
-  PageFile file(fd, rotation, path.string());
+  PageFile file(fd, layout, path.string());
   flash::PageBytes bytes;
   for (std::uint32_t page = 0;; ++page) {
     const auto got = pread(fd, bytes.data(), bytes.size(), static_cast<off_t>(page) * flash::page_bytes);
@@ -32,7 +33,7 @@ Expected<PageFile> PageFile::open(const std::filesystem::path& path, std::uint32
 
 PageFile::PageFile(PageFile&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
-      rotation_(other.rotation_),
+      layout_(other.layout_),
       name_(std::move(other.name_)),
       have_(std::move(other.have_)),
       count_(other.count_),
@@ -41,7 +42,7 @@ PageFile::PageFile(PageFile&& other) noexcept
 
 PageFile& PageFile::operator=(PageFile&& other) noexcept {
   std::swap(fd_, other.fd_);
-  std::swap(rotation_, other.rotation_);
+  std::swap(layout_, other.layout_);
   std::swap(name_, other.name_);
   std::swap(have_, other.have_);
   std::swap(count_, other.count_);
@@ -60,11 +61,20 @@ std::string PageFile::complaint(std::uint32_t page, std::span<const std::uint8_t
   if (const auto decoded = flash::decode_page(bytes, scratch_); !decoded) {
     return decoded.error() == flash::PageError::bad_crc ? "wrong CRC" : std::string(flash::name(decoded.error()));
   }
-  if (scratch_.run_id != rotation_) {
-    return fmt::format("belongs to rotation {}, not {}", scratch_.run_id, rotation_);
+  if (scratch_.run_id != layout_.rotation) {
+    return fmt::format("rotation {}, {} expected", scratch_.run_id, layout_.rotation);
   }
   if (scratch_.sequence != page) {
-    return fmt::format("calls itself page {}", scratch_.sequence);
+    return fmt::format("sequence number {}, {} expected", scratch_.sequence, page);
+  }
+  const std::uint64_t first = std::uint64_t{page} * layout_.samples_per_page;
+  if (scratch_.first_sample != first) {
+    return fmt::format("first sample {}, {} expected", scratch_.first_sample, first);
+  }
+  const std::uint64_t rest = layout_.samples > first ? layout_.samples - first : 0;
+  const std::uint64_t count = std::min<std::uint64_t>(rest, layout_.samples_per_page);
+  if (scratch_.samples.size() != count) {
+    return fmt::format("{} samples, {} expected", scratch_.samples.size(), count);
   }
   return {};
 }

@@ -11,15 +11,26 @@
 
 namespace selfcal {
 
+// What every page of a rotation must agree with: every page but the last is full, so that page p begins with sample
+// p * samples_per_page, no two pages overlap and none leaves a hole.
+struct PageLayout {
+  std::uint32_t rotation = 0;
+  std::uint32_t samples_per_page = 0;
+  std::uint64_t samples = 0;  // of the rotation so far, by the directory
+};
+
 class PageFile {
  public:
-  // Pages of `rotation` that the file holds already are kept.
-  static Expected<PageFile> open(const std::filesystem::path& file, std::uint32_t rotation);
+  // Pages that the file holds already are kept where they agree with `layout`.
+  static Expected<PageFile> open(const std::filesystem::path& file, const PageLayout& layout);
   PageFile(PageFile&& other) noexcept;
   PageFile& operator=(PageFile&& other) noexcept;
   ~PageFile();
 
-  // Empty: stored. Else why the page is no good ("bad CRC").
+  // The directory was read again: so many samples of the rotation are in its pages now.
+  void learn_samples(std::uint64_t samples) { layout_.samples = samples; }
+
+  // Empty: stored. Else what is wrong with the page ("wrong CRC", "144 samples, 145 expected").
   Expected<std::string> store(std::uint32_t page, std::span<const std::uint8_t> bytes);
 
   // Sets disk space aside for the pages and, behind them, for the recording to be made of them; the file does not
@@ -35,12 +46,12 @@ class PageFile {
   Range missing(std::uint32_t end, std::uint32_t longest);
 
  private:
-  PageFile(int fd, std::uint32_t rotation, std::string name) : fd_(fd), rotation_(rotation), name_(std::move(name)) {}
+  PageFile(int fd, const PageLayout& layout, std::string name) : fd_(fd), layout_(layout), name_(std::move(name)) {}
   std::string complaint(std::uint32_t page, std::span<const std::uint8_t> bytes);
   void mark(std::uint32_t page);
 
   int fd_;
-  std::uint32_t rotation_;
+  PageLayout layout_;
   std::string name_;
   std::vector<bool> have_;
   std::uint32_t count_ = 0;

@@ -154,6 +154,21 @@ Expected<InsSnapshot> InsWatch::snapshot() {
   }
 }
 
+Expected<std::string> InsWatch::bus() {
+  try {
+    return proxy_->AskBus();
+  } catch (const sdbus::Error& error) {
+    if (error.getName() != "org.freedesktop.DBus.Error.AccessDenied") {
+      return tl::unexpected<Error>(from_bus(error));
+    }
+  }
+  try {
+    return entry(proxy_->Standing(), "bus", std::string());
+  } catch (const sdbus::Error& error) {
+    return tl::unexpected<Error>(from_bus(error));
+  }
+}
+
 Expected<void> wait_for_news(sdbus::IConnection& connection, int timeout_ms) {
   try {
     bool any = false;

@@ -68,6 +68,8 @@ class InsWatch {
   std::function<void(std::uint64_t run, int exit_status, const std::string& reason)> on_finished;
 
   Expected<InsSnapshot> snapshot();
+  // The state of its bus in a clause. The INS is asked where the caller may do so and no run needs it.
+  Expected<std::string> bus();
 
  private:
   class Proxy;

@@ -89,20 +89,6 @@ void add_memory(Json& ins, const Json& runs) {
   }
 }
 
-std::string memory_text(const Json& ins) {
-  const Json& force = ins.at("in_force");
-  const Json& last = ins.at("last_calibration");
-  std::string text = "  in force          ";
-  text += force.is_null() ? "no set that was written from here"
-                          : fmt::format("the set of run {} ({}), since {}", force.at("run").get<int>(),
-                                        force.at("kind").get<std::string>(), force.at("from_utc").get<std::string>());
-  text += "\n  last calibration  ";
-  text += last.is_null() ? "none"
-                         : fmt::format("run {}, {}, {}", last.at("run").get<int>(), last.at("state").get<std::string>(),
-                                       last.at("ended_utc").get<std::string>());
-  return text + "\n";
-}
-
 Expected<int> status(ManagerClient& manager, const Arguments& options) {
   const auto instruments = manager.instruments();
   if (!instruments) {
@@ -113,7 +99,8 @@ Expected<int> status(ManagerClient& manager, const Arguments& options) {
     if (!options.ins.empty() && options.ins != ins) {
       continue;
     }
-    const auto snapshot = InsWatch(manager.connection(), ins).snapshot();
+    InsWatch watch(manager.connection(), ins);
+    const auto snapshot = watch.snapshot();
     if (!snapshot) {
       return tl::unexpected(snapshot.error());
     }
@@ -142,6 +129,11 @@ Expected<int> status(ManagerClient& manager, const Arguments& options) {
       }
       add_memory(all.back(), Json::parse(*history).at("runs"));
     }
+    const auto bus = watch.bus();
+    if (!bus) {
+      return tl::unexpected(bus.error());
+    }
+    all.back()["bus"] = *bus;
   }
   if (all.empty()) {
     return fail(ErrorKind::usage, fmt::format("no INS \"{}\"{}; configured: {}", options.ins,
@@ -152,21 +144,7 @@ Expected<int> status(ManagerClient& manager, const Arguments& options) {
     return 0;
   }
   for (const auto& ins : all) {
-    fmt::print("{} {}: {}", ins["ins"].get<std::string>(), ins["serial"].get<std::string>(),
-               ins["state"].get<std::string>());
-    if (ins["state"] != "idle") {
-      const auto& estimate = ins["estimate"];
-      if (!estimate.is_null()) {
-        fmt::print(", {} of 24 to tolerance", estimate["tolerances_met"].get<int>());
-      }
-      if (ins["finish_in_s"].get<double>() >= 0) {
-        fmt::print(", rotation ends in {:.0f} s", ins["finish_in_s"].get<double>());
-      }
-      fmt::print(", run {} by {} since {}, position {} of {}, pages {}/{}", ins["run"].get<std::uint64_t>(),
-                 ins["user"].get<std::string>(), ins["since"].get<std::string>(), ins["position"].get<int>(),
-                 ins["positions"].get<int>(), ins["pages_pulled"].get<int>(), ins["pages_expected"].get<int>());
-    }
-    fmt::print("\n{}", ins["state"] == "idle" ? memory_text(ins) : std::string());
+    fmt::print("{}", status_text(ins.dump(), text_columns(stdout)));
   }
   return 0;
 }

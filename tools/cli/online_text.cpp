@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -81,6 +82,59 @@ std::string physics_lines(const json& result, bool amended) {
     text += finding_text(finding);
   }
   return text + symbols_text(findings);
+}
+
+// "  bus               can0: up", broken at spaces where a terminal has so many columns.
+std::string labelled(const char* label, const std::string& text, int columns) {
+  constexpr std::size_t indent = 20;
+  constexpr std::size_t narrowest = 16;
+  const std::size_t room = columns > 0 ? std::max(narrowest, static_cast<std::size_t>(columns) - indent) : text.size();
+  std::string lines = fmt::format("  {:<{}}", label, indent - 2);
+  for (std::size_t at = 0; at < text.size() || at == 0;) {
+    std::size_t end = std::min(at + room, text.size());
+    if (end < text.size()) {
+      const std::size_t space = text.rfind(' ', end);
+      end = space == std::string::npos || space <= at ? std::min(text.find(' ', end), text.size()) : space;
+    }
+    lines += fmt::format("{}{}\n", at == 0 ? "" : std::string(indent, ' '), text.substr(at, end - at));
+    at = end + 1;
+  }
+  return lines;
+}
+
+std::string progress_lines(const json& ins, int columns) {
+  std::string text = labelled(
+      "run",
+      fmt::format("{} by {} since {}", ins.at("run").get<std::uint64_t>(), text_of(ins, "user"), text_of(ins, "since")),
+      columns);
+  std::string far =
+      fmt::format("position {} of {}, pages {} of {}", ins.at("position").get<int>(), ins.at("positions").get<int>(),
+                  ins.at("pages_pulled").get<int>(), ins.at("pages_expected").get<int>());
+  if (number_of(ins, "finish_in_s") >= 0) {
+    far += fmt::format(", ends in {:.0f} s", number_of(ins, "finish_in_s"));
+  }
+  text += labelled("rotation", far, columns);
+  const json& estimate = ins.at("estimate");
+  if (estimate.is_object()) {
+    text += labelled(
+        "estimate", fmt::format("{} of 24 parameters to tolerance", estimate.at("tolerances_met").get<int>()), columns);
+  }
+  return text;
+}
+
+std::string memory_lines(const json& ins, int columns) {
+  const json& force = ins.at("in_force");
+  const json& last = ins.at("last_calibration");
+  return labelled("in force",
+                  force.is_null() ? std::string("no set that was written from here")
+                                  : fmt::format("the set of run {} ({}), since {}", force.at("run").get<int>(),
+                                                text_of(force, "kind"), text_of(force, "from_utc")),
+                  columns) +
+         labelled("last calibration",
+                  last.is_null() ? std::string("none")
+                                 : fmt::format("run {}, {}, {}", last.at("run").get<int>(), text_of(last, "state"),
+                                               text_of(last, "ended_utc")),
+                  columns);
 }
 
 std::string csv_field(const std::string& text) {
@@ -202,6 +256,18 @@ std::string run_text(const std::string& document, bool colour, int columns) {
     text += parameter_lines(result, colour);
   }
   return text + events(run) + (columns > 0 ? "\n" + summary : "");
+}
+
+std::string status_text(const std::string& instrument, int columns) {
+  const json ins = json::parse(instrument);
+  const std::string serial = text_of(ins, "serial");
+  std::string text =
+      fmt::format("{}{}{}: {}\n", text_of(ins, "ins"), serial.empty() ? "" : " ", serial, text_of(ins, "state"));
+  if (text_of(ins, "state") != "idle") {
+    text += progress_lines(ins, columns);
+  }
+  text += labelled("bus", text_of(ins, "bus"), columns);
+  return text + (ins.contains("in_force") ? memory_lines(ins, columns) : std::string());
 }
 
 std::string history_text(const std::string& document) {

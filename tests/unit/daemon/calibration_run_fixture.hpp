@@ -87,7 +87,13 @@ class CalibrationRunTest : public testing::Test {
     config_.interface = std::string("fake0");
     config_.drift_check_s = 30.0;
     config_.lost_after_s = 20.0;
+    // Table 2 as long as the fake turns.
     schedule_ = *named_schedule("table2");
+    const double shorter = FakeIns::rotation_s / schedule_.duration_s();
+    for (double& dwell_s : schedule_.dwell_s) {
+      dwell_s *= shorter;
+    }
+    schedule_.rotation_s *= shorter;
     key_ = ins_.key;
   }
 
@@ -118,6 +124,13 @@ class CalibrationRunTest : public testing::Test {
         << "hangs in " << name(run_->record().state);
     EXPECT_THAT(*store_->unfinished_runs(), testing::IsEmpty());
     return run_->record().state;
+  }
+  // Status frames of somebody else, ten a second from now on.
+  void forge_status(const ins::Status& status) {
+    if (ins_.on_status) {
+      ins_.on_status(status);
+    }
+    timers_.after(100ms, [this, status] { forge_status(status); });
   }
   const std::string& reason() const { return run_->record().reason; }
   bool old_set_in_force() { return ins_.in_force().version == 0; }

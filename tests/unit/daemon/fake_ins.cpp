@@ -62,6 +62,29 @@ std::uint32_t FakeIns::pages_written() {
                   static_cast<std::uint32_t>((stopped_s_ < 0 ? since_start() : stopped_s_) / rotation_s * pages));
 }
 
+// A move belongs to the position that it leads to.
+std::uint8_t FakeIns::position() {
+  if (state() != ins::State::rotating) {
+    return 0;
+  }
+  double whole_ms = -static_cast<double>(schedule_.rotation_ms);
+  for (const auto& next : schedule_.positions) {
+    whole_ms += schedule_.rotation_ms + next.dwell_ms;
+  }
+  const double elapsed_ms =
+      since_start() / rotation_s * whole_ms;  // its schedule takes rotation_s, whatever its length
+  double end_ms = -static_cast<double>(schedule_.rotation_ms);
+  std::uint8_t position = 0;
+  for (const auto& next : schedule_.positions) {
+    if (position > 0 && end_ms > elapsed_ms) {
+      break;
+    }
+    ++position;
+    end_ms += schedule_.rotation_ms + next.dwell_ms;
+  }
+  return position;
+}
+
 bool FakeIns::session_expired() const { return (dead || !session_kept_) && timers_.now() - alive_at_ > 5s; }
 
 void FakeIns::keep_session(bool keep) {
@@ -166,8 +189,8 @@ Answer<Bytes> FakeIns::read(std::uint16_t did) {
     case ins::did::coefficients_inactive: return inactive_.empty() ? set(slots_.at(1 - in_force_)) : inactive_;
     case ins::did::site: return ins::encode(ins::SiteRecord{40, 116, 50});
     case ins::did::sample_format:
-      return ins::encode(
-          ins::SampleFormatRecord{sample_rate_hz, 1e-9, 1e-6, 1e-4, flash::page_bytes, flash::samples_per_page});
+      return ins::encode(ins::SampleFormatRecord{told_rate_hz.value_or(sample_rate_hz), 1e-9, 1e-6, 1e-4,
+                                                 flash::page_bytes, flash::samples_per_page});
     case ins::did::raw_data_directory:
       return ins::encode(ins::DirectoryRecord{
           rotation_, pages_written() - std::min(pages_written(), ring), pages_written(), pages,
@@ -197,6 +220,8 @@ Answer<Bytes> FakeIns::respond_to_routine(std::span<const std::uint8_t> request)
         started_ = timers_.now();
         stopped_s_ = -1.0;
         rotation_ = ByteReader(call->option).get<std::uint32_t>();
+      } else if (call->action == uds::RoutineAction::result) {
+        status = ins::encode(ins::RunRecord{state(), 0, position(), rotation_, pages_written()});
       } else {
         ++stops;
         if (turning_) {
@@ -277,6 +302,9 @@ Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
       const auto did = reader.get<std::uint16_t>();
       if (!unlocked_) {
         return no(0x33);
+      }
+      if (did == ins::did::schedule) {
+        schedule_ = ins::decode_schedule(request.subspan(3)).value();
       }
       if (did == ins::did::coefficients_inactive) {
         inactive_.assign(request.begin() + 3, request.end());

@@ -34,6 +34,7 @@ class FakeIns : public InsPort {
   void power_cycle();  // RAM is lost; the newest valid slot comes into force
   ins::State state();
   std::uint32_t pages_written();
+  std::uint8_t position();  // 1 is the first; 0: it does not turn
   const ins::Coefficients& in_force() const { return slots_.at(in_force_); }
   // Five seconds (S3) after the last request or TesterPresent the session is over and the INS is locked.
   bool in_default_session() const { return !extended_ || session_expired(); }
@@ -69,7 +70,8 @@ class FakeIns : public InsPort {
   static constexpr std::uint32_t pages = 20;
   static constexpr double rotation_s = 100.0;
   static constexpr double check_s = 30.0;
-  double sample_rate_hz = 1.0;  // so that the pages hold about as many seconds as a schedule
+  double sample_rate_hz = pages * flash::samples_per_page / rotation_s;
+  std::optional<double> told_rate_hz;  // else that one
 
   int starts = 0;         // rotations commanded
   int second_starts = 0;  // of them, on top of one that was not over
@@ -99,6 +101,7 @@ class FakeIns : public InsPort {
   std::array<std::uint8_t, 16> seed_{9, 9, 9};
   ins::State resting_ = ins::State::idle;
   bool turning_ = false;
+  ins::ScheduleRecord schedule_;
   SteadyTime started_{};
   std::uint32_t rotation_ = 0;
   std::uint32_t power_cycles_ = 1;

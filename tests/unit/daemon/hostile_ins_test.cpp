@@ -208,6 +208,20 @@ TEST_F(HostileInsTest, AForgedStatusFrameAsksForNothing) {
   EXPECT_EQ(ins_.pages_read.size(), FakeIns::pages);
 }
 
+// The rotation takes 100 s; the frames go on for as long as the run may wait. It ends when the INS answers that it is over:
+// the next question comes within a second.
+TEST_F(HostileInsTest, ForgedStatusFramesDoNotProlongTheRotation) {
+  begin();
+  ASSERT_TRUE(until(State::rotating));
+  const SteadyTime began = timers_.now();
+  ins::Status rotating;
+  rotating.state = ins::State::rotating;
+  forge_status(rotating);
+  ASSERT_TRUE(until(State::draining));
+  EXPECT_LT(seconds(began), FakeIns::rotation_s + 2.0);
+  EXPECT_EQ(end(), State::completed) << reason();
+}
+
 TEST_F(HostileInsTest, BusyRepeatRequestIsRepeatedAndNotForEver) {
   int busy = 3;
   ins_.alter = [&](Request request, Answer<Bytes>& answer) {

@@ -12,7 +12,18 @@ using testing::HasSubstr;
 using testing_support::CalibrationRunTest;
 using testing_support::FakeIns;
 
-TEST_F(CalibrationRunTest, SigmaIsShownAndShrinksWhileTheGimbalTurns) {
+// An estimate needs more data than the fake's 100 s: here its clock runs 29.4 times faster, and they hold all of Table 2.
+class RunningStepsTest : public CalibrationRunTest {
+ protected:
+  RunningStepsTest() {
+    schedule_ = *named_schedule("table2");
+    config_.time_scale = schedule_.duration_s() / FakeIns::rotation_s;
+    config_.drift_check_s = 0.0;  // the fake's check knows no other clock
+    ins_.sample_rate_hz = FakeIns::pages * flash::samples_per_page / schedule_.duration_s();
+  }
+};
+
+TEST_F(RunningStepsTest, SigmaIsShownAndShrinksWhileTheGimbalTurns) {
   begin();
   std::vector<double> sigma;
   ASSERT_TRUE(timers_.run_until(
@@ -33,7 +44,7 @@ TEST_F(CalibrationRunTest, SigmaIsShownAndShrinksWhileTheGimbalTurns) {
 }
 
 // 100 s of rotation; an estimate that takes 10 s of a processor may come every 41 s (1 s of the fake's, 40 of pause).
-TEST_F(CalibrationRunTest, RunningEstimatesTakeAFifthOfAProcessorAtMost) {
+TEST_F(RunningStepsTest, RunningEstimatesTakeAFifthOfAProcessorAtMost) {
   estimators_.running_cpu_s = 10.0;
   begin();
   EXPECT_EQ(end(), State::completed) << reason();
@@ -41,14 +52,14 @@ TEST_F(CalibrationRunTest, RunningEstimatesTakeAFifthOfAProcessorAtMost) {
   EXPECT_LE(estimators_.running_jobs, 3);
 }
 
-TEST_F(CalibrationRunTest, NoRunningEstimateWhereNoneIsWanted) {
+TEST_F(RunningStepsTest, NoRunningEstimateWhereNoneIsWanted) {
   config_.running_estimate_s = 0.0;
   begin();
   EXPECT_EQ(end(), State::completed) << reason();
   EXPECT_EQ(estimators_.running_jobs, 0);
 }
 
-TEST_F(CalibrationRunTest, WhatTheScheduleCannotGiveIsSaidOnce) {
+TEST_F(RunningStepsTest, WhatTheScheduleCannotGiveIsSaidOnce) {
   estimators_.forecast.out_of_reach = {"gyro_scale_y"};
   begin();
   EXPECT_EQ(end(), State::completed) << reason();
@@ -59,7 +70,7 @@ TEST_F(CalibrationRunTest, WhatTheScheduleCannotGiveIsSaidOnce) {
             1);
 }
 
-class StopWhenMetTest : public CalibrationRunTest {
+class StopWhenMetTest : public RunningStepsTest {
  protected:
   StopWhenMetTest() { estimators_.met_from = 4; }
   void begin_wanting_it(bool wanted = true) {
@@ -81,7 +92,8 @@ TEST_F(StopWhenMetTest, TheRotationEndsEarlyAndAllElseFollows) {
   EXPECT_EQ(ins_.stops, 1);
   EXPECT_LT(ins_.pages_read.size(), FakeIns::pages);
   EXPECT_EQ(ins_.pages_read.size(), ins_.pages_written());  // every page of it, none twice
-  EXPECT_EQ(run_->record().early_end_s, static_cast<double>(ins_.pages_written() * flash::samples_per_page));
+  EXPECT_DOUBLE_EQ(run_->record().early_end_s,
+                   static_cast<double>(ins_.pages_written() * flash::samples_per_page) / ins_.sample_rate_hz);
   EXPECT_EQ(ins_.in_force().version, 1u);
   EXPECT_EQ(estimators_.jobs, 1);
 }
@@ -119,6 +131,28 @@ TEST_F(StopWhenMetTest, TheStopLeavesADwellsEndAlone) {
   const double period = schedule_.dwell_s[0] + schedule_.rotation_s;
   const double into_position = std::fmod(elapsed, period);
   EXPECT_LT(into_position, schedule_.dwell_s[0] - 1.0);  // a status frame may be a second old
+}
+
+// Frames of somebody else, who says at every time that the gimbal stands 2 s into the first position. The INS answers where
+// it is; it is not stopped, and that is said once.
+TEST_F(StopWhenMetTest, NotOnTheWordOfAForgedStatusFrame) {
+  RunRecord record;
+  record.stop_when_met = true;
+  begin(record);
+  ins::Status first_dwell;
+  first_dwell.state = ins::State::rotating;
+  first_dwell.position = 1;
+  first_dwell.time_left_s = schedule_.duration_s() - 2.0;
+  ASSERT_TRUE(until(State::rotating));
+  forge_status(first_dwell);
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_EQ(ins_.stops, 0);
+  const auto events = *store_->events(run_->record().id);
+  EXPECT_EQ(std::count_if(events.begin(), events.end(),
+                          [](const EventRecord& event) {
+                            return event.text.find("not ended early on their word") != std::string::npos;
+                          }),
+            1);
 }
 
 TEST_F(StopWhenMetTest, AKilledDaemonGoesOnEndingIt) {

@@ -210,6 +210,17 @@ TEST_F(ServiceTest, WhatIsKnownOfAnInsWithoutAskingIt) {
   EXPECT_EQ(standing.set_version, 0u);
 }
 
+// Where the interface is missing nobody is asked: the answer comes at once and says so.
+TEST_F(ServiceTest, TheStateOfABusThatIsNotThere) {
+  configure("", section("a"));
+  start();
+  std::vector<std::string> told;
+  operations().ask_bus("a", [&](const std::string& words) { told.push_back(words); });
+  EXPECT_THAT(told, ElementsAre("absent-a: there is no CAN interface of this name"));
+  operations().ask_bus("nobody", [&](const std::string& words) { told.push_back(words); });
+  EXPECT_EQ(told.size(), 2u);
+}
+
 // The run is not over: the next daemon takes it up.
 TEST_F(ServiceTest, AStopLeavesARunResumableAndBeginsNone) {
   configure("", section("a"));
