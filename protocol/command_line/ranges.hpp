@@ -36,6 +36,9 @@ inline constexpr Range latitude{-89.0, 89.0, "deg"};
 inline constexpr Range height{-500.0, 9000.0, "m"};
 inline constexpr Range angle{-360.0, 360.0, "deg"};
 
+// A recording's; as its check has it.
+inline constexpr Range sample_rate{1.0, 20000.0, "Hz"};
+
 // Statistics and passes.
 inline constexpr Range false_alarm_rate{1e-6, 0.2, ""};
 inline constexpr Range convergence{1e-6, 1.0, ""};

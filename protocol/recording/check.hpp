@@ -20,6 +20,7 @@ struct LoadedRecording {
 struct CheckPolicy {
   bool gaps_are_errors = true;
   bool gimbal_contradiction_is_error = true;
+  bool uneven_force_is_error = true;  // mean specific force unlike gravity, that of half of the seconds like it
 };
 
 // Checks values: finite, time increasing, no gaps (an interval above 1.5 nominal ones), mean rate within 0.1 % of

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "protocol/error.hpp"
 #include "protocol/recording/check.hpp"
@@ -22,6 +24,9 @@ Expected<LoadedRecording> read_hdf5_image(const void* image, std::size_t size, c
 // Writes f8, chunked, shuffled and deflated. The file appears under its name complete and on disk, or not at all:
 // it is written beside its place, synced, and renamed; an existing file is replaced only by a complete one. A full
 // disk or an unwritable folder is an error (internal: it is this machine that fails) and leaves no partial file.
-Expected<void> write_hdf5(const Recording& recording, const std::filesystem::path& path);
+// ORIGIN, where the recording comes from: further text attributes of the root, which readers pass over; 60 kB each.
+using TextAttributes = std::vector<std::pair<std::string, std::string>>;
+Expected<void> write_hdf5(const Recording& recording, const std::filesystem::path& path,
+                          const TextAttributes& origin = {});
 
 }  // namespace selfcal

@@ -67,6 +67,12 @@ bool write_attributes(hid_t file, const Recording& recording) {
          (recording.start_time_utc.empty() || write_text(file, "start_time_utc", recording.start_time_utc));
 }
 
+bool write_origin(hid_t file, const TextAttributes& origin) {
+  return std::all_of(origin.begin(), origin.end(), [file](const auto& attribute) {
+    return write_text(file, attribute.first.c_str(), attribute.second);
+  });
+}
+
 bool write_datasets(hid_t file, const Recording& recording) {
   const hsize_t rows = recording.size();
   return write_dataset(file, "time_s", recording.time_s.data(), rows, 0) &&
@@ -83,13 +89,13 @@ bool write_datasets(hid_t file, const Recording& recording) {
 
 // The whole file in memory: HDF5 never sees the disk, so a full one cannot leave it with half-written metadata, and
 // the image is about a tenth of the samples it holds.
-Expected<std::string> file_image(const Recording& recording) {
+Expected<std::string> file_image(const Recording& recording, const TextAttributes& origin) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   const bool in_memory = H5Pset_fapl_core(access.get(), image_increment, false) >= 0;
   const Handle file(in_memory ? H5Fcreate("recording", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()) : H5I_INVALID_HID,
                     H5Fclose);
-  if (!file || !write_attributes(file.get(), recording) || !write_datasets(file.get(), recording) ||
-      H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) {
+  if (!file || !write_attributes(file.get(), recording) || !write_origin(file.get(), origin) ||
+      !write_datasets(file.get(), recording) || H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) {
     return fail(ErrorKind::internal, hdf5::last_error());
   }
   const ssize_t size = H5Fget_file_image(file.get(), nullptr, 0);
@@ -102,7 +108,7 @@ Expected<std::string> file_image(const Recording& recording) {
 
 }  // namespace
 
-Expected<void> write_hdf5(const Recording& recording, const std::filesystem::path& path) {
+Expected<void> write_hdf5(const Recording& recording, const std::filesystem::path& path, const TextAttributes& origin) {
   const hdf5::QuietErrors quiet;
   for (const std::size_t rows : {recording.delta_theta_rad.size(), recording.delta_v_mps.size(),
                                  recording.gimbal_outer_rad.size(), recording.gimbal_inner_rad.size()}) {
@@ -111,7 +117,7 @@ Expected<void> write_hdf5(const Recording& recording, const std::filesystem::pat
                   fmt::format("{}: recording with columns of {} and {} rows", path.string(), recording.size(), rows));
     }
   }
-  const Expected<std::string> image = file_image(recording);
+  const Expected<std::string> image = file_image(recording, origin);
   if (!image) {
     return fail(ErrorKind::internal, fmt::format("{}: cannot write as HDF5: {}", path.string(), image.error().message));
   }

@@ -14,4 +14,7 @@ namespace selfcal {
 // shares no file with the caller and leaves by _exit; its standard error is closed.
 Expected<Recording> parse_isolated(const std::string& name, const std::function<Expected<Recording>()>& parse);
 
+// The same for a parser whose result is bytes.
+Expected<std::string> bytes_isolated(const std::string& name, const std::function<Expected<std::string>()>& parse);
+
 }  // namespace selfcal

@@ -1,0 +1,397 @@
+#include "protocol/import/guess.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "protocol/import/guess_orientation.hpp"
+#include "protocol/import/guess_roles.hpp"
+#include "protocol/import/guess_units.hpp"
+#include "protocol/import/psins.hpp"
+#include "protocol/import/time_axis.hpp"
+
+namespace selfcal::import {
+namespace {
+
+constexpr std::size_t most_numbers = std::size_t{40} << 20;  // judged by; 320 MiB
+constexpr std::size_t fewest_columns = 6;
+
+std::string_view si_unit(const UnitClaim& said, std::string_view increments, std::string_view rates) {
+  return said.increments ? increments : rates;
+}
+
+class Guesser {
+ public:
+  Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values)
+      : source_(source),
+        known_(knowledge),
+        values_(std::move(values)),
+        named_(read_names(source.names(), source.units())) {}
+
+  Guess guess() {
+    if (source_.dialect() != nullptr) {
+      guess_.map.dialect = *source_.dialect();
+    }
+    psins_ = read_psins(source_.preamble());
+    roles_ = assign_roles(source_, named_, values_, psins_.has_value(), guess_.remarks);
+    guess_site();
+    guess_time();
+    if (roles_.gyro && roles_.accelerometer) {
+      guess_sensors();
+    }
+    guess_temperature();
+    for (const Remark& remark : guess_.remarks) {
+      std::vector<std::string>& unsettled = guess_.map.unsettled;
+      if (remark.doubt && std::find(unsettled.begin(), unsettled.end(), remark.key) == unsettled.end()) {
+        unsettled.push_back(remark.key);
+      }
+    }
+    return std::move(guess_);
+  }
+
+ private:
+  void say(const char* key, std::string text) { guess_.remarks.push_back({key, std::move(text), false}); }
+  void doubt(const char* key, std::string text) { guess_.remarks.push_back({key, std::move(text), true}); }
+
+  ColumnRef reference(std::size_t column) const {
+    const std::vector<std::string>& names = source_.names();
+    const std::string& name = names[column];
+    const bool unique = !name.empty() && std::count(names.begin(), names.end(), name) == 1;
+    return unique ? ColumnRef{0, name} : ColumnRef{column + 1, {}};
+  }
+
+  void guess_site() {
+    ImportMap& map = guess_.map;
+    map.latitude_deg = known_.latitude_deg;
+    map.longitude_deg = known_.longitude_deg;
+    map.height_m = known_.height_m;
+    if (psins_ && !known_.latitude_deg && !known_.longitude_deg && !known_.height_m) {
+      map.latitude_deg = psins_->latitude_deg;
+      map.longitude_deg = psins_->longitude_deg;
+      map.height_m = psins_->height_m;
+      return say("site", "from the file's header");
+    }
+    if (!map.latitude_deg || !map.longitude_deg || !map.height_m) {
+      doubt("site", "latitude, longitude and height are not in the file");
+    }
+  }
+
+  void guess_time() {
+    ImportMap& map = guess_.map;
+    if (!roles_.time) {
+      const std::optional<double> rate =
+          psins_ ? std::optional<double>(1.0 / psins_->interval_s) : known_.sample_rate_hz;
+      map.sample_rate_hz = rate;
+      if (rate) {
+        interval_s_ = 1.0 / *rate;
+        return say("time",
+                   fmt::format("no column of it; {} Hz {}", *rate, psins_ ? "from the file's header" : "as given"));
+      }
+      return doubt("time", "no column increases evenly: the sample rate is not known (--rate gives it)");
+    }
+    const std::size_t column = *roles_.time;
+    map.time.column = reference(column);
+    const double interval = static_cast<double>(1.0L / static_cast<long double>(rate_of(roles_.stamps, 1.0L).rate_hz));
+    const std::vector<std::string> units = time_units(interval);
+    const std::string& claimed = named_[column].unit;
+    if (roles_.time_is_date) {
+      map.time.unit = "date";
+    } else if (find_unit(claimed) && find_unit(claimed)->quantity == Quantity::time) {
+      map.time.unit = claimed;
+      const bool long_unit = claimed == "min" || claimed == "h";
+      if (!long_unit && std::find(units.begin(), units.end(), claimed) == units.end()) {
+        doubt("time.unit", fmt::format("{} by its name; that would make {:.6g} Hz", claimed,
+                                       1.0 / (interval * find_unit(claimed)->si)));
+      }
+    } else if (units.empty()) {
+      doubt("time.unit", fmt::format("intervals of {:.6g}: no unit makes a sample rate of that", interval));
+    } else {
+      map.time.unit = units.front();
+      if (units.size() > 1) {
+        doubt("time.unit", fmt::format("intervals of {:.6g}: {} or {}", interval, units[0], units[1]));
+      }
+    }
+    const double si = roles_.time_is_date ? 1.0 : find_unit(map.time.unit)->si;
+    const RateOfStamps rate = rate_of(roles_.stamps, static_cast<long double>(si));
+    map.sample_rate_hz = rate.rate_hz;
+    interval_s_ = 1.0 / rate.rate_hz;
+    say("time.unit", fmt::format("{}: {} Hz; intervals vary by {:.2g} % rms{}", map.time.unit, rate.rate_hz,
+                                 rate.jitter < 1e-9 ? 0.0 : 100.0 * rate.jitter,
+                                 rate.gaps > 0 ? fmt::format(", {} gaps", rate.gaps) : ""));
+    say("time.stamp", "a time is taken to be the end of its sample's interval");
+    // A recording counts from its start.
+    const double first_s = static_cast<double>(roles_.stamps.front()) * si;
+    if (first_s < -*interval_s_ || first_s > 2.5 * *interval_s_) {
+      map.time.origin_first = true;
+      say("time.origin", fmt::format("the first time, {} {}, is taken to be one interval after the start",
+                                     static_cast<double>(roles_.stamps.front()), map.time.unit));
+    }
+    if (known_.sample_rate_hz && std::abs(*known_.sample_rate_hz / rate.rate_hz - 1.0) > 1e-3) {
+      doubt("time.unit", fmt::format("the times make {} Hz, {} Hz is given", rate.rate_hz, *known_.sample_rate_hz));
+    }
+  }
+
+  UnitClaim claim(const std::array<std::size_t, 3>& columns, const char* key) {
+    UnitClaim said{named_[columns[0]].unit, named_[columns[0]].increment};
+    for (const std::size_t column : columns) {
+      if (named_[column].unit != said.unit) {
+        doubt(key, "the names of the three columns say different units");
+        said.unit.clear();
+      }
+    }
+    return said;
+  }
+
+  void guess_sensors() {
+    ImportMap& map = guess_.map;
+    for (std::size_t k = 0; k < 3; ++k) {
+      map.gyro.columns[k] = reference((*roles_.gyro)[k]);
+      map.accelerometer.columns[k] = reference((*roles_.accelerometer)[k]);
+    }
+    take_zero_off();
+    OrientationInput input;
+    input.gyro = triad_columns(values_, *roles_.gyro);
+    input.accelerometer = triad_columns(values_, *roles_.accelerometer);
+    input.interval_s = interval_s_;
+    input.latitude_deg = map.latitude_deg;
+    input.axes_by_format = psins_.has_value();
+    if (roles_.gimbal) {
+      input.gimbal[0] = &values_[(*roles_.gimbal)[0]];
+      input.gimbal[1] = &values_[(*roles_.gimbal)[1]];
+      input.gimbal_named = roles_.gimbal_named;
+      const std::string& unit = named_[(*roles_.gimbal)[0]].unit;
+      input.gimbal_unit = find_unit(unit) && find_unit(unit)->quantity == Quantity::angle ? unit : std::string();
+    }
+    const Orientation orientation = find_orientation(input, guess_.remarks);
+    set_gimbal(orientation);
+    if (psins_) {
+      return set_psins();
+    }
+    set_axes(orientation.gyro, map.gyro);
+    set_axes(orientation.accelerometer, map.accelerometer);
+    guess_gyro_unit(orientation);
+    guess_accelerometer_unit();
+  }
+
+  // Counts around a middle: the sphere through gravity's directions has its centre there.
+  void take_zero_off() {
+    const TriadColumns columns = triad_columns(values_, *roles_.accelerometer);
+    const auto claimed = find_unit(named_[roles_.accelerometer->front()].unit);
+    if (psins_ ||
+        (claimed && (claimed->quantity == Quantity::acceleration || claimed->quantity == Quantity::velocity))) {
+      return;
+    }
+    const std::optional<Vector3> zero = centre_of_gravity_sphere(triad_columns(values_, *roles_.gyro), columns);
+    if (!zero) {
+      return;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      guess_.map.accelerometer.zero[k] = std::round((*zero)[static_cast<int>(k)]);
+      for (double& value : values_[(*roles_.accelerometer)[k]]) {
+        value -= guess_.map.accelerometer.zero[k];
+      }
+    }
+    doubt(
+        "accelerometer.zero",
+        fmt::format("counts {:.0f}, {:.0f}, {:.0f} mean no force: the centre of gravity's directions; biases are in it",
+                    (*zero)[0], (*zero)[1], (*zero)[2]));
+  }
+
+  static void set_axes(const Matrix3& axes, TriadMap& triad) {
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 3; ++j) {
+        if (axes(k, j) != 0.0) {
+          triad.axes[static_cast<std::size_t>(k)] = {j, axes(k, j)};
+        }
+      }
+    }
+  }
+
+  void set_psins() {
+    ImportMap& map = guess_.map;
+    map.gyro.increments = map.accelerometer.increments = true;
+    map.gyro.unit = "arcsec";
+    map.gyro.scale = psins_->gyro_arcsec;
+    map.accelerometer.unit = "m/s";
+    map.accelerometer.scale = psins_->accelerometer_mps;
+    map.gyro.axes = map.accelerometer.axes = {{{1, 1.0}, {2, 1.0}, {0, 1.0}}};
+    say("gyro.unit", "counts; what one is worth, for both triads, from the file's header");
+    say("gyro.axes", "PSINS: x right, y forward, z up; b: x forward, y up, z right");
+  }
+
+  void set_gimbal(const Orientation& orientation) {
+    GimbalMap& gimbal = guess_.map.gimbal;
+    if (roles_.gimbal) {
+      const std::size_t outer = (*roles_.gimbal)[orientation.swapped ? 1 : 0];
+      const std::size_t inner = (*roles_.gimbal)[orientation.swapped ? 0 : 1];
+      gimbal.outer = reference(outer);
+      gimbal.inner = reference(inner);
+      gimbal.unit = orientation.gimbal_unit;
+      gimbal.signs = orientation.signs;
+      say("gimbal.outer", fmt::format("outer {}, inner {}{}", source_.title(outer), source_.title(inner),
+                                      roles_.gimbal_named ? ", by their names" : ": so gravity and the turns fit"));
+    } else if (orientation.moves) {
+      gimbal.absent = true;
+      say("gimbal", "no read-outs in the file, though the sensor turns: good for `selfcal poses`, not for the 24");
+    } else {
+      gimbal.fixed_deg = {0.0, 0.0};
+      say("gimbal", "nothing turns: read-outs are written as 0");
+    }
+  }
+
+  void guess_gyro_unit(const Orientation& orientation) {
+    TriadMap& gyro = guess_.map.gyro;
+    const UnitClaim said = claim(*roles_.gyro, "gyro.unit");
+    const auto claimed = find_unit(said.unit);
+    if (!orientation.rad_per_sample || !interval_s_) {
+      gyro.unit = std::string(claimed ? claimed->name : si_unit(said, "rad", "rad/s"));
+      gyro.increments = find_unit(gyro.unit)->quantity == Quantity::angle;
+      const char* why = !interval_s_ ? "the sample rate is not known" : "no turn that shows it";
+      return claimed && interval_s_ ? say("gyro.unit", fmt::format("{} by its name; {}", gyro.unit, why))
+                                    : doubt("gyro.unit", fmt::format("{}{}: {}", gyro.unit,
+                                                                     claimed ? " by its name" : " or any other", why));
+    }
+    if (const auto fit = gyro_unit(*orientation.rad_per_sample, *interval_s_, said)) {
+      gyro.unit = fit->unit;
+      gyro.increments = fit->increments;
+      say("gyro.unit", fmt::format("{} ({}): the turns show it within {:.1f} %", fit->unit,
+                                   fit->increments ? "increments" : "rates", 100.0 * std::expm1(fit->off)));
+      if (!fit->rivals.empty()) {
+        doubt("gyro.unit", fmt::format("{} or {}: both fit the turns", fit->unit, fmt::join(fit->rivals, ", ")));
+      }
+      return;
+    }
+    // Counts, or another unit than the name's.
+    const auto other = gyro_unit(*orientation.rad_per_sample, *interval_s_, {{}, said.increments});
+    gyro.increments = said.increments;
+    gyro.unit = std::string(si_unit(said, "rad", "rad/s"));
+    const double scale = *orientation.rad_per_sample / (said.increments ? 1.0 : *interval_s_);
+    gyro.scale = {scale, scale, scale};
+    doubt("gyro.unit",
+          claimed ? fmt::format("{} by the name contradicts the turns{}", said.unit,
+                                other ? fmt::format(", which show {}", other->unit) : "")
+                  : fmt::format("counts: the turns show {:.4g} {} a count; the data sheet's value belongs here", scale,
+                                gyro.unit));
+  }
+
+  // Size of the mean of blocks, the median of them.
+  double size_of_gravity() const {
+    const TriadColumns columns = triad_columns(values_, *roles_.accelerometer);
+    const Motion motion = find_motion(columns, columns, std::nullopt, 25);
+    std::vector<double> size;
+    for (const Block& block : motion.blocks) {
+      size.push_back(block.accel.norm());
+    }
+    if (size.empty()) {
+      return 0.0;
+    }
+    const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+    std::nth_element(size.begin(), middle, size.end());
+    return *middle;
+  }
+
+  void guess_accelerometer_unit() {
+    TriadMap& accel = guess_.map.accelerometer;
+    const UnitClaim said = claim(*roles_.accelerometer, "accelerometer.unit");
+    const double size = size_of_gravity();
+    // Without a rate only a named rate can be told.
+    const auto claimed = find_unit(said.unit);
+    const double interval = interval_s_.value_or(1.0);
+    const auto fit = size > 0.0 && (interval_s_ || claimed) ? accelerometer_unit(size, interval, said) : std::nullopt;
+    if (fit) {
+      accel.unit = fit->unit;
+      accel.increments = fit->increments;
+      say("accelerometer.unit",
+          fmt::format("{} ({}): gravity is {:.5g} of it", fit->unit, fit->increments ? "increments" : "rates", size));
+      if (!fit->rivals.empty() || (!interval_s_ && fit->increments)) {
+        doubt("accelerometer.unit",
+              fmt::format("{} or {}: gravity fits both", fit->unit, fmt::join(fit->rivals, ", ")));
+      }
+      return;
+    }
+    accel.increments = said.increments;
+    accel.unit = std::string(si_unit(said, "m/s", "m/s^2"));
+    const double scale = 9.80665 * (said.increments ? interval : 1.0) / size;
+    accel.scale = {scale, scale, scale};
+    doubt("accelerometer.unit",
+          claimed ? fmt::format("{} by the name, but gravity is {:.5g} of it", said.unit, size)
+                  : fmt::format("counts: gravity is {:.5g} of them, zero offsets included; scale and zero of the data "
+                                "sheet belong here",
+                                size));
+  }
+
+  void guess_temperature() {
+    ImportMap& map = guess_.map;
+    for (const std::size_t column : roles_.temperature) {
+      map.temperature.push_back(reference(column));
+    }
+    if (roles_.temperature.empty()) {
+      return;
+    }
+    const std::vector<double>& values = values_[roles_.temperature.front()];
+    const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+    const std::string& claimed = named_[roles_.temperature.front()].unit;
+    if (claimed == "C" || claimed == "K" || claimed == "F") {
+      map.temperature_unit = claimed;
+      const double celsius_of = celsius(mean, claimed);
+      return celsius_of > -60.0 && celsius_of < 130.0
+                 ? say("temperature.unit", fmt::format("{}, by its name", claimed))
+                 : doubt("temperature.unit",
+                         fmt::format("{} by its name: {:.4g} would be {:.4g} C", claimed, mean, celsius_of));
+    }
+    map.temperature_unit.assign(1, mean > 200.0 ? 'K' : 'C');
+    if (mean > 200.0 && mean < 400.0) {
+      return say("temperature.unit", fmt::format("K: {:.4g}", mean));
+    }
+    if (mean > -40.0 && mean < 45.0) {
+      return say("temperature.unit", fmt::format("C: {:.4g}", mean));
+    }
+    doubt("temperature.unit", fmt::format("{:.4g}: C, F or counts", mean));
+  }
+
+  const ColumnSource& source_;
+  const GuessKnowledge& known_;
+  Values values_;
+  std::vector<NamedColumn> named_;
+  Roles roles_;
+  std::optional<PsinsHeader> psins_;
+  std::optional<double> interval_s_;
+  Guess guess_;
+};
+
+}  // namespace
+
+Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& knowledge, const std::string& file) {
+  const std::size_t columns = source.names().size();
+  if (columns < fewest_columns) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {}: {} columns; three gyros and three accelerometers are expected", file,
+                            source.form(), columns));
+  }
+  ColumnRequest request;
+  request.tolerant = true;
+  request.columns.resize(columns);
+  std::iota(request.columns.begin(), request.columns.end(), std::size_t{0});
+  request.most_rows = most_numbers / columns;
+  Expected<ColumnData> data = source.read(request);
+  if (!data) {
+    return tl::unexpected(data.error());
+  }
+  constexpr std::size_t fewest_rows = 200;
+  if (data->rows < fewest_rows) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {} lines of numbers; at least {} are needed to judge by", file,
+                                                  data->rows, fewest_rows));
+  }
+  const std::size_t rows = data->rows;
+  const bool left_out = data->left_out;
+  Guess guess = Guesser(source, knowledge, std::move(data->values)).guess();
+  if (left_out) {
+    guess.remarks.insert(guess.remarks.begin(),
+                         Remark{"columns", fmt::format("judged by the first {} rows", rows), false});
+  }
+  return guess;
+}
+
+}  // namespace selfcal::import

@@ -1,0 +1,333 @@
+#include "protocol/import/guess_names.hpp"
+
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+
+#include "protocol/import/text_dialect.hpp"
+#include "protocol/import/units.hpp"
+
+namespace selfcal::import {
+namespace {
+
+using Words = std::vector<std::string>;
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+// "GyroX" -> gyro x, "acc_x_m_s2" -> acc x m s2
+Words words_of(std::string_view name) {
+  Words words(1);
+  char before = ' ';
+  for (const char c : name) {
+    const bool capital = c >= 'A' && c <= 'Z' && before >= 'a' && before <= 'z';
+    if (!is_letter(c) && !is_digit(c)) {
+      words.emplace_back();
+    } else {
+      if (capital) {
+        words.emplace_back();
+      }
+      words.back() += lower(c);
+    }
+    before = c;
+  }
+  std::erase(words, std::string());
+  return words;
+}
+
+// As people write units, to as we do. Blanks, points and carets are taken out first.
+std::string known_unit(std::string_view written) {
+  std::string text;
+  constexpr std::string_view degree_sign = "\xC2\xB0";
+  constexpr std::string_view micro_signs[] = {"\xC2\xB5", "\xCE\xBC"};
+  constexpr std::string_view square = "\xC2\xB2";
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    const std::string_view rest = written.substr(k);
+    if (rest.starts_with(degree_sign)) {
+      text += "deg";
+      ++k;
+    } else if (rest.starts_with(micro_signs[0]) || rest.starts_with(micro_signs[1])) {
+      text += 'u';
+      ++k;
+    } else if (rest.starts_with(square)) {
+      text += '2';
+      ++k;
+    } else if (written[k] != ' ' && written[k] != '^' && written[k] != '*' && written[k] != '.') {
+      text += lower(written[k]);
+    }
+  }
+  struct Known {
+    std::string_view written, unit;
+  };
+  static constexpr std::array<Known, 66> known{{
+      {"rad/s", "rad/s"},
+      {"rads", "rad/s"},
+      {"rads-1", "rad/s"},
+      {"radps", "rad/s"},
+      {"rad/sec", "rad/s"},
+      {"deg/s", "deg/s"},
+      {"degs", "deg/s"},
+      {"dps", "deg/s"},
+      {"deg/sec", "deg/s"},
+      {"degps", "deg/s"},
+      {"deg/h", "deg/h"},
+      {"degh", "deg/h"},
+      {"deg/hr", "deg/h"},
+      {"dph", "deg/h"},
+      {"mrad/s", "mrad/s"},
+      {"rad/h", "rad/h"},
+      {"mdeg/s", "mdeg/s"},
+      {"mdps", "mdeg/s"},
+      {"rpm", "rpm"},
+      {"arcsec/s", "arcsec/s"},
+      {"rad", "rad"},
+      {"deg", "deg"},
+      {"arcsec", "arcsec"},
+      {"\"", "arcsec"},
+      {"mrad", "mrad"},
+      {"urad", "urad"},
+      {"arcmin", "arcmin"},
+      {"m/s2", "m/s^2"},
+      {"ms2", "m/s^2"},
+      {"mps2", "m/s^2"},
+      {"m/s/s", "m/s^2"},
+      {"ms-2", "m/s^2"},
+      {"m/sec2", "m/s^2"},
+      {"g", "g"},
+      {"mg", "mg"},
+      {"ug", "ug"},
+      {"ft/s2", "ft/s^2"},
+      {"cm/s2", "cm/s^2"},
+      {"gal", "cm/s^2"},
+      {"m/s", "m/s"},
+      {"mps", "m/s"},
+      {"ms-1", "m/s"},
+      {"gs", "g*s"},
+      {"mgs", "mg*s"},
+      {"ugs", "ug*s"},
+      {"mm/s", "mm/s"},
+      {"cm/s", "cm/s"},
+      {"ft/s", "ft/s"},
+      {"s", "s"},
+      {"sec", "s"},
+      {"seconds", "s"},
+      {"ms", "ms"},
+      {"msec", "ms"},
+      {"us", "us"},
+      {"usec", "us"},
+      {"ns", "ns"},
+      {"nsec", "ns"},
+      {"nanoseconds", "ns"},
+      {"milliseconds", "ms"},
+      {"microseconds", "us"},
+      {"c", "C"},
+      {"degc", "C"},
+      {"celsius", "C"},
+      {"k", "K"},
+      {"f", "F"},
+      {"degf", "F"},
+  }};
+  const auto* const found = std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.written == text; });
+  return found == known.end() ? std::string() : std::string(found->unit);
+}
+
+// Takes a unit off the end of the words: acc x m s2.
+std::string unit_at_end(Words& words) {
+  struct Ending {
+    std::vector<std::string_view> words;
+    std::string_view unit;
+  };
+  static const std::vector<Ending> endings{
+      {{"m", "s", "s"}, "m/s^2"},
+      {{"m", "s2"}, "m/s^2"},
+      {{"mps2"}, "m/s^2"},
+      {{"ms2"}, "m/s^2"},
+      {{"m", "s"}, "m/s"},
+      {{"mps"}, "m/s"},
+      {{"rad", "s"}, "rad/s"},
+      {{"rads"}, "rad/s"},
+      {{"radps"}, "rad/s"},
+      {{"deg", "s"}, "deg/s"},
+      {{"dps"}, "deg/s"},
+      {{"degps"}, "deg/s"},
+      {{"mdps"}, "mdeg/s"},
+      {{"deg", "h"}, "deg/h"},
+      {{"dph"}, "deg/h"},
+      {{"deg", "hr"}, "deg/h"},
+      {{"deg"}, "deg"},
+      {{"rad"}, "rad"},
+      {{"arcsec"}, "arcsec"},
+      {{"mg"}, "mg"},
+      {{"ug"}, "ug"},
+      {{"mrad", "s"}, "mrad/s"},
+      {{"ms"}, "ms"},
+      {{"us"}, "us"},
+      {{"ns"}, "ns"},
+      {{"degc"}, "C"},
+      {{"deg", "c"}, "C"},
+      {{"kelvin"}, "K"},
+      {{"celsius"}, "C"},
+      {{"degf"}, "F"},
+      {{"g"}, "g"},
+      {{"m", "s", "2"}, "m/s^2"},
+      {{"deg", "per", "s"}, "deg/s"},
+      {{"rad", "per", "s"}, "rad/s"},
+      {{"deg", "per", "h"}, "deg/h"},
+      {{"deg", "sec"}, "deg/s"},
+      {{"rad", "sec"}, "rad/s"},
+  };
+  for (const Ending& ending : endings) {
+    if (words.size() > ending.words.size() &&
+        std::equal(ending.words.begin(), ending.words.end(),
+                   words.end() - static_cast<std::ptrdiff_t>(ending.words.size()))) {
+      words.resize(words.size() - ending.words.size());
+      return std::string(ending.unit);
+    }
+  }
+  return {};
+}
+
+bool holds(const Words& words, std::initializer_list<std::string_view> parts) {
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+    return std::any_of(parts.begin(), parts.end(),
+                       [&](std::string_view part) { return word.find(part) != std::string::npos; });
+  });
+}
+
+bool is_one_of(const Words& words, std::initializer_list<std::string_view> whole) {
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+    return std::any_of(whole.begin(), whole.end(), [&](std::string_view one) { return word == one; });
+  });
+}
+
+// The unit of the first pair whose word is among WORDS.
+std::string unit_among(const Words& words, std::initializer_list<std::pair<std::string_view, std::string_view>> pairs) {
+  for (const auto& [word, unit] : pairs) {
+    if (is_one_of(words, {word})) {
+      return std::string(unit);
+    }
+  }
+  return {};
+}
+
+// The axis at the end, in words or glued to a stem ("gx", "accy", "wz"), taken off.
+int take_axis(Words& words) {
+  constexpr std::string_view letters = "xyz";
+  for (auto word = words.rbegin(); word != words.rend(); ++word) {
+    if (word->size() == 1 && letters.find(*word) != std::string_view::npos) {
+      const int axis = static_cast<int>(letters.find(*word));
+      words.erase(std::next(word).base());
+      return axis;
+    }
+  }
+  static constexpr std::string_view stems[] = {
+      "g",  "w",  "a",   "f", "acc", "accel",  "gyr",  "gyro", "gyr0", "dv",    "dth",  "da", "om", "omega",
+      "fb", "wb", "wib", "m", "mag", "dtheta", "dvel", "dang", "fib",  "force", "rate", "v",  "vel"};
+  for (std::string& word : words) {
+    const std::size_t axis = word.empty() ? std::string_view::npos : letters.find(word.back());
+    const std::string_view stem = std::string_view(word).substr(0, word.empty() ? 0 : word.size() - 1);
+    if (axis != std::string_view::npos && std::find(std::begin(stems), std::end(stems), stem) != std::end(stems)) {
+      word.pop_back();
+      return static_cast<int>(axis);
+    }
+  }
+  return -1;
+}
+
+Role triad_role(const Words& w) {
+  if (holds(w, {"mag", "field"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
+    return Role::other;
+  }
+  const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});
+  if (holds(w, {"gyr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
+      is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "dth", "da"}) ||
+      (inc && (holds(w, {"theta", "angle"}) || is_one_of(w, {"ang"}))) ||
+      (holds(w, {"ang"}) && holds(w, {"rate", "vel"}))) {
+    return Role::gyro;
+  }
+  if (holds(w, {"acc", "force", "beschl"}) || is_one_of(w, {"a", "f", "fb", "fib", "dv", "dvel"}) ||
+      (inc && (holds(w, {"vel"}) || is_one_of(w, {"v"})))) {
+    return Role::accelerometer;
+  }
+  return Role::other;
+}
+
+Role single_role(const Words& w) {
+  if (holds(w, {"temp"}) || is_one_of(w, {"tmp"})) {
+    return Role::temperature;
+  }
+  if (holds(w, {"outer"})) {
+    return Role::outer;
+  }
+  if (holds(w, {"inner"})) {
+    return Role::inner;
+  }
+  if (holds(w, {"gimbal", "turntable", "encoder", "resolver", "cmd", "axis"})) {
+    return Role::gimbal;
+  }
+  if (holds(w, {"time", "stamp", "zeit", "utc", "date", "epoch"}) ||
+      is_one_of(w, {"t", "sec", "seconds", "tow", "sow", "s", "ms", "us", "ns"})) {
+    return Role::time;
+  }
+  if (holds(w, {"count", "index", "seq", "sample", "packet", "frame"}) || is_one_of(w, {"n", "i", "id", "nr", "no"})) {
+    return Role::counter;
+  }
+  return Role::other;
+}
+
+}  // namespace
+
+NamedColumn read_name(std::string_view name, std::string_view unit) {
+  NamedColumn column;
+  if (trimmed(name).empty()) {
+    column.unit = known_unit(unit);
+    return column;
+  }
+  std::string_view bare = name;
+  for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}, std::pair{'{', '}'}}) {
+    const std::size_t begin = bare.find(open);
+    const std::size_t end = begin == std::string_view::npos ? begin : bare.find(close, begin);
+    if (end != std::string_view::npos && begin > 0) {
+      column.unit = known_unit(bare.substr(begin + 1, end - begin - 1));
+      bare = bare.substr(0, begin);
+      break;
+    }
+  }
+  Words words = words_of(bare);
+  if (column.unit.empty() && !unit.empty()) {
+    column.unit = known_unit(unit);
+  }
+  const std::string ending = unit_at_end(words);
+  column.unit = column.unit.empty() ? ending : column.unit;
+  const bool delta =
+      holds(words, {"delta", "incr", "dtheta", "dvel", "dang"}) || is_one_of(words, {"inc", "d", "dv", "dth", "da"});
+  Words stems = words;
+  column.axis = take_axis(stems);
+  column.increment = delta || (column.axis >= 0 && is_one_of(stems, {"dv", "dth", "da", "dtheta", "dvel", "dang"}));
+  column.role = column.axis >= 0 ? triad_role(stems) : single_role(words);
+  if (column.role == Role::temperature && column.unit.empty()) {
+    column.unit = unit_among(words, {{"c", "C"}, {"k", "K"}, {"f", "F"}});
+  }
+  if (column.role == Role::time && column.unit.empty()) {
+    column.unit = unit_among(words, {{"ms", "ms"},
+                                     {"us", "us"},
+                                     {"ns", "ns"},
+                                     {"s", "s"},
+                                     {"sec", "s"},
+                                     {"seconds", "s"},
+                                     {"tow", "s"},
+                                     {"sow", "s"}});
+  }
+  return column;
+}
+
+std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units) {
+  std::vector<NamedColumn> all;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    all.push_back(read_name(names[k], k < units.size() ? std::string_view(units[k]) : std::string_view{}));
+  }
+  return all;
+}
+
+}  // namespace selfcal::import

@@ -1,0 +1,25 @@
+// What the names of columns say: which quantity, which axis, which unit. Names are claims, which the numbers then check.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace selfcal::import {
+
+enum class Role { unknown, time, counter, gyro, accelerometer, outer, inner, gimbal, temperature, other };
+
+struct NamedColumn {
+  Role role = Role::unknown;
+  int axis = -1;           // 0 1 2 for x y z
+  bool increment = false;  // the name says so
+  std::string unit;        // of units.hpp, "C" "K" "F", "date"; empty: none said
+};
+
+// NAME without or with a unit ("gx [deg/s]", "acc_x_m_s2"); UNIT from a line of units, may be empty.
+NamedColumn read_name(std::string_view name, std::string_view unit);
+
+std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units);
+
+}  // namespace selfcal::import

@@ -1,0 +1,388 @@
+#include "protocol/import/guess_roles.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "estimator/geometry/units.hpp"
+#include "protocol/import/guess_axes.hpp"
+
+namespace selfcal::import {
+namespace {
+
+bool all_finite(const std::vector<double>& values) {
+  return !values.empty() && std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+template <typename Number>
+bool increasing(const std::vector<Number>& values) {
+  return values.size() > 2 &&
+         std::adjacent_find(values.begin(), values.end(), [](Number a, Number b) { return !(b > a); }) == values.end();
+}
+
+// Nearly all intervals of about the same length: a time, and no slowly rising quantity.
+template <typename Number>
+bool even(const std::vector<Number>& values) {
+  std::vector<Number> steps;
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    steps.push_back(values[k] - values[k - 1]);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  const Number typical = *middle;
+  const auto like = std::count_if(steps.begin(), steps.end(),
+                                  [typical](Number s) { return s > typical / 2 && s < typical + typical / 2; });
+  return static_cast<double>(like) > 0.9 * static_cast<double>(steps.size());
+}
+
+class Assigner {
+ public:
+  Assigner(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
+           std::vector<Remark>& remarks)
+      : source_(source), named_(named), values_(values), remarks_(remarks), used_(values.size(), false) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      used_[k] = !all_finite(values[k]);  // of no use
+    }
+  }
+
+  Roles assign() {
+    find_time();
+    roles_.gyro = triad_by_name(Role::gyro, "gyro");
+    roles_.accelerometer = triad_by_name(Role::accelerometer, "accelerometer");
+    find_gimbal_by_name();
+    for (std::size_t k = 0; k < named_.size(); ++k) {
+      if (named_[k].role == Role::temperature && !used_[k]) {
+        take(k);
+        roles_.temperature.push_back(k);
+        say("temperature.columns", fmt::format("{}, by its name", source_.title(k)));
+      } else if (named_[k].role == Role::counter || named_[k].role == Role::other) {
+        used_[k] = true;
+      }
+    }
+    find_accelerometers();
+    find_gyros();
+    find_gimbal();
+    tell_unused();
+    return std::move(roles_);
+  }
+
+ private:
+  void say(const char* key, std::string text) { remarks_.push_back({key, std::move(text), false}); }
+  void doubt(const char* key, std::string text) { remarks_.push_back({key, std::move(text), true}); }
+  void take(std::size_t column) {
+    used_[column] = true;
+    taken_.push_back(column);
+  }
+
+  bool try_time(std::size_t column) {
+    ColumnRequest request;
+    request.tolerant = true;
+    request.stamp = column;
+    request.most_rows = values_[column].size();
+    for (const bool date : {false, true}) {
+      request.stamp_is_date = date;
+      const Expected<ColumnData> data = source_.read(request);
+      if (data && increasing(data->stamps) && even(data->stamps)) {
+        roles_.time = column;
+        roles_.time_is_date = date;
+        roles_.stamps = data->stamps;
+        take(column);
+        return true;
+      }
+      if (data && !date &&
+          std::all_of(values_[column].begin(), values_[column].end(), [](double v) { return std::isfinite(v); })) {
+        break;
+      }
+    }
+    return false;
+  }
+
+  void find_time() {
+    std::string named_but;
+    for (std::size_t k = 0; k < named_.size(); ++k) {
+      if (named_[k].role == Role::time) {
+        if (try_time(k)) {
+          return say("time.column", fmt::format("{}, by its name; it increases evenly", source_.title(k)));
+        }
+        named_but = source_.title(k);
+      }
+    }
+    // A column that rises by 1 is a counter as well as a time.
+    for (const bool counters : {false, true}) {
+      for (std::size_t k = 0; k < named_.size(); ++k) {
+        const bool free = named_[k].role == Role::unknown || named_[k].role == Role::other ||
+                          (counters && named_[k].role == Role::counter);
+        const bool rises_by_1 = values_[k].size() > 1 && values_[k][1] - values_[k][0] == 1.0;
+        if (free && rises_by_1 == counters && (!used_[k] || !std::isfinite(values_[k].front())) && try_time(k)) {
+          counters ? doubt("time.column", fmt::format("{} rises by 1: a time in units of the interval, or a counter",
+                                                      source_.title(k)))
+                   : say("time.column", fmt::format("{}: it increases evenly", source_.title(k)));
+          return;
+        }
+      }
+    }
+    if (!named_but.empty()) {
+      doubt("time.column", fmt::format("{} is named so, but does not increase evenly", named_but));
+    }
+  }
+
+  std::optional<std::array<std::size_t, 3>> triad_by_name(Role role, const char* key) {
+    std::array<std::optional<std::size_t>, 3> found;
+    bool several = false;
+    for (std::size_t k = 0; k < named_.size(); ++k) {
+      if (named_[k].role == role && named_[k].axis >= 0 && !used_[k]) {
+        auto& place = found.at(static_cast<std::size_t>(named_[k].axis));
+        several = several || place.has_value();
+        place = place ? place : k;
+      }
+    }
+    if (!found[0] || !found[1] || !found[2]) {
+      return std::nullopt;
+    }
+    const std::array<std::size_t, 3> triad{*found[0], *found[1], *found[2]};
+    for (const std::size_t k : triad) {
+      take(k);
+    }
+    const std::string which =
+        fmt::format("{}, {}, {}", source_.title(triad[0]), source_.title(triad[1]), source_.title(triad[2]));
+    const std::string path = fmt::format("{}.columns", key);
+    remarks_.push_back({path,
+                        several ? fmt::format("{}: the first of several that are named so", which)
+                                : fmt::format("{}, by their names", which),
+                        several});
+    return triad;
+  }
+
+  void find_gimbal_by_name() {
+    std::optional<std::size_t> outer;
+    std::optional<std::size_t> inner;
+    std::vector<std::size_t> plain;
+    for (std::size_t k = 0; k < named_.size(); ++k) {
+      if (used_[k]) {
+        continue;
+      }
+      outer = named_[k].role == Role::outer && !outer ? k : outer;
+      inner = named_[k].role == Role::inner && !inner ? k : inner;
+      if (named_[k].role == Role::gimbal) {
+        plain.push_back(k);
+      }
+    }
+    if (outer && inner) {
+      roles_.gimbal = {*outer, *inner};
+      roles_.gimbal_named = true;
+    } else if (plain.size() == 2 && !outer && !inner) {
+      roles_.gimbal = {plain[0], plain[1]};
+    }
+    if (roles_.gimbal) {
+      take((*roles_.gimbal)[0]);
+      take((*roles_.gimbal)[1]);
+    }
+  }
+
+  // Runs of three free columns side by side.
+  std::vector<std::array<std::size_t, 3>> free_triads() const {
+    std::vector<std::array<std::size_t, 3>> all;
+    for (std::size_t k = 0; k + 2 < values_.size(); ++k) {
+      if (!used_[k] && !used_[k + 1] && !used_[k + 2]) {
+        all.push_back({k, k + 1, k + 2});
+      }
+    }
+    return all;
+  }
+
+  // Gravity: the size of the mean over a block is the same in all blocks, in whatever attitude.
+  void find_accelerometers() {
+    if (roles_.accelerometer) {
+      return;
+    }
+    double least = 0.05;
+    for (const auto& triad : free_triads()) {
+      const TriadColumns columns = triad_columns(values_, triad);
+      const Motion motion = find_motion(columns, columns, std::nullopt, 25);
+      std::vector<double> size;
+      for (const Block& block : motion.blocks) {
+        size.push_back(block.accel.norm());
+      }
+      if (size.size() < 8) {
+        continue;
+      }
+      const double mean = std::accumulate(size.begin(), size.end(), 0.0) / static_cast<double>(size.size());
+      double squares = 0.0;
+      for (const double s : size) {
+        squares += (s - mean) * (s - mean);
+      }
+      const double scatter = std::sqrt(squares / static_cast<double>(size.size())) / mean;
+      if (mean > 0.0 && scatter < least) {
+        least = scatter;
+        roles_.accelerometer = triad;
+      }
+    }
+    if (!roles_.accelerometer) {
+      return doubt("accelerometer.columns", "no three columns side by side of a constant size, as gravity has");
+    }
+    for (const std::size_t k : *roles_.accelerometer) {
+      take(k);
+    }
+    say("accelerometer.columns",
+        fmt::format("columns {} to {}: their size is constant within {:.2g} %, as gravity's is",
+                    roles_.accelerometer->front() + 1, roles_.accelerometer->back() + 1, 100.0 * least));
+  }
+
+  // The least of three columns' largest deviation over what a block usually deviates by.
+  static double least_contrast(const Motion& motion) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k) {
+      std::vector<double> off;
+      for (const Block& block : motion.blocks) {
+        off.push_back(std::abs(block.gyro[k] / static_cast<double>(motion.samples) - motion.bias[k]));
+      }
+      std::sort(off.begin(), off.end());
+      least = std::min(least, off.back() / std::max(off[off.size() / 4], 1e-300));
+    }
+    return least;
+  }
+
+  // What turns the specific force.
+  void find_gyros() {
+    if (roles_.gyro || !roles_.accelerometer) {
+      return;
+    }
+    struct Candidate {
+      std::array<std::size_t, 3> triad;
+      double explained, gimbal, contrast;
+    };
+    std::vector<Candidate> candidates;
+    const std::vector<std::array<std::size_t, 3>> free = free_triads();
+    double best = 0.3;
+    for (const auto& triad : free) {
+      const Motion motion =
+          find_motion(triad_columns(values_, triad), triad_columns(values_, *roles_.accelerometer), std::nullopt, 12);
+      const auto fit = motion.turns ? gyros_by_gravity(motion) : std::nullopt;
+      if (fit && fit->explained > 0.3) {
+        const auto pair = roles_.gimbal ? std::nullopt : best_gimbal(triad);
+        candidates.push_back({triad, fit->explained, pair ? pair->score : 0.0, least_contrast(motion)});
+        best = std::max(best, fit->explained);
+      }
+    }
+    // Turns about the vertical are not seen so: two gyros and a stranger may explain as much. What leaves a gimbal that fits
+    // is right; else, a gyro turns and rests.
+    std::erase_if(candidates, [best](const Candidate& c) { return c.explained < best - 0.05; });
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+      return std::abs(a.gimbal - b.gimbal) > 0.02 ? a.gimbal > b.gimbal : a.contrast > b.contrast;
+    });
+    if (!candidates.empty()) {
+      roles_.gyro = candidates.front().triad;
+      if (candidates.size() > 1 && candidates[0].gimbal == 0.0) {
+        doubt("gyro.columns", fmt::format("columns {} to {} explain the turning of the specific force as well",
+                                          candidates[1].triad.front() + 1, candidates[1].triad.back() + 1));
+      }
+    }
+    if (roles_.gyro) {
+      say("gyro.columns", fmt::format("columns {} to {}: they explain {:.0f} % of how the specific force turns",
+                                      roles_.gyro->front() + 1, roles_.gyro->back() + 1, 100.0 * best));
+    } else if (!free.empty()) {
+      roles_.gyro = free.front();
+      doubt("gyro.columns", fmt::format("columns {} to {}: three that are free; nothing shows that they are gyros",
+                                        roles_.gyro->front() + 1, roles_.gyro->back() + 1));
+    } else {
+      return doubt("gyro.columns", "no three columns side by side are left");
+    }
+    for (const std::size_t k : *roles_.gyro) {
+      take(k);
+    }
+  }
+
+  struct GimbalPair {
+    std::array<std::size_t, 2> columns{};
+    double score = 0.0;
+  };
+  // Two free columns side by side, none of GYRO's, whose angles the accelerometers and the gyros bear out.
+  std::optional<GimbalPair> best_gimbal(const std::array<std::size_t, 3>& gyro) const {
+    constexpr double good_gravity = 0.98;  // as guess_orientation wants them
+    constexpr double good_turns = 0.95;
+    std::optional<GimbalPair> best;
+    const auto is_free = [&](std::size_t k) {
+      return !used_[k] && std::find(gyro.begin(), gyro.end(), k) == gyro.end();
+    };
+    for (std::size_t k = 0; k + 1 < values_.size(); ++k) {
+      if (!is_free(k) || !is_free(k + 1)) {
+        continue;
+      }
+      for (const double unit : {units::degree, 1.0}) {
+        std::array<std::vector<double>, 2> angle{values_[k], values_[k + 1]};
+        for (auto& column : angle) {
+          std::transform(column.begin(), column.end(), column.begin(), [unit](double v) { return v * unit; });
+        }
+        const Motion motion =
+            find_motion(triad_columns(values_, gyro), triad_columns(values_, *roles_.accelerometer), angle, 25);
+        const std::vector<Rest> rests = rests_of(motion);
+        for (const bool swapped : {false, true}) {
+          const auto gravity = accelerometers_by_gimbal(rests, swapped);
+          const auto turns = gyros_by_gimbal(motion, turns_of(motion, rests), swapped);
+          if (gravity && turns && gravity->explained > good_gravity && turns->explained > good_turns &&
+              (!best || gravity->explained + turns->explained > best->score)) {
+            best = {{k, k + 1}, gravity->explained + turns->explained};
+          }
+        }
+      }
+    }
+    return best;
+  }
+
+  void find_gimbal() {
+    if (roles_.gimbal || !roles_.gyro || !roles_.accelerometer) {
+      return;
+    }
+    if (const auto pair = best_gimbal(*roles_.gyro)) {
+      roles_.gimbal = pair->columns;
+      take(pair->columns[0]);
+      take(pair->columns[1]);
+    }
+  }
+
+  void tell_unused() {
+    std::string rest;
+    for (std::size_t k = 0; k < values_.size(); ++k) {
+      if (std::find(taken_.begin(), taken_.end(), k) == taken_.end()) {
+        rest += fmt::format("{}{}", rest.empty() ? "" : ", ", source_.title(k));
+      }
+    }
+    if (!rest.empty()) {
+      say("columns", fmt::format("not taken over: {}", rest));
+    }
+  }
+
+  const ColumnSource& source_;
+  const std::vector<NamedColumn>& named_;
+  const Values& values_;
+  std::vector<Remark>& remarks_;
+  std::vector<bool> used_;
+  std::vector<std::size_t> taken_;
+  Roles roles_;
+};
+
+}  // namespace
+
+TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3>& columns) {
+  TriadColumns triad;
+  for (std::size_t k = 0; k < 3; ++k) {
+    triad.column[k] = &values[columns[k]];
+  }
+  return triad;
+}
+
+Roles assign_roles(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
+                   bool by_format, std::vector<Remark>& remarks) {
+  if (by_format) {
+    Roles roles;
+    roles.gyro = {0, 1, 2};
+    roles.accelerometer = {3, 4, 5};
+    return roles;
+  }
+  return Assigner(source, named, values, remarks).assign();
+}
+
+}  // namespace selfcal::import

@@ -1,0 +1,34 @@
+// Which column is what: by name where there are names, else by what numbers can only be.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "protocol/import/column_source.hpp"
+#include "protocol/import/guess.hpp"
+#include "protocol/import/guess_names.hpp"
+#include "protocol/import/motion.hpp"
+
+namespace selfcal::import {
+
+using Values = std::vector<std::vector<double>>;  // by column; NaN where there is no number
+
+struct Roles {
+  std::optional<std::size_t> time;
+  bool time_is_date = false;
+  std::vector<long double> stamps;
+  std::optional<std::array<std::size_t, 3>> gyro;
+  std::optional<std::array<std::size_t, 3>> accelerometer;
+  std::optional<std::array<std::size_t, 2>> gimbal;  // outer, inner where `gimbal_named`; else as they stand
+  bool gimbal_named = false;
+  std::vector<std::size_t> temperature;
+};
+
+TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3>& columns);
+
+// BY_FORMAT: the file's format says that the first six columns are gyros and accelerometers. Adds to REMARKS what was assumed and doubted.
+Roles assign_roles(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
+                   bool by_format, std::vector<Remark>& remarks);
+
+}  // namespace selfcal::import

@@ -1,0 +1,96 @@
+#include "protocol/import/guess_units.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace selfcal::import {
+namespace {
+
+constexpr double gravity = 9.807;  // m/s^2; normal gravity differs by 0.3 %
+
+struct Tolerance {
+  double match;  // ln: calibration errors
+  double rival;  // ln: another unit as near as that cannot be told apart
+};
+
+// Hardly anybody writes an IMU's data so: only where a name says it, or where nothing else is as near.
+bool is_rare(std::string_view unit) {
+  return unit == "cm/s^2" || unit == "rpm" || unit == "arcmin" || unit == "rad/h" || unit == "mdeg/s" || unit == "cm/s";
+}
+
+std::string words(const UnitFit& fit) {
+  return fmt::format("{} ({})", fit.unit, fit.increments ? "increments" : "rates");
+}
+
+// EXPECTED of a unit is what it would be multiplied by; SEEN is what the numbers want.
+std::optional<UnitFit> best_unit(double seen, double interval_s, const UnitClaim& claim, Quantity rate,
+                                 Quantity increment, const Tolerance& tolerance) {
+  std::vector<UnitFit> fits;
+  for (const Unit& unit : known_units()) {
+    const bool increments = unit.quantity == increment;
+    if ((unit.quantity != rate && !increments) || (!claim.unit.empty() && claim.unit != unit.name) ||
+        (claim.unit.empty() && claim.increments && !increments)) {
+      continue;
+    }
+    const double factor = increments ? unit.si : unit.si * interval_s;
+    const double off = std::abs(std::log(seen / factor));
+    const bool known = std::any_of(fits.begin(), fits.end(), [&](const UnitFit& f) {
+      return f.increments == increments && std::abs(f.off - off) < 1e-9;  // deg/h and arcsec/s are one
+    });
+    if (off < 2.0 * tolerance.match && !known) {
+      fits.push_back({std::string(unit.name), increments, off, {}});
+    }
+  }
+  std::sort(fits.begin(), fits.end(), [](const UnitFit& a, const UnitFit& b) { return a.off < b.off; });
+  if (fits.empty() || fits.front().off > tolerance.match) {
+    return std::nullopt;
+  }
+  const auto usual = std::find_if(fits.begin(), fits.end(), [](const UnitFit& f) { return !is_rare(f.unit); });
+  UnitFit best = usual != fits.end() && usual->off <= tolerance.match ? *usual : fits.front();
+  for (const UnitFit& fit : fits) {
+    const bool other = fit.unit != best.unit || fit.increments != best.increments;
+    if (other && fit.off < (is_rare(fit.unit) ? best.off : std::max(tolerance.rival, 3.0 * best.off))) {
+      best.rivals.push_back(words(fit));
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const UnitClaim& claim) {
+  return best_unit(rad_per_sample, interval_s, claim, Quantity::angular_rate, Quantity::angle, {0.25, 0.06});
+}
+
+std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim) {
+  return best_unit(gravity * interval_s / size, interval_s, claim, Quantity::acceleration, Quantity::velocity,
+                   {0.08, 0.03});
+}
+
+std::vector<std::string> time_units(double interval) {
+  struct Way {
+    std::string unit;
+    double strangeness;
+  };
+  std::vector<Way> ways;
+  for (const char* name : {"s", "ms", "us", "ns"}) {
+    const double rate = 1.0 / (interval * find_unit(name).value_or(Unit{{}, Quantity::time, 1.0}).si);
+    constexpr double lowest = 1.0;
+    constexpr double highest = 20000.0;
+    constexpr double usual = 150.0;
+    if (rate > lowest * (1.0 - 1e-3) && rate < highest) {
+      ways.push_back({name, std::abs(std::log(rate / usual))});
+    }
+  }
+  std::sort(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.strangeness < b.strangeness; });
+  std::vector<std::string> units;
+  for (Way& way : ways) {
+    units.push_back(std::move(way.unit));
+  }
+  return units;
+}
+
+}  // namespace selfcal::import

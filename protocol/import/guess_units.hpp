@@ -1,0 +1,34 @@
+// Which unit makes of a number what physics says that it is.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/import/units.hpp"
+
+namespace selfcal::import {
+
+struct UnitFit {
+  std::string unit;
+  bool increments = false;
+  double off = 0.0;                 // |ln(seen / expected)|
+  std::vector<std::string> rivals;  // others that fit about as well: "deg, increments"
+};
+
+// What the names say: a unit, or only that they are increments.
+struct UnitClaim {
+  std::string unit;
+  bool increments = false;
+};
+
+// Gyros: RAD_PER_SAMPLE is what a count stands for in a sample, seen in the turns. nullopt: no unit within a quarter.
+std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const UnitClaim& claim);
+
+// Accelerometers: SIZE is the size of gravity in counts. nullopt: no unit within 8 %.
+std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim);
+
+// Units (s, ms, us, ns) in which times with this interval make 1 Hz to 20 kHz, the likeliest first.
+std::vector<std::string> time_units(double interval);
+
+}  // namespace selfcal::import

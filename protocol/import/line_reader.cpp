@@ -1,0 +1,100 @@
+#include "protocol/import/line_reader.hpp"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace selfcal::import {
+namespace {
+
+constexpr std::size_t block = std::size_t{1} << 18;
+constexpr std::size_t longest_line = std::size_t{1} << 20;
+
+}  // namespace
+
+struct LineReader::Input {
+  explicit Input(const std::filesystem::path& path) : file(gzopen(path.c_str(), "rb")) {}
+  ~Input() {
+    if (file != nullptr) {
+      gzclose(file);
+    }
+  }
+  Input(const Input&) = delete;
+  Input& operator=(const Input&) = delete;
+  gzFile file;
+};
+
+LineReader::LineReader(std::unique_ptr<Input> input, std::string name)
+    : input_(std::move(input)), name_(std::move(name)) {}
+LineReader::LineReader(LineReader&&) noexcept = default;
+LineReader& LineReader::operator=(LineReader&&) noexcept = default;
+LineReader::~LineReader() = default;
+
+Expected<LineReader> LineReader::open(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: is a folder", path.string()));
+  }
+  errno = 0;
+  auto input = std::make_unique<Input>(path);
+  if (input->file == nullptr) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno)));
+  }
+  return LineReader(std::move(input), path.string());
+}
+
+Expected<bool> LineReader::refill() {
+  buffer_.erase(0, at_);
+  at_ = 0;
+  const std::size_t held = buffer_.size();
+  buffer_.resize(held + block);
+  const int count = gzread(input_->file, buffer_.data() + held, static_cast<unsigned>(block));
+  if (count < 0) {
+    int code = 0;
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: line {}: damaged: {}", name_, number_ + 1, gzerror(input_->file, &code)));
+  }
+  buffer_.resize(held + static_cast<std::size_t>(count));
+  if (const void* nul = std::memchr(buffer_.data() + held, '\0', buffer_.size() - held); nul != nullptr) {
+    const bool wide = buffer_.starts_with("\xFF\xFE") || buffer_.starts_with("\xFE\xFF");
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: line {}: {}", name_, number_ + 1,
+                            wide ? "UTF-16; text in UTF-8 is expected" : "holds a byte 0; a text is expected"));
+  }
+  return count > 0;
+}
+
+Expected<bool> LineReader::next(std::string_view& line) {
+  std::size_t end = buffer_.find('\n', at_);
+  while (end == std::string::npos && !ended_) {
+    const std::size_t searched = buffer_.size() - at_;
+    if (searched > longest_line) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: line {}: longer than {} bytes", name_, number_ + 1, longest_line));
+    }
+    const Expected<bool> more = refill();
+    if (!more) {
+      return more;
+    }
+    ended_ = !*more;
+    end = buffer_.find('\n', at_ + searched);
+  }
+  if (at_ >= buffer_.size()) {
+    return false;
+  }
+  const std::size_t stop = end == std::string::npos ? buffer_.size() : end;
+  line = std::string_view(buffer_).substr(at_, stop - at_);
+  at_ = end == std::string::npos ? stop : end + 1;
+  if (line.ends_with('\r')) {
+    line.remove_suffix(1);
+  }
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (++number_ == 1 && line.starts_with(byte_order_mark)) {
+    line.remove_prefix(byte_order_mark.size());
+  }
+  return true;
+}
+
+}  // namespace selfcal::import

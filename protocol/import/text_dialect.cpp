@@ -1,0 +1,334 @@
+#include "protocol/import/text_dialect.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+
+namespace selfcal::import {
+namespace {
+
+constexpr std::array<std::string_view, 5> comment_marks{"#", "%", "//", "!", "*"};
+
+std::string_view comment_of(std::string_view line) {
+  const std::string_view text = trimmed(line);
+  for (const std::string_view mark : comment_marks) {
+    if (text.starts_with(mark)) {
+      return mark;
+    }
+  }
+  return {};
+}
+
+template <typename Number>
+std::optional<Number> parsed(std::string_view field, char decimal) {
+  std::array<char, 64> buffer{};
+  if (field.starts_with('+')) {
+    field.remove_prefix(1);
+    if (field.starts_with('-')) {
+      return std::nullopt;
+    }
+  }
+  // As written, where it can be: most fields need no copy.
+  Number value{};
+  const auto whole = [&value](const char* begin, const char* end) {
+    const auto [stopped, error] = std::from_chars(begin, end, value);
+    return begin != end && error == std::errc{} && stopped == end;
+  };
+  if (decimal == '.' && whole(field.data(), field.data() + field.size())) {
+    return value;
+  }
+  if (field.size() > buffer.size() || (decimal != '.' && field.find('.') != std::string_view::npos)) {
+    return std::nullopt;
+  }
+  std::transform(field.begin(), field.end(), buffer.begin(), [decimal](char c) {
+    const bool fortran = c == 'D' || c == 'd';  // 1.0D+03
+    return fortran ? 'e' : c == decimal ? '.' : c;
+  });
+  return whole(buffer.data(), buffer.data() + field.size()) ? std::optional<Number>(value) : std::nullopt;
+}
+
+std::optional<int> digits(std::string_view& text, std::size_t count) {
+  int value = 0;
+  if (text.size() < count) {
+    return std::nullopt;
+  }
+  const auto [stopped, error] = std::from_chars(text.data(), text.data() + count, value);
+  if (error != std::errc{} || stopped != text.data() + count || value < 0) {
+    return std::nullopt;
+  }
+  text.remove_prefix(count);
+  return value;
+}
+
+bool take(std::string_view& text, char c) {
+  const bool there = text.starts_with(c);
+  text.remove_prefix(there ? 1 : 0);
+  return there;
+}
+
+// hh:mm:ss[.s...]
+std::optional<long double> clock_of(std::string_view& text) {
+  const auto hours = digits(text, 2);
+  if (!hours || !take(text, ':')) {
+    return std::nullopt;
+  }
+  const auto minutes = digits(text, 2);
+  if (!minutes || *hours > 24 || *minutes > 59 || !take(text, ':')) {
+    return std::nullopt;
+  }
+  const std::size_t length = std::min(text.find_first_not_of("0123456789.,"), text.size());
+  const char decimal = text.substr(0, length).find(',') != std::string_view::npos ? ',' : '.';
+  const auto seconds = parsed<long double>(text.substr(0, length), decimal);
+  if (!seconds || *seconds >= 61.0L) {
+    return std::nullopt;
+  }
+  text.remove_prefix(length);
+  return static_cast<long double>(*hours * 3600 + *minutes * 60) + *seconds;
+}
+
+// Z, +hh:mm, +hhmm, +hh: seconds ahead of UTC.
+std::optional<int> offset_of(std::string_view text) {
+  if (text.empty() || text == "Z" || text == "z") {
+    return 0;
+  }
+  const int sign = text.front() == '-' ? -1 : 1;
+  if (text.front() != '-' && text.front() != '+') {
+    return std::nullopt;
+  }
+  text.remove_prefix(1);
+  const auto hours = digits(text, 2);
+  take(text, ':');
+  const auto minutes = text.empty() ? std::optional<int>(0) : digits(text, 2);
+  if (!hours || !minutes || !text.empty()) {
+    return std::nullopt;
+  }
+  return sign * (*hours * 3600 + *minutes * 60);
+}
+
+enum class Field { number, date, empty, word, wrong };
+
+Field kind_of(std::string_view field, char decimal) {
+  if (field.empty()) {
+    return Field::empty;
+  }
+  if (number_of(field, decimal)) {
+    return Field::number;
+  }
+  if (date_of(field)) {
+    return Field::date;
+  }
+  // What holds a separator or a digit is a sign that the text is split in the wrong way.
+  return field.find_first_of(",;\t 0123456789") == std::string_view::npos ? Field::word : Field::wrong;
+}
+
+// Number of fields of a line of numbers (a date and a few words may be among them), 0 for any other.
+std::size_t numeric_fields(std::string_view line, char separator, char decimal, std::vector<std::string_view>& fields) {
+  split_fields(line, separator, fields);
+  std::size_t numbers = 0;
+  std::size_t words = 0;
+  for (const std::string_view field : fields) {
+    const Field kind = kind_of(field, decimal);
+    if (kind == Field::wrong) {
+      return 0;
+    }
+    numbers += kind == Field::number ? 1 : 0;
+    words += kind == Field::word ? 1 : 0;
+  }
+  return numbers > 0 && words < numbers ? fields.size() : 0;
+}
+
+struct Run {
+  std::size_t first = 0;  // index of the line
+  std::size_t lines = 0;
+  std::size_t fields = 0;
+};
+
+// The longest run of lines with the same number of numeric fields.
+Run longest_run(const std::vector<std::string_view>& lines, char separator, char decimal) {
+  Run best;
+  Run run;
+  std::vector<std::string_view> fields;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    if (trimmed(lines[k]).empty() || !comment_of(lines[k]).empty()) {
+      continue;
+    }
+    const std::size_t count = numeric_fields(lines[k], separator, decimal, fields);
+    if (count != run.fields) {
+      run = {k, 0, count};
+    }
+    ++run.lines;
+    if (run.fields > 1 && run.lines > best.lines) {
+      best = run;
+    }
+  }
+  return best;
+}
+
+bool is_unit(std::string_view field) {
+  constexpr std::array<std::string_view, 34> known{
+      "s",      "ms",     "us",   "ns",     "sec",   "rad",   "deg",    "rad/s", "deg/s", "deg/h",   "dps", "m/s^2",
+      "m/s2",   "m/s",    "g",    "mg",     "ug",    "c",     "degc",   "k",     "f",     "degf",    "hz",  "-",
+      "counts", "arcsec", "mrad", "mrad/s", "rad/h", "ft/s2", "ft/s^2", "m/s/s", "ug*s",  "arcsec/s"};
+  std::string lower(field);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return std::find(known.begin(), known.end(), lower) != known.end() || lower.find("\xC2\xB0") != std::string::npos;
+}
+
+// Index of the line of names above the numbers, and of the units between them.
+void find_header(const std::vector<std::string_view>& lines, const Run& run, TextDialect& dialect) {
+  const auto count = [&](std::size_t k) { return header_fields(lines[k], dialect); };
+  const auto fits = [&](const std::vector<std::string>& fields) {
+    return fields.size() == run.fields && std::none_of(fields.begin(), fields.end(), [&](const std::string& f) {
+             return number_of(f, dialect.decimal).has_value();
+           });
+  };
+  std::size_t k = run.first;
+  while (k > 0 && trimmed(lines[k - 1]).empty()) {
+    --k;
+  }
+  if (k == 0) {
+    return;
+  }
+  const std::vector<std::string> nearest = count(k - 1);
+  if (!fits(nearest)) {
+    return;
+  }
+  const auto units = std::count_if(nearest.begin(), nearest.end(), [](const std::string& f) { return is_unit(f); });
+  if (k > 1 && 2 * static_cast<std::size_t>(units) > run.fields && fits(count(k - 2))) {
+    dialect.unit_line = k;
+    dialect.header_line = k - 1;
+    return;
+  }
+  dialect.header_line = k;
+}
+
+}  // namespace
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r\v\f";
+  const std::size_t first = text.find_first_not_of(blanks);
+  if (first == std::string_view::npos) {
+    return {};
+  }
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+void split_fields(std::string_view line, char separator, std::vector<std::string_view>& fields) {
+  fields.clear();
+  if (separator == ' ') {
+    constexpr std::string_view blanks = " \t";
+    for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
+      const std::size_t end = line.find_first_of(blanks);
+      fields.push_back(line.substr(0, end));
+      line.remove_prefix(std::min(end, line.size()));
+    }
+    return;
+  }
+  for (bool more = true; more;) {
+    const bool quoted = trimmed(line).starts_with('"');
+    const std::size_t opening = quoted ? line.find('"') : 0;
+    const std::size_t closing = quoted ? line.find('"', opening + 1) : std::string_view::npos;
+    const std::size_t end = line.find(separator, closing == std::string_view::npos ? 0 : closing);
+    std::string_view field = trimmed(line.substr(0, end));
+    if (closing != std::string_view::npos && field.size() >= 2 && field.back() == '"') {
+      field = trimmed(field.substr(1, field.size() - 2));
+    }
+    fields.push_back(field);
+    more = end != std::string_view::npos;
+    line.remove_prefix(more ? end + 1 : line.size());
+  }
+}
+
+std::optional<double> number_of(std::string_view field, char decimal) { return parsed<double>(field, decimal); }
+
+std::optional<long double> long_number_of(std::string_view field, char decimal) {
+  return parsed<long double>(field, decimal);
+}
+
+std::optional<long double> date_of(std::string_view field) {
+  std::string_view text = field;
+  long double days = 0.0L;
+  if (text.size() > 4 && (text[4] == '-' || text[4] == '/')) {
+    const char mark = text[4];
+    const auto year = digits(text, 4);
+    take(text, mark);
+    const auto month = digits(text, 2);
+    if (!year || !month || !take(text, mark)) {
+      return std::nullopt;
+    }
+    const auto day = digits(text, 2);
+    if (!day || !(take(text, 'T') || take(text, ' '))) {
+      return std::nullopt;
+    }
+    const std::chrono::year_month_day date{std::chrono::year{*year}, std::chrono::month{static_cast<unsigned>(*month)},
+                                           std::chrono::day{static_cast<unsigned>(*day)}};
+    if (!date.ok()) {
+      return std::nullopt;
+    }
+    days = static_cast<long double>(std::chrono::sys_days(date).time_since_epoch().count());
+  }
+  const auto seconds = clock_of(text);
+  const auto offset = seconds ? offset_of(text) : std::nullopt;
+  if (!offset) {
+    return std::nullopt;
+  }
+  constexpr long double day_s = 86400.0L;
+  return days * day_s + *seconds - static_cast<long double>(*offset);
+}
+
+std::vector<std::string> header_fields(std::string_view line, const TextDialect& dialect) {
+  const std::string_view mark = comment_of(line);
+  line = trimmed(line);
+  line.remove_prefix(mark.size());
+  std::vector<std::string_view> fields;
+  split_fields(line, dialect.separator, fields);
+  std::vector<std::string> names;
+  for (std::string_view field : fields) {
+    if (field.size() >= 2 &&
+        ((field.front() == '[' && field.back() == ']') || (field.front() == '(' && field.back() == ')'))) {
+      field = field.substr(1, field.size() - 2);
+    }
+    names.emplace_back(field);
+  }
+  return names;
+}
+
+std::optional<TextDialect> detect_dialect(const std::vector<std::string_view>& lines) {
+  struct Way {
+    char separator, decimal;
+  };
+  // Earlier ones are preferred where two read the same lines.
+  constexpr std::array<Way, 7> ways{
+      {{'\t', '.'}, {';', '.'}, {',', '.'}, {' ', '.'}, {'\t', ','}, {';', ','}, {' ', ','}}};
+  Run best;
+  TextDialect dialect;
+  for (const Way& way : ways) {
+    const Run run = longest_run(lines, way.separator, way.decimal);
+    if (run.lines > best.lines || (run.lines == best.lines && run.fields > best.fields)) {
+      best = run;
+      dialect.separator = way.separator;
+      dialect.decimal = way.decimal;
+    }
+  }
+  if (best.fields < 2) {
+    // Quoted numbers with decimal commas between commas.
+    best = longest_run(lines, ',', ',');
+    dialect.separator = dialect.decimal = ',';
+  }
+  if (best.fields < 2) {
+    return std::nullopt;
+  }
+  dialect.first_line = best.first + 1;
+  for (const std::string_view line : lines) {
+    if (const std::string_view mark = comment_of(line); !mark.empty() && dialect.comment.empty()) {
+      dialect.comment = std::string(mark);
+    }
+  }
+  find_header(lines, best, dialect);
+  return dialect;
+}
+
+}  // namespace selfcal::import

@@ -1,0 +1,82 @@
+// How a text is written, from its lines alone.
+#include <gmock/gmock.h>
+
+#include "protocol/import/text_dialect.hpp"
+
+namespace selfcal::import {
+namespace {
+
+using ::testing::ElementsAre;
+
+std::optional<TextDialect> dialect_of(std::vector<std::string_view> lines) { return detect_dialect(lines); }
+
+TEST(Dialect, CommasWithNames) {
+  const auto d = dialect_of({"t,gx,gy", "0.1,1,2", "0.2,3,4"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->separator, ',');
+  EXPECT_EQ(d->decimal, '.');
+  EXPECT_EQ(d->header_line, 1U);
+  EXPECT_EQ(d->first_line, 2U);
+}
+
+TEST(Dialect, DecimalCommasBetweenSemicolonsTabsBlanksAndQuotes) {
+  for (const auto& [line, separator] : {std::pair{"0,1;-1,5;2", ';'}, std::pair{"0,1\t-1,5\t2", '\t'},
+                                        std::pair{"  0,1   -1,5 2", ' '}, std::pair{"\"0,1\",\"-1,5\",\"2\"", ','}}) {
+    const auto d = dialect_of({line, line});
+    ASSERT_TRUE(d) << line;
+    EXPECT_EQ(d->separator, separator) << line;
+    EXPECT_EQ(d->decimal, ',') << line;
+    std::vector<std::string_view> fields;
+    split_fields(line, d->separator, fields);
+    ASSERT_EQ(fields.size(), 3U) << line;
+    EXPECT_EQ(number_of(fields[1], d->decimal), -1.5) << line;
+  }
+}
+
+TEST(Dialect, ACommaAndABlankAreACommaAndABlank) {
+  const auto d = dialect_of({"1, 5, 2", "3, 4, 5"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->separator, ',');
+}
+
+TEST(Dialect, CommentsNamesInACommentAndALineOfUnits) {
+  const auto d = dialect_of({"# made in 2024", "# t;gx;gy", "", "1;2;3", "4;5;6"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->comment, "#");
+  EXPECT_EQ(d->header_line, 2U);
+  EXPECT_EQ(d->first_line, 4U);
+  const auto u = dialect_of({"time;gx;gy", "[s];[deg/s];[deg/s]", "1;2;3", "4;5;6"});
+  ASSERT_TRUE(u);
+  EXPECT_EQ(u->header_line, 1U);
+  EXPECT_EQ(u->unit_line, 2U);
+  EXPECT_THAT(header_fields("[s];[deg/s];(m)", *u), ElementsAre("s", "deg/s", "m"));
+}
+
+TEST(Dialect, NoNumbersNoDialect) {
+  EXPECT_FALSE(dialect_of({"a,b,c", "d,e,f"}));
+  EXPECT_FALSE(dialect_of({}));
+  EXPECT_FALSE(dialect_of({"1", "2", "3"}));
+}
+
+TEST(Numbers, OnlyWholeFields) {
+  EXPECT_EQ(number_of("+1.5e3", '.'), 1500.0);
+  EXPECT_EQ(number_of("1.5D-3", '.'), 1.5e-3);  // Fortran
+  for (const char* wrong : {"", "+-1", "1.2.3", "0x10", "1 2", "1,5"}) {
+    EXPECT_FALSE(number_of(wrong, '.')) << wrong;
+  }
+  EXPECT_FALSE(number_of("1.234,5", ','));  // points between thousands are refused, not passed over
+}
+
+TEST(Dates, SecondsSince1970AndOffsets) {
+  // 2024-02-29 is day 19782 of the epoch: date -u -d 2024-02-29 +%s is 1709164800.
+  EXPECT_EQ(date_of("2024-02-29T00:00:01.5Z"), 1709164801.5L);
+  EXPECT_EQ(date_of("2024-02-29 02:00:00+02:00"), 1709164800.0L);
+  EXPECT_EQ(date_of("01:00:00"), 3600.0L);
+  for (const char* wrong :
+       {"2023-02-29T00:00:00", "2024-13-01T00:00:00", "25:00:00", "2024-02-29", "2024-02-29T00:61:00"}) {
+    EXPECT_FALSE(date_of(wrong)) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace selfcal::import

@@ -1,0 +1,124 @@
+// Files by what they hold: NumPy, what is hostile or not meant.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "protocol/import/array_source.hpp"
+#include "tests/unit/recording/sample_recording.hpp"
+
+namespace selfcal::import {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string npy(const std::string& header, const std::string& data) {
+  std::string padded = header;
+  padded.resize((10 + header.size() + 1 + 63) / 64 * 64 - 11, ' ');
+  padded += '\n';
+  std::string image = "\x93NUMPY";
+  image += std::string("\x01\x00", 2);
+  image += static_cast<char>(padded.size() & 0xFF);
+  image += static_cast<char>(padded.size() >> 8U);
+  return image + padded + data;
+}
+
+template <typename Number>
+std::string bytes(std::initializer_list<Number> numbers) {
+  std::string out;
+  for (const Number number : numbers) {
+    out.append(reinterpret_cast<const char*>(&number), sizeof number);
+  }
+  return out;
+}
+
+class Source : public ::testing::Test {
+ protected:
+  Expected<std::unique_ptr<ColumnSource>> open(const std::string& contents, const char* name = "file") {
+    std::ofstream(folder_ / name, std::ios::binary) << contents;
+    return open_columns(folder_ / name);
+  }
+  std::string fault(const std::string& contents) {
+    const auto source = open(contents);
+    return source ? std::string() : source.error().message;
+  }
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(Source, NpyByRowsAndByColumns) {
+  for (const bool fortran : {false, true}) {
+    const auto source =
+        open(npy(fmt::format("{{'descr': '<f8', 'fortran_order': {}, 'shape': (2, 3), }}", fortran ? "True" : "False"),
+                 fortran ? bytes<double>({1, 4, 2, 5, 3, 6}) : bytes<double>({1, 2, 3, 4, 5, 6})));
+    ASSERT_TRUE(source) << source.error().message;
+    ColumnRequest request;
+    request.columns = {2, 0};
+    const auto data = (*source)->read(request);
+    ASSERT_TRUE(data) << data.error().message;
+    EXPECT_THAT(data->values[0], ElementsAre(3, 6));
+    EXPECT_THAT(data->values[1], ElementsAre(1, 4));
+  }
+}
+
+TEST_F(Source, NpyOfRecordsAndBigEndianAndWholeNumbers) {
+  // 't' big-endian int64, 'g' two float32
+  std::string data;
+  for (const std::int64_t t : {std::int64_t{1709164800000000001}, std::int64_t{1709164800000000002}}) {
+    std::string number = bytes<std::int64_t>({t});
+    std::reverse(number.begin(), number.end());
+    data += number + bytes<float>({0.5F, -2.0F});
+  }
+  const auto source =
+      open(npy("{'descr': [('t', '>i8'), ('g', '<f4', (2,))], 'fortran_order': False, 'shape': (2,), }", data));
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_THAT((*source)->names(), ElementsAre("t", "g.1", "g.2"));
+  ColumnRequest request;
+  request.columns = {2};
+  request.stamp = 0;
+  const auto read = (*source)->read(request);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_THAT(read->values[0], ElementsAre(-2, -2));
+  EXPECT_EQ(read->stamps[1] - read->stamps[0], 1.0L);  // a double has steps of 256 here
+}
+
+TEST_F(Source, NpyThatAnnouncesMoreThanItHas) {
+  EXPECT_THAT(fault(npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 4), }", "12345678")),
+              HasSubstr("8 bytes; 4611686018427387904 x 4 numbers of 8 bytes are announced"));
+  EXPECT_THAT(fault(npy("{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3, 4), }", "")),
+              HasSubstr("one or two dimensions"));
+  EXPECT_THAT(fault(npy("{'descr': '|O', 'fortran_order': False, 'shape': (3,), }", bytes<double>({1, 2, 3}))),
+              HasSubstr("file"));
+  EXPECT_THAT(fault(npy("{'descr'", "")), HasSubstr("holds no array"));
+  EXPECT_THAT(fault("\x93NUMPY"), HasSubstr("no .npy array, or cut off"));
+}
+
+TEST_F(Source, WhatIsNoTextSaysWhatItIs) {
+  EXPECT_THAT(fault(std::string("\xFF\xFE"
+                                "1\0,\0",
+                                6)),
+              HasSubstr("UTF-16"));
+  EXPECT_THAT(fault(std::string("1,2\0,3\n", 7)), HasSubstr("holds a byte 0"));
+  EXPECT_THAT(fault("\x89MCAP0\r\n"), HasSubstr("MCAP"));
+  EXPECT_THAT(fault("#ROSBAG V2.0\n"), HasSubstr("ROS bag"));
+  EXPECT_THAT(fault("\x89HDF\r\n\x1A\n"), HasSubstr("HDF5"));
+  EXPECT_THAT(fault("hello\nworld\n"), HasSubstr("no lines of numbers"));
+  EXPECT_THAT(fault(""), HasSubstr("no lines of numbers"));
+  EXPECT_THAT(fault(std::string((1 << 20) + (1 << 19), '1')), HasSubstr("line 1: longer than"));
+  for (const char* damaged : {"PK\x03\x04 and nothing", "MATLAB 5.0 MAT-file and nothing"}) {
+    EXPECT_THAT(fault(damaged), HasSubstr("file"));
+  }
+}
+
+TEST_F(Source, GzipIsReadAsTheTextInIt) {
+  const std::string name = (folder_ / "plain.csv").string();
+  std::ofstream(name) << "a,b\n1,2\n3,4\n";
+  ASSERT_EQ(std::system(("gzip " + name).c_str()), 0);
+  const auto source = open_columns(folder_ / "plain.csv.gz");
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_THAT((*source)->names(), ElementsAre("a", "b"));
+}
+
+}  // namespace
+}  // namespace selfcal::import
