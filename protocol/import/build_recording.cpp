@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/resample.hpp"
@@ -174,9 +175,7 @@ std::vector<double> intervals_of(const TimeAxis& axis, bool by_stamps) {
   return interval;
 }
 
-}  // namespace
-
-Expected<Imported> build_recording(const ColumnSource& source, const ImportMap& map, const std::string& file) {
+Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const std::string& file) {
   if (const auto settled = check_settled(map); !settled) {
     return tl::unexpected(settled.error());
   }
@@ -223,6 +222,16 @@ Expected<Imported> build_recording(const ColumnSource& source, const ImportMap& 
     imported.notes.push_back(std::move(*done));
   }
   return imported;
+}
+
+}  // namespace
+
+Expected<Imported> build_recording(const ColumnSource& source, const ImportMap& map, const std::string& file) {
+  try {
+    return build(source, map, file);
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: does not fit into memory", file));
+  }
 }
 
 }  // namespace selfcal::import

@@ -279,7 +279,8 @@ class Guesser {
   // Size of the mean of blocks, the median of them.
   double size_of_gravity() const {
     const TriadColumns columns = triad_columns(values_, *roles_.accelerometer);
-    const Motion motion = find_motion(columns, columns, std::nullopt, 25);
+    const Motion motion =
+        find_motion(columns, columns, std::nullopt, std::clamp<std::size_t>(columns.column[0]->size() / 2000, 2, 25));
     std::vector<double> size;
     for (const Block& block : motion.blocks) {
       size.push_back(block.accel.norm());

@@ -193,42 +193,75 @@ class Assigner {
     return all;
   }
 
-  // Gravity: the size of the mean over a block is the same in all blocks, in whatever attitude.
+  // Samples of a block: a turn takes some seconds, and a recording a thousand of them.
+  std::size_t block() const { return std::clamp<std::size_t>(values_.front().size() / 2000, 2, 25); }
+
+  struct SizeOfTriad {
+    double scatter = 0.0;  // of the size of a block's mean, in parts of it
+    bool turns = false;    // the direction changes
+  };
+  std::optional<SizeOfTriad> size_of(const std::array<std::size_t, 3>& triad) const {
+    const TriadColumns columns = triad_columns(values_, triad);
+    const Motion motion = find_motion(columns, columns, std::nullopt, block());
+    constexpr std::size_t fewest = 8;
+    if (motion.blocks.size() < fewest) {
+      return std::nullopt;
+    }
+    const auto count = static_cast<double>(motion.blocks.size());
+    double sum = 0.0;
+    for (const Block& block : motion.blocks) {
+      sum += block.accel.norm() / count;
+    }
+    SizeOfTriad found;
+    double squares = 0.0;
+    const Vector3 first = motion.blocks.front().accel.normalized();
+    for (const Block& block : motion.blocks) {
+      squares += std::pow(block.accel.norm() / sum - 1.0, 2) / count;
+      constexpr double far = 0.5;  // rad
+      found.turns = found.turns || block.accel.normalized().cross(first).norm() > far;
+    }
+    found.scatter = std::sqrt(squares);
+    return sum > 0.0 ? std::optional<SizeOfTriad>(found) : std::nullopt;
+  }
+
+  // Gravity: the size of the mean over a block is the same in all blocks, in whatever attitude. Three columns with a large
+  // constant one among them have a constant size too; but their direction does not turn.
   void find_accelerometers() {
     if (roles_.accelerometer) {
       return;
     }
-    double least = 0.05;
+    constexpr double most_scatter = 0.05;
+    SizeOfTriad best;
+    std::size_t alike = 0;
     for (const auto& triad : free_triads()) {
-      const TriadColumns columns = triad_columns(values_, triad);
-      const Motion motion = find_motion(columns, columns, std::nullopt, 25);
-      std::vector<double> size;
-      for (const Block& block : motion.blocks) {
-        size.push_back(block.accel.norm());
-      }
-      if (size.size() < 8) {
+      const auto size = size_of(triad);
+      if (!size || size->scatter > most_scatter) {
         continue;
       }
-      const double mean = std::accumulate(size.begin(), size.end(), 0.0) / static_cast<double>(size.size());
-      double squares = 0.0;
-      for (const double s : size) {
-        squares += (s - mean) * (s - mean);
+      if (!roles_.accelerometer || size->turns > best.turns) {
+        alike = 0;
       }
-      const double scatter = std::sqrt(squares / static_cast<double>(size.size())) / mean;
-      if (mean > 0.0 && scatter < least) {
-        least = scatter;
+      alike += !roles_.accelerometer || size->turns >= best.turns ? 1 : 0;
+      if (!roles_.accelerometer || size->turns > best.turns ||
+          (size->turns == best.turns && size->scatter < best.scatter)) {
+        best = *size;
         roles_.accelerometer = triad;
       }
     }
     if (!roles_.accelerometer) {
+      doubt("gyro.columns", "not looked for: without accelerometers nothing shows them");
       return doubt("accelerometer.columns", "no three columns side by side of a constant size, as gravity has");
+    }
+    if (alike > 1) {
+      doubt("accelerometer.columns",
+            fmt::format("{} sets of three columns side by side have a constant size, as gravity has", alike));
     }
     for (const std::size_t k : *roles_.accelerometer) {
       take(k);
     }
     say("accelerometer.columns",
         fmt::format("columns {} to {}: their size is constant within {:.2g} %, as gravity's is",
-                    roles_.accelerometer->front() + 1, roles_.accelerometer->back() + 1, 100.0 * least));
+                    roles_.accelerometer->front() + 1, roles_.accelerometer->back() + 1, 100.0 * best.scatter));
   }
 
   // The least of three columns' largest deviation over what a block usually deviates by.
@@ -258,8 +291,8 @@ class Assigner {
     const std::vector<std::array<std::size_t, 3>> free = free_triads();
     double best = 0.3;
     for (const auto& triad : free) {
-      const Motion motion =
-          find_motion(triad_columns(values_, triad), triad_columns(values_, *roles_.accelerometer), std::nullopt, 12);
+      const Motion motion = find_motion(triad_columns(values_, triad), triad_columns(values_, *roles_.accelerometer),
+                                        std::nullopt, block());
       const auto fit = motion.turns ? gyros_by_gravity(motion) : std::nullopt;
       if (fit && fit->explained > 0.3) {
         const auto pair = roles_.gimbal ? std::nullopt : best_gimbal(triad);
@@ -317,7 +350,7 @@ class Assigner {
           std::transform(column.begin(), column.end(), column.begin(), [unit](double v) { return v * unit; });
         }
         const Motion motion =
-            find_motion(triad_columns(values_, gyro), triad_columns(values_, *roles_.accelerometer), angle, 25);
+            find_motion(triad_columns(values_, gyro), triad_columns(values_, *roles_.accelerometer), angle, block());
         const std::vector<Rest> rests = rests_of(motion);
         for (const bool swapped : {false, true}) {
           const auto gravity = accelerometers_by_gimbal(rests, swapped);

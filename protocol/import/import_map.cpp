@@ -148,6 +148,12 @@ class Section {
       fault_ = map_.error_at(key, what);
     }
   }
+  // A doubted map may have holes: that it is doubted is said first, by who builds a recording of it.
+  void miss(std::string_view key, std::string_view what) {
+    if (map_.unsettled.empty()) {
+      refuse(key, what);
+    }
+  }
   std::string path(std::string_view key) const {
     return name_.empty() ? std::string(key) : fmt::format("{}.{}", name_, key);
   }
@@ -207,14 +213,14 @@ void read_axes(Section& section, TriadMap& triad) {
 
 void read_triad(Section& section, bool gyro, TriadMap& triad) {
   if (!section.there()) {
-    return section.refuse(gyro ? "gyro" : "accelerometer", "table missing");
+    return section.miss(gyro ? "gyro" : "accelerometer", "table missing");
   }
   const std::vector<ColumnRef> columns = section.columns("columns", 3);
   std::string kind;
   section.text("kind", kind, {"rates", "increments"});
   section.text("unit", triad.unit);
   if (columns.empty() || kind.empty() || triad.unit.empty()) {
-    section.refuse(section.path(columns.empty() ? "columns" : kind.empty() ? "kind" : "unit"), "missing");
+    section.miss(section.path(columns.empty() ? "columns" : kind.empty() ? "kind" : "unit"), "missing");
     return;
   }
   std::copy_n(columns.begin(), std::min(columns.size(), triad.columns.size()), triad.columns.begin());
@@ -273,8 +279,8 @@ void read_time(Section& section, ImportMap& map) {
   } else {
     section.number("origin", time.origin);
   }
-  if (!time.column && !map.sample_rate_hz && map.unsettled.empty()) {
-    section.refuse("time", "neither a column nor recording.sample_rate_hz");
+  if (!time.column && !map.sample_rate_hz) {
+    section.miss("time", "neither a column nor recording.sample_rate_hz");
   }
   if (!time.column && (time.resample || time.interval == "stamps")) {
     section.refuse(time.resample ? "time.resample" : "time.interval", "without a column there are no stamps");
@@ -293,7 +299,7 @@ void read_gimbal(Section& section, GimbalMap& gimbal) {
   section.flag("absent", gimbal.absent);
   const int ways = (gimbal.outer || gimbal.inner ? 1 : 0) + (gimbal.fixed_deg ? 1 : 0) + (gimbal.absent ? 1 : 0);
   if (ways != 1 || gimbal.outer.has_value() != gimbal.inner.has_value()) {
-    section.refuse("gimbal", "one of these is expected: outer and inner, fixed_deg = [outer, inner], absent = true");
+    section.miss("gimbal", "one of these is expected: outer and inner, fixed_deg = [outer, inner], absent = true");
   }
   for (const double sign : gimbal.signs) {
     if (std::abs(sign) != 1.0) {

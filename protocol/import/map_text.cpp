@@ -85,9 +85,11 @@ class Writer {
 void write_triad(Writer& out, const std::string& name, const TriadMap& triad) {
   constexpr std::string_view letters = "xyz";
   out.table(name);
-  out.line("columns", list(triad.columns, column));
+  const bool known = triad.columns[0].number > 0 || !triad.columns[0].name.empty();
+  known ? out.line("columns", list(triad.columns, column)) : out.open("columns", "[2, 3, 4]   # names or numbers");
   out.line("kind", triad.increments ? "\"increments\"" : "\"rates\"");
-  out.line("unit", toml_text(triad.unit));
+  triad.unit.empty() ? out.open("unit", name == "gyro" ? "\"rad/s\"" : "\"m/s^2\"")
+                     : out.line("unit", toml_text(triad.unit));
   if (triad.scale != std::array<double, 3>{1.0, 1.0, 1.0}) {
     out.line("scale", list(triad.scale, number));
   }

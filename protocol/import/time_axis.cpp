@@ -84,8 +84,8 @@ RateOfStamps rate_of(const std::vector<long double>& stamps, long double seconds
   found.jitter = static_cast<double>(std::sqrt(squares / static_cast<long double>(count)));
   const long double step = resolution_of(stamps);
   found.resolution_s = static_cast<double>(step * seconds);
-  // The span's two ends are each known to half a step; a double's rounding is below 1e-12.
-  const double tolerance = static_cast<double>(step / span) + 1e-12;
+  // The span's two ends are each known to half a step and to four times the jitter; a double's rounding is below 1e-12.
+  const double tolerance = static_cast<double>(step / span) + 4.0 * found.jitter / static_cast<double>(count) + 1e-12;
   found.rate_hz = shortest_near(static_cast<double>(1.0L / (mean * seconds)), tolerance);
   return found;
 }

@@ -97,6 +97,8 @@ class Dialect:
     gimbal_signs: tuple
     gimbal_order: tuple    # names of the columns in their order
     temperature: str       # C, K, F, none
+    strangers: list        # columns of no use here
+    jitter: float          # of the times, in parts of the interval
     order: list            # of the groups
     know_site: bool
 
@@ -109,28 +111,33 @@ def signed_permutation(rng, plain):
 
 def draw(rng):
     separator, decimal = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), (" ", ",")][rng.integers(7)]
-    gyro_kind, accel_kind = ("rates", "rates") if rng.random() < 0.6 else ("increments", "increments")
-    order = ["gyro", "accel", "gimbal", "temperature"]
+    gyro_kind, accel_kind = [("rates", "rates"), ("rates", "rates"), ("increments", "increments"), ("rates", "increments"),
+                             ("increments", "rates")][rng.integers(5)]
+    strangers = [s for s in ("magnetometer", "counter", "status", "height") if rng.random() < 0.15]
+    order = ["gyro", "accel", "gimbal", "temperature", *strangers]
     rng.shuffle(order)
     gyro_axes = signed_permutation(rng, 0.4)
     return Dialect(
         separator=separator, decimal=decimal,
         header=str(rng.choice(["names", "units in names", "units line", "comment", "none"])),
         comment=str(rng.choice(["", "#", "%"])), bom=bool(rng.random() < 0.2), crlf=bool(rng.random() < 0.3),
-        rate=float(rng.choice([50.0, 64.0, 100.0, 125.0, 200.0])),
+        rate=float(rng.choice([10.0, 50.0, 64.0, 100.0, 125.0, 200.0, 400.0])),
         time=str(rng.choice(["s", "ms", "us", "ns", "date", "none"])), origin=float(rng.choice([0.0, 0.0, 254500.0])),
         gyro_kind=gyro_kind, gyro_unit=str(rng.choice(list(RATES if gyro_kind == "rates" else ANGLES))),
         accel_kind=accel_kind, accel_unit=str(rng.choice(list(FORCES if accel_kind == "rates" else VELOCITIES))),
         gyro_axes=gyro_axes, accel_axes=gyro_axes if rng.random() < 0.6 else signed_permutation(rng, 0.3),
         gimbal_unit=str(rng.choice(["deg", "rad"])), gimbal_signs=tuple(rng.choice([-1.0, 1.0], 2)),
         gimbal_order=("outer", "inner") if rng.random() < 0.6 else ("inner", "outer"),
-        temperature=str(rng.choice(["C", "K", "F", "none"])), order=order, know_site=bool(rng.random() < 0.6))
+        temperature=str(rng.choice(["C", "K", "F", "none"])), strangers=strangers, jitter=float(rng.choice([0.0, 0.0, 0.03])),
+        order=order, know_site=bool(rng.random() < 0.6))
 
 
 NAMES = {
-    "gyro": {"rates": [["gx", "gy", "gz"], ["gyro_x", "gyro_y", "gyro_z"], ["wx", "wy", "wz"], ["AngularRateX", "AngularRateY", "AngularRateZ"]],
+    "gyro": {"rates": [["gx", "gy", "gz"], ["gyro_x", "gyro_y", "gyro_z"], ["wx", "wy", "wz"], ["AngularRateX", "AngularRateY", "AngularRateZ"],
+                       ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"], ["Gyr_X", "Gyr_Y", "Gyr_Z"]],
              "increments": [["dtheta_x", "dtheta_y", "dtheta_z"], ["delta_angle_x", "delta_angle_y", "delta_angle_z"]]},
-    "accel": {"rates": [["ax", "ay", "az"], ["acc_x", "acc_y", "acc_z"], ["AccX", "AccY", "AccZ"], ["fx", "fy", "fz"]],
+    "accel": {"rates": [["ax", "ay", "az"], ["acc_x", "acc_y", "acc_z"], ["AccX", "AccY", "AccZ"], ["fx", "fy", "fz"],
+                        ["linear_acceleration.x", "linear_acceleration.y", "linear_acceleration.z"], ["Acc_X", "Acc_Y", "Acc_Z"]],
               "increments": [["dv_x", "dv_y", "dv_z"], ["delta_vel_x", "delta_vel_y", "delta_vel_z"]]},
 }
 
@@ -153,13 +160,20 @@ def columns(rng, d, t):
     if d.temperature != "none":
         value = {"C": c, "K": c + 273.15, "F": c * 1.8 + 32}[d.temperature]
         groups["temperature"] = [("temp", d.temperature, text(value, 6))]
+    n = len(t["end"])
+    field = numpy.einsum("nji,j->ni", turn(2, t["outer"]) @ turn(1, t["inner"]), [18.0, -43.0, 5.0]) + rng.normal(0, 0.3, (n, 3))
+    groups["magnetometer"] = [(f"m{a}", "", text(field[:, k], 5)) for k, a in enumerate("xyz")]
+    groups["counter"] = [("packet", "", [str(k % 256) for k in range(n)])]
+    groups["status"] = [("status", "", ["0"] * n)]
+    groups["height"] = [("baro_height", "", text(480 + numpy.cumsum(rng.normal(0, 0.01, n)), 6))]
     result = []
     if d.time == "date":
         start = datetime.datetime(2024, 5, 17, 9, 30)
         stamp = [(start + datetime.timedelta(microseconds=round(e * 1e6))).isoformat(timespec="microseconds") + "Z" for e in t["end"]]
         result.append(("utc", "", stamp))
     elif d.time != "none":
-        exact = numpy.round((t["end"] + d.origin) / TIMES[d.time], 7 if d.time == "s" else 3)
+        stamp = t["end"] + d.jitter / d.rate * rng.normal(0, 1, len(t["end"])).clip(-3, 3)
+        exact = numpy.round((stamp + d.origin) / TIMES[d.time], 7 if d.time == "s" else 3)
         result.append(("time", d.time, [repr(float(v)) if d.time == "s" else f"{v:.3f}".rstrip("0").rstrip(".") for v in exact]))
     for group in d.order:
         result += groups.get(group, [])

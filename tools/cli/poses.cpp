@@ -12,7 +12,9 @@
 #include "estimator/geometry/units.hpp"
 #include "protocol/document/document_head.hpp"
 #include "protocol/recording/atomic_file.hpp"
+#include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/convert.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -23,6 +25,29 @@ struct PosesArguments {
   double false_alarm_rate = 0.01;
   bool json = false;
 };
+
+// Increments to rates: what `selfcal import` wrote of a sensor without a gimbal.
+Expected<diagnosis::PoseInput> read_poses_of_recording(const std::string& path) {
+  const Expected<LoadedRecording> loaded = read_hdf5(path, lenient);
+  if (!loaded) {
+    return tl::unexpected(loaded.error());
+  }
+  const Recording& recording = loaded->recording;
+  diagnosis::PoseInput input;
+  input.time_s = recording.time_s;
+  const auto rates = [&recording](const std::vector<std::array<double, 3>>& increments) {
+    std::vector<std::array<double, 3>> all = increments;
+    for (std::array<double, 3>& row : all) {
+      for (double& value : row) {
+        value *= recording.sample_rate_hz;
+      }
+    }
+    return all;
+  };
+  input.gyro = rates(recording.delta_theta_rad);
+  input.accel = rates(recording.delta_v_mps);
+  return input;
+}
 
 // One header line, then time, three gyros, three accelerometers; further columns are ignored.
 Expected<diagnosis::PoseInput> read_poses(const std::string& path) {
@@ -130,7 +155,9 @@ std::string answer_text(const diagnosis::PoseDiagnosis& d) {
 }
 
 Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
-  Expected<diagnosis::PoseInput> input = read_poses(arguments.file);
+  const bool is_recording = arguments.file.ends_with(".h5") || arguments.file.ends_with(".hdf5");
+  Expected<diagnosis::PoseInput> input =
+      is_recording ? read_poses_of_recording(arguments.file) : read_poses(arguments.file);
   if (!input) {
     return tl::unexpected(input.error());
   }
@@ -153,7 +180,8 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
 
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<PosesArguments>();
-  options.text("FILE", arguments->file, "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw",
+  options.text("FILE", arguments->file,
+               "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw; or a recording (.h5)",
                Needed::yes);
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
