@@ -1,0 +1,34 @@
+// From the pages to the set that is to be written: the estimate, the gate's objections, the new set. These steps need no INS.
+#pragma once
+
+#include <functional>
+
+#include "daemon/run/run_steps.hpp"
+#include "daemon/run/running_steps.hpp"
+
+namespace selfcal {
+
+class EstimateSteps : public RunSteps {
+ public:
+  // `post` gets the event that follows, from the loop or at once.
+  EstimateSteps(const StepContext& context, Estimators& estimators, RunningSteps& running,
+                std::function<void(Event)> post)
+      : RunSteps(context), estimators_(estimators), running_(running), post_(std::move(post)) {}
+
+  void estimate();
+  void judge();
+
+ private:
+  std::filesystem::path amended_recording() const;
+  void on_estimate_progress(const CalibrationProgress& progress);
+  void on_estimate(Expected<Estimate> answer);
+  Expected<void> store_result();
+  Expected<void> make_new_set();
+  void warn_of_history(const RunStore::Parameters& parameters);
+
+  Estimators& estimators_;
+  RunningSteps& running_;
+  std::function<void(Event)> post_;
+};
+
+}  // namespace selfcal
