@@ -1,4 +1,4 @@
-// Status on LCM: best effort. Without a route nothing is published, it is said once, and tried again.
+// Status on LCM, best effort: without a route nothing is published; that is logged once, and publishing is tried again.
 #pragma once
 
 #include <map>

@@ -254,6 +254,7 @@ void Service::on_warning(const RunRecord& run, const std::string& text) {
 }
 
 void Service::on_finished(const RunRecord& run) {
+  rest_from_questions(run.ins);
   tell_bus([&](OperatorService& service) { service.finished(run); });
   if (run.state == State::failed) {
     publisher_.publish_alarm(run.ins, run.id, false, run.reason);

@@ -40,6 +40,8 @@ class Service : public Operations, public RunObserver {
     std::unique_ptr<CalibrationRun> run;
     std::unique_ptr<BusQuestion> question;
     std::vector<std::function<void(const std::string&)>> asking;  // who waits for its answer
+    SteadyTime may_ask_from{};
+    std::string bus_answer;  // the last one since a run
     bool active() const { return run && !is_final(run->record().state); }
     bool ending() const { return run && !active() && !run->over(); }
     bool busy() const { return active() || ending(); }
@@ -77,6 +79,7 @@ class Service : public Operations, public RunObserver {
   Standing standing(const std::string& ins) const override;
   void ask_bus(const std::string& ins, std::function<void(const std::string&)> done) override;
   std::string bus_words(const Session& session) const;
+  void rest_from_questions(const std::string& ins);  // its session must be able to end
 
   void on_state(const RunRecord& run) override;
   void on_progress(const RunRecord& run) override;

@@ -16,8 +16,8 @@ namespace selfcal {
 // recording has several (the view needs it contiguous) and must outlive the view too.
 ImuData imu_view(const Recording& recording, std::vector<double>& first_temperature);
 
-// Runs calibrate() and fills elapsed_s. Where no answer can be computed the error (bad_input) says why; a bad
-// answer is a CalibrationResult that says so (gate.hpp judges it). The recording must have passed check_recording.
+// Runs calibrate() and fills elapsed_s. The error (bad_input) names why no result can be computed; a bad result is no error:
+// gate.hpp judges it. The recording must have passed check_recording.
 Expected<CalibrationResult> calibrate_recording(const Recording& recording, const CalibrationOptions& options,
                                                 const std::function<void(const CalibrationProgress&)>& progress = {},
                                                 const std::stop_token& stop = {});

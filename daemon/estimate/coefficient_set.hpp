@@ -15,7 +15,7 @@ struct CoefficientSet {
   std::array<double, sensor_parameter_count> value{};  // SI, order of sensor_parameters
   std::array<double, sensor_parameter_count> sigma{};  // SI
   std::array<bool, sensor_parameter_count> determined{};
-  bool acceptable = false;  // the gate's answer: may be pushed without a word
+  bool acceptable = false;  // the gate's answer: no objection
 };
 
 // A value outside what is physically possible counts as not determined here. The time is the caller's, who has a clock.

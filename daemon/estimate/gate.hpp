@@ -1,4 +1,4 @@
-// The gate: whether a result may be written to an INS without the operator's word, and what speaks against it.
+// The gate: whether a result may be written to an INS without the operator's reason, and the objections to it.
 //
 // One function answers, once for each result. Its answer is stored with the result; the run, the JSON document, the
 // table, the page, an amendment, LCM and D-Bus read the stored answer and never ask again with less knowledge.

@@ -1,4 +1,4 @@
-// A calibration with everything that is said of it: the gate's answer, the cause of an inconsistency, the summary.
+// A calibration with its judgement: the gate's answer, the cause of an inconsistency, the summary.
 #pragma once
 
 #include <functional>

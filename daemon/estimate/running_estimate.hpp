@@ -39,7 +39,7 @@ using RunningJob = std::function<Expected<RunningEstimate>(std::stop_token)>;
 using RunningDone = std::function<void(Expected<RunningEstimate>, double)>;
 
 // What the rest of `schedule` gives after `data_s` of it: covariance analysis with attitude and noise as found so far.
-// Where the data so far gave less than the analysis says (a moving base), the rest is taken to give less by as much.
+// Where the data so far gave less than the analysis predicts (a moving base), the rest is assumed to give less by as much.
 Forecast forecast(const Schedule& schedule, const CalibrationResult& so_far, const earth::Position& site, double data_s,
                   const ParameterVector& tolerance);
 

@@ -1,4 +1,4 @@
-// Why nobody answers: what else is on the bus, listened to without a filter while requests go unanswered.
+// The cause of missing answers: listens to all frames on the bus, without a filter, while requests go unanswered.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct Heard {
 };
 
 void count(const can::CanFrame& frame, const InsConfig& config, Heard& heard);
-// One clause for the line that says that no answer came.
+// One clause for the message that reports a missing answer.
 std::string why_silent(const Heard& heard, const InsConfig& config);
 
 class BusListener {

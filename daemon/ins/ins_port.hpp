@@ -21,7 +21,7 @@ namespace selfcal {
 struct PortError {
   enum class Kind {
     link,      // no answer, or the interface is down: worth trying again later
-    negative,  // the INS said no, with nrc
+    negative,  // the INS refused, with nrc
     protocol,  // it answered something that makes no sense
     local,     // not the INS's fault: disk or database of this machine
   };
@@ -53,9 +53,9 @@ class InsPort {
   virtual std::uint64_t lost_frames() const = 0;
   virtual std::string_view interface() const = 0;  // begins every message about it
 
-  // What the CAN controller says of itself and the bus (error frames), as it comes.
+  // Each error frame of the CAN controller, as it comes.
   std::function<void(can::BusEvent)> on_bus_event;
-  // What the status frames told last, after each batch that held one.
+  // The state by the last status frames, after each batch that held one.
   std::function<void(const ins::Status&)> on_status;
 };
 

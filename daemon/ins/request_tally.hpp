@@ -1,4 +1,4 @@
-// What an INS was asked since the last progress, for the line that says why there was none.
+// The requests to an INS since the last progress, for the message that reports that there was none.
 #pragma once
 
 #include <cstdint>

@@ -12,7 +12,7 @@ namespace selfcal {
 
 class SessionEnd {
  public:
-  // A server that is busy drops a request without a word, so it is asked again. Eight times a quarter of a second cover
+  // A busy server drops a request silently, so the request is repeated. Eight times a quarter of a second cover
   // the slowest answer that sim_ins and serial NOR FLASH give (0.4 s to erase a sector), and are well below S3 (5 s),
   // which ends the session of an INS that cannot be reached.
   static constexpr int attempts = 8;

@@ -1,6 +1,6 @@
-// What an INS says of its data and of itself, held against the schedule and against what else it says. Each complaint
-// names the value and what it contradicts; none begins with the interface. What a single record can tell by itself is
-// checked where its bytes are read (protocol/ins_interface).
+// Checks of an INS's answers against the schedule and against each other. Each complaint names the value and what it
+// contradicts; none begins with the interface. The range of a single value is checked where its bytes are decoded
+// (protocol/ins_interface).
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ Complaint check_rotation_time(const ins::DirectoryRecord& directory, const ins::
 // The first value (SI, order of sensor_parameters) outside what is physically possible.
 Complaint check_coefficients(const std::array<double, sensor_parameter_count>& value, std::string_view whose);
 
-// A navigation check of `asked_s` that says it is done, or is under way.
+// The answer about a navigation check of `asked_s` seconds, done or under way.
 Complaint check_navigation(const ins::NavigationCheckRecord& answer, double asked_s);
 
 }  // namespace selfcal

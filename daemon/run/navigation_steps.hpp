@@ -11,7 +11,7 @@ class NavigationSteps : public RunSteps {
 
   Task<Step> measure_drift(double RunRecord::*figure);
   Task<Step> end_check();
-  // Whoever began it; without one nothing is done.
+  // Also one that another tester began; without one nothing is done.
   Task<Answer<Done>> stop_check();
 };
 

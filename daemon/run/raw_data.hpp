@@ -23,7 +23,7 @@ class RawData : public RunSteps {
   // The directory of this run's rotation, in agreement with format and schedule.
   Task<Answer<ins::DirectoryRecord>> read_directory();
   Task<Answer<Done>> learn_pages_written();
-  // The gimbal is at rest: until the directory says that no more pages come.
+  // The gimbal is at rest: waits until the directory is complete.
   Task<Answer<Done>> await_completion();
   // Pulls a part of what is missing of the pages that the directory named.
   Task<Answer<Done>> pull();

@@ -32,7 +32,7 @@ class RunJournal {
   void show_estimate(const ParameterVector& value, const ParameterVector& sigma);
   // An error frame of the CAN controller: each kind is reported at most every ten seconds.
   void on_bus_event(can::BusEvent event);
-  // The record is final and stored: sums up, and tells the journal and the observer.
+  // The record is final and stored: sums up, and reports to journal and observer.
   void conclude();
 
   bool storage_lost() const { return storage_lost_; }

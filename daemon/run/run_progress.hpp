@@ -1,4 +1,4 @@
-// What an onlooker may know about a run, at any time, and who is told of its news.
+// The progress of a run, as an onlooker may read it at any time, and the observer that its news are reported to.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // The calibration as one table: in this state, upon this event, if this guard holds: go there and do that.
 //
 // The engine (calibration_run.hpp) stores the next state in the database before it performs the action, so that
-// after a crash the table says how to go on: the event `recovered` (bus back, INS restarted, daemon restarted) has a
+// after a crash the table defines how the run continues: the event `recovered` (bus back, INS restarted, daemon restarted) has a
 // row in every state. daemon/README.md shows this table; a test compares the two.
 #pragma once
 
@@ -44,14 +44,14 @@ enum class Guard {
   always,
   rollback,           // a former set is to be put back, nothing to be measured
   amendment,          // a kept recording is to be estimated again, nothing to be measured
-  gimbal_turning,     // the INS says so, and it is this run's rotation
-  rotation_complete,  // the INS says so, and it is this run's rotation
+  gimbal_turning,     // by the INS's answer, and it is this run's rotation
+  rotation_complete,  // by the INS's answer, and it is this run's rotation
   gate_refused,       // not determined, inconsistent or implausible, and no operator's reason to write it anyway
   dry_run,
   drift_check_wanted,
   new_set_in_force,  // slot in force holds this run's set
   abort_pending,     // an operator asked for this end
-  failure_pending,   // nobody asked for it: a step failed
+  failure_pending,   // no operator asked for it: a step failed
 };
 
 enum class Action {

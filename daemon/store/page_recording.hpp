@@ -12,7 +12,7 @@
 
 namespace selfcal {
 
-// What the pages do not tell. Kept beside them, so that a restarted daemon needs no INS to go on.
+// What the pages do not hold. It is kept beside them, so that a restarted daemon needs no INS to continue.
 struct PageContext {
   ins::SampleFormatRecord format;
   ins::SiteRecord site;

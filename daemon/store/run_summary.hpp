@@ -10,7 +10,7 @@
 namespace selfcal {
 
 // Of the set that a run wrote. A set is in force from the end of its run until another one takes its place: a later
-// calibration, an amendment or a rollback of the same INS, or one that nobody here wrote (a later run found another).
+// calibration, an amendment or a rollback of the same INS, or a set from elsewhere (a later run found another).
 struct InForce {
   bool now = false;
   bool known = true;       // false: a later run broke off when it may have changed the set; `now` is then false

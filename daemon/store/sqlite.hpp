@@ -12,7 +12,7 @@
 
 namespace selfcal::sqlite {
 
-// What SQLite says of its last failure, and what the operating system said to SQLite where that is the cause.
+// SQLite's message about its last failure, with the operating system's where that is the cause.
 std::string failure_words(sqlite3* database);
 
 // The database as an error: `what` was tried.
