@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/signature_pass.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
@@ -100,20 +101,49 @@ std::vector<Effect> functions(const ImuData& data) {
   return all;
 }
 
+// What a sensor of this kind can put out wrongly at most, in typical sizes: the limit beyond which a bias or a drift of it is not
+// plausible either.
+double possible(int column) {
+  const int axis = column % axes;
+  const ParameterVector limit = plausible_limit();
+  return (axis < 3 ? limit(3) : limit(0)) / map_unit(axis);
+}
+
+// Whether enough of a function is left beside the 24, the attitude and what was taken. One that shows less than 100 sigma at
+// its largest possible size lies inside their span to a per cent of what could be there at all: what is left of it is a curve of another
+// shape, and fits at a coefficient that says nothing of the function.
+bool visible(double sigma, int column) {
+  constexpr double least_significance = 100.0;
+  return sigma * least_significance < possible(column);
+}
+
 // The column that gains most, if it is significant among all that were tried; -1: none.
 int best_column(const Evidence& evidence, int columns, const std::vector<int>& chosen, double alpha) {
+  const SingleTest test(evidence, chosen);
   int best = -1;
   double gain = 0.0;
   for (int k = 0; k < columns; ++k) {
-    if (std::find(chosen.begin(), chosen.end(), k) == chosen.end()) {
-      const GroupTest test = test_group(evidence, {k}, chosen);
-      if (test.gain > gain) {
-        gain = test.gain;
-        best = k;
-      }
+    const bool taken = std::find(chosen.begin(), chosen.end(), k) != chosen.end();
+    const auto found = taken ? std::nullopt : test(k);
+    if (!found || found->z * found->z <= gain || !visible(std::abs(found->size / found->z), k) ||
+        std::abs(found->size) > possible(k)) {
+      continue;
     }
+    gain = found->z * found->z;
+    best = k;
   }
   return log_corrected(log_chi_squared_tail(gain, 1.0), columns) < std::log(alpha) ? best : -1;
+}
+
+// Whether each coefficient is still one that a sensor can have: what is taken later may be nearly collinear with it.
+bool sensible(const Fit& fit, const std::vector<int>& chosen) {
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    if (!visible(std::sqrt(fit.covariance(at, at)), chosen[k]) || std::abs(fit.value(at)) > possible(chosen[k])) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -143,7 +173,7 @@ EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& 
     std::vector<int> with = chosen;
     with.push_back(column);
     const double gain = held_out_gain(rows.columns, rows.residual, fold, with, chosen);
-    if (gain <= 0.0) {
+    if (gain <= 0.0 || !sensible(evidence.fit(with), with)) {
       break;
     }
     chosen = with;

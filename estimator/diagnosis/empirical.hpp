@@ -23,7 +23,8 @@ struct EmpiricalDescription {
 };
 
 // Terms are added while each is significant after correction for all that were tried and also gains on the parts of
-// the recording that were left out; at most eight.
+// the recording that were left out; at most eight. None lies nearly inside the span of what is fitted, and none has a coefficient
+// that no sensor can have (plausible_limit).
 EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& diagnosis, double false_alarm_rate);
 
 }  // namespace selfcal::diagnosis
