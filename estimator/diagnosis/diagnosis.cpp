@@ -207,6 +207,33 @@ DataFault wrong_latitude(const Chosen& chosen, const ImuData& data) {
   return {"wrong_site", words, 0, data.size()};
 }
 
+const char* words_of(FormKind kind) {
+  switch (kind) {
+    case FormKind::in_turns: return "it is another while the gimbal turns";
+    case FormKind::constants: return "it has more than one time constant";
+    case FormKind::time: return "it changes in the course of the recording";
+    case FormKind::attitude: return "it changes with the attitude";
+    case FormKind::rate: return "it changes with the rate of turning";
+  }
+  return "";
+}
+
+std::optional<Remainder> remainder_of(const Naming& naming) {
+  const OpenForms& forms = naming.forms();
+  if (forms.empty()) {
+    return std::nullopt;
+  }
+  Remainder r;
+  r.share = naming.share_of_misfit(forms.square);
+  r.sigma = std::sqrt(std::max(0.0, forms.square));
+  for (const FormFamily& f : forms.families) {
+    r.forms.push_back(
+        {naming.chosen()[f.chosen].candidate.effect->id, words_of(f.kind), naming.share_of_misfit(f.square)});
+  }
+  r.places = naming.map_without_forms().places;
+  return r;
+}
+
 class Diagnoser {
  public:
   Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
@@ -288,6 +315,7 @@ void Diagnoser::decide(const Naming& naming) {
       return;
     }
     named.push_back(describe(c, naming.rows()));
+    named.back().share = naming.share_of_misfit(c.gain);
     d_.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
   }
   bool jumps = false;
@@ -305,14 +333,18 @@ void Diagnoser::decide(const Naming& naming) {
     d_.after.accepted = d_.after.accepted && left.log_p_named > std::log(rejection_rate) &&
                         left.log_p_elsewhere > std::log(share_structure * alpha);
   }
-  // Beside an effect of hundreds of sigma the linearisation leaves a thousandth of it: not worth a verdict.
-  constexpr double numerical_share = 1e-3;
-  if (!named.empty() && d_.after.misfit < numerical_share * d_.before.misfit && d_.after.largest_sigma < 4.0) {
+  // Beside an effect of hundreds of sigma the linearisation, and an equation that is right to 3 % of the amplitude, leave a
+  // thousandth of its square, in one place or in all: not worth a verdict.
+  constexpr double worth_a_verdict = 1e-3;
+  const double least = std::max(16.0, worth_a_verdict * d_.before.misfit);
+  if (!named.empty() && d_.after.misfit < worth_a_verdict * d_.before.misfit &&
+      d_.after.largest_sigma * d_.after.largest_sigma < least) {
     d_.after.accepted = true;
   }
   const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
   d_.after.accepted = d_.after.accepted && !jumps && itself && !naming.entangled();
   d_.unexplained = !d_.after.accepted;
+  d_.remainder = d_.after.accepted ? remainder_of(naming) : std::nullopt;
   if (d_.unexplained) {
     d_.model.clear();  // rejected names are no equations of a model: nothing is carried over or taken out
   }

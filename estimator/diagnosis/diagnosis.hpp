@@ -44,7 +44,23 @@ struct Finding {
   double log_p = 0.0;                         // the same, natural logarithm
   double delta_bic = 0.0;                     // fall of the BIC: positive speaks for it
   double held_out_gain = 0.0;                 // log-likelihood on dwells and rotations left out in turn
+  double share = 0.0;                         // of the misfit that it takes away, given the other findings; 0 for noise
   bool stochastic = false;                    // a noise model, not a mean
+};
+
+// A way in which a named effect differs from its equation.
+struct FormLeft {
+  std::string effect, words;
+  double share = 0.0;  // of the misfit
+};
+
+// What the named equations leave where they are the answer all the same: small beside what they explain, and of a form that they
+// may take in nature. Sigma of the 24 holds what it may do to them.
+struct Remainder {
+  double share = 0.0;  // of the misfit
+  double sigma = 0.0;  // its size, sigmas
+  std::vector<FormLeft> forms;
+  std::vector<Located> places;  // where it shows, largest first
 };
 
 // One equation of the model that the findings make: for use on other recordings.
@@ -79,6 +95,7 @@ struct Diagnosis {
   std::vector<Finding> findings;   // best first
   std::vector<Finding> rejected;   // fitted best, but what remains says no
   std::vector<Finding> suspected;  // too weak to name
+  std::optional<Remainder> remainder;
   std::vector<Located> located, remaining;
   std::vector<Located> located_by, remaining_by;  // by gimbal angles, directions, temperature: the worst of each
   std::vector<Undetectable> undetectable, detectable;

@@ -24,6 +24,7 @@ struct EffectContext {
   Matrix3 C_nb;
   double since_turn_start_s = 0.0;         // part of the stretch after the end of the first turn, since the last one's
   double since_turn_end_s = 0.0;           // equal: none
+  bool turning = false;                    // whether the middle lies within a turn of the gimbal
   double duration_s = 0.0;                 // of the recording
   double outer = NAN, inner = NAN;         // gimbal read-outs at the middle, rad; NaN: none
   double temperature = NAN;                // less its mean over the recording, degC; NaN: no channel

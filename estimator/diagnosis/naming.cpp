@@ -55,7 +55,8 @@ Naming::Naming(const RecordingContext& context, PassInput input, double log_thre
       log_threshold_(log_threshold),
       pass_(context, candidates_for(context, {}), true),
       rows_(pass_.run(input_)),
-      evidence_(rows_) {
+      evidence_(rows_),
+      given_forms_(evidence_) {
   lines_before_ = innovation_lines(rows_, input_.interval_s);
   const bool lines = std::any_of(lines_before_.begin(), lines_before_.end(),
                                  [](const InnovationLine& l) { return l.log_p < line_log_p; });
@@ -177,6 +178,7 @@ void Naming::relinearise() {
       break;
     }
   }
+  append_forms();
 }
 
 // Gain of a chosen effect with its constant `steps` steps of the logarithm to either side.
@@ -262,8 +264,12 @@ bool Naming::add_best() {
     if (taken || same || fell(c)) {
       continue;
     }
-    const GroupTest test = test_group(evidence_, columns_of(c), others);
-    detected = std::min(detected, corrected(test.log_detection, c.effect->id));
+    const GroupTest test = test_group(given_forms(), columns_of(c), others);
+    const double log_p = corrected(test.log_detection, c.effect->id);
+    if (log_p < log_threshold_ && immaterial(c, test)) {
+      continue;
+    }
+    detected = std::min(detected, log_p);
     if (test.log_p < best) {
       best = test.log_p;
       winner = &c;
@@ -275,12 +281,12 @@ bool Naming::add_best() {
   std::vector<WalkTest> tests;
   tests.reserve(walk_axes);
   for (int axis = 0; axis < walk_axes; ++axis) {
-    tests.push_back(test_walk(evidence_, pass_.map(), pass_.first_map_column(), axis, others));
+    tests.push_back(test_walk(given_forms(), pass_.map(), pass_.first_map_column(), axis, others));
   }
   for (const WalkTest& test : tests) {
     const double log_p = log_chi_squared_tail(test.gain, 1.0);
-    const bool taken =
-        std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis == test.axis; });
+    const bool taken = within_form(test) || std::any_of(walks_.begin(), walks_.end(),
+                                                        [&](const WalkTest& w) { return w.axis == test.axis; });
     if (!taken) {
       detected = std::min(detected, corrected(log_p, test.axis < 3 ? "gyro_random_walk" : "accel_random_walk"));
     }
@@ -304,6 +310,7 @@ bool Naming::add_best() {
     walks_.push_back(*walker);
     evidence_.absorb(walker->columns, walker->covariance);
     refit();
+    size_forms();
   } else {
     chosen_.emplace_back();
     chosen_.back().candidate = *winner;
@@ -331,7 +338,7 @@ bool Naming::fell(const Candidate& candidate) const {
 
 bool Naming::drop_weak() {
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const GroupTest test = test_group(evidence_, columns_of(chosen_[i].candidate), chosen_columns(i));
+    const GroupTest test = test_group(given_forms(), columns_of(chosen_[i].candidate), chosen_columns(i));
     if (corrected(test.log_detection, chosen_[i].candidate.effect->id) > log_threshold_) {
       fallen_.push_back(chosen_[i].candidate);
       chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(i));
@@ -386,9 +393,10 @@ void Naming::judge() {
     Chosen& c = chosen_[i];
     const std::vector<int> others = chosen_columns(i);
     const GroupTest own = test_group(evidence_, columns_of(c.candidate), others);
-    c.gain = own.gain;
-    c.rank = own.rank;
-    c.log_p = corrected(own.log_detection, c.candidate.effect->id);
+    const GroupTest marginal = test_group(given_forms(), columns_of(c.candidate), others);
+    c.gain = marginal.gain;
+    c.rank = marginal.rank;
+    c.log_p = corrected(marginal.log_detection, c.candidate.effect->id);
     c.held_out = held_out_gain(rows_.columns, residual, fold, all, others);
     c.equivalent.clear();
     for (const Candidate& rival : pass_.candidates()) {
@@ -421,6 +429,8 @@ void Naming::run(const std::function<void(const std::string&)>& progress, const 
     while (drop_weak()) {
     }
   }
+  while (!stop.stop_requested() && drop_weak_walk()) {
+  }
   sharpen_observation();
   refit_noise();
   while (!stop.stop_requested() && chosen_.size() + walks_.size() < most_effects && add_best()) {
@@ -449,7 +459,7 @@ std::vector<Suspect> Naming::suspects() const {
     if (chosen) {
       continue;
     }
-    const GroupTest test = test_group(evidence_, columns_of(c), others);
+    const GroupTest test = test_group(given_forms(), columns_of(c), others);
     const double log_p = corrected(test.log_detection, c.effect->id);
     const auto same = std::find_if(all.begin(), all.end(), [&](const Suspect& s) { return s.effect == c.effect->id; });
     if (same == all.end()) {

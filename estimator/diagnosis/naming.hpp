@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/form.hpp"
 #include "estimator/diagnosis/locate.hpp"
 
 namespace selfcal::diagnosis {
@@ -81,6 +82,12 @@ class Naming {
   // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts
   // with the attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some.
   double log_p_likeness() const { return log_p_likeness_; }
+  // What the named effects differ from their equations by; the tests of what remains are made given it.
+  const OpenForms& forms() const { return forms_; }
+  // Share of the misfit, with the effects as named taken out of nothing, that a square is.
+  double share_of_misfit(double square) const { return square / std::max(1.0, evidence_.square - evidence_.rows); }
+  // Where the forms show: the map with the effects as equations alone.
+  Map map_without_forms() const { return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns()); }
   // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value() const;
   ParameterVector value_as_named() const;
@@ -101,6 +108,16 @@ class Naming {
   double log_likelihood_as_named(const PassInput& input) const;
   int append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine);
   void append_constants();
+  void append_forms();
+  void rebuild_evidence();
+  bool drop_weak_walk();
+  double largest_square(int triad) const;
+  bool within_form(const WalkTest& walk) const;
+  bool immaterial(const Candidate& candidate, const GroupTest& test) const;
+  ParameterMatrix covariance_of_closed_forms() const;
+  void size_forms();
+  // Normal equations with the forms marginalised.
+  const Evidence& given_forms() const { return forms_.empty() ? evidence_ : given_forms_; }
   void test_likenesses();
   double test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside);
   void average();
@@ -117,7 +134,10 @@ class Naming {
   double effective_tests_ = 1.0;  // of the catalogue on this recording
   SignaturePass pass_;
   SignatureRows rows_;
-  Evidence evidence_;  // with what the correction took out added back, walks integrated out
+  Evidence evidence_;                 // with what the correction took out added back, walks integrated out
+  std::vector<FormFamily> families_;  // columns of rows_, for the effects as chosen
+  OpenForms forms_;
+  Evidence given_forms_;
   std::vector<Chosen> chosen_;
   std::vector<Candidate> fallen_;  // chosen once, too weak beside others
   std::vector<WalkTest> walks_;

@@ -330,6 +330,7 @@ int Naming::append_columns(const std::vector<Candidate>& more, const Eigen::Matr
   for (const WalkTest& walk : walks_) {
     evidence_.absorb(walk.columns, walk.covariance);
   }
+  size_forms();
   return static_cast<int>(at);
 }
 

@@ -146,6 +146,9 @@ bool Naming::entangled() const {
 double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside) {
   constexpr double counts = 3.0;          // sigmas from which a coefficient counts
   constexpr double tests_per_axis = 3.0;  // four functions of the gimbal angles; warm-ups are alike: two
+  // An equation that is right to 3 % of its amplitude leaves as much: its own form, not another effect's.
+  constexpr double form_square = 1e-3;
+  const double own = test_group(evidence_, columns_of(chosen.candidate), {}).gain;
   std::vector<int> others = chosen_columns();
   for (const Chosen& c : chosen_) {
     for (int k = 0; c.derivative >= 0 && k < c.candidate.count; ++k) {
@@ -166,7 +169,8 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   double smallest = 0.0;
   for (int column = 0; column < static_cast<int>(all); ++column) {  // axis by axis in threes
     if (concerned[static_cast<std::size_t>(column % 3)]) {
-      smallest = std::min(smallest, test_group(evidence_, {first + column}, others).log_p);
+      const GroupTest left = test_group(given_forms(), {first + column}, others);
+      smallest = left.gain > form_square * own ? std::min(smallest, left.log_p) : smallest;
     }
   }
   const auto axes = std::count(concerned.begin(), concerned.end(), true);
@@ -199,7 +203,8 @@ void Naming::test_likenesses() {
 Naming::Structure Naming::structure() const {
   using Kind = LocatedColumn::Kind;
   const std::vector<int> others = chosen_columns();
-  const Eigen::VectorXd size = evidence_.fit(others).value;
+  const Evidence& evidence = given_forms();
+  const Eigen::VectorXd size = evidence.fit(others).value;
   Structure found;
   int tests = 0;
   for (const Kind kind : {Kind::dwell, Kind::rotation, Kind::after_turn, Kind::time}) {
@@ -210,10 +215,10 @@ Naming::Structure Naming::structure() const {
           group.push_back(pass_.first_map_column() + static_cast<int>(k));
         }
       }
-      const GroupTest left = test_group(evidence_, group, others);
+      const GroupTest left = test_group(evidence, group, others);
       const bool walks =
           std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis / 3 == axis / 3; });
-      const bool named = walks || (!others.empty() && square_within(evidence_, group, others, size) >= left.gain);
+      const bool named = walks || (!others.empty() && square_within(evidence, group, others, size) >= left.gain);
       double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
       smallest = std::min(smallest, left.log_p);
       ++tests;
@@ -224,7 +229,7 @@ Naming::Structure Naming::structure() const {
   return found;
 }
 
-Map Naming::map_after() const { return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns()); }
+Map Naming::map_after() const { return locate(given_forms(), pass_.map(), pass_.first_map_column(), chosen_columns()); }
 
 Naming::ByQuantity Naming::locate_by_quantities() const {
   std::vector<Candidate> all = quantity_bins(context_);
@@ -259,7 +264,7 @@ Naming::ByQuantity Naming::locate_by_quantities() const {
   return located;
 }
 
-double Naming::square_after() const { return evidence_.square - evidence_.fit(chosen_columns()).gain; }
+double Naming::square_after() const { return given_forms().square - given_forms().fit(chosen_columns()).gain; }
 
 Eigen::VectorXd Naming::final_residual() const {
   Eigen::VectorXd residual = rows_.residual;
@@ -269,6 +274,9 @@ Eigen::VectorXd Naming::final_residual() const {
   const std::vector<int> columns = chosen_columns();
   if (!columns.empty()) {
     residual -= rows_.columns(Eigen::all, columns) * evidence_.fit(columns).value;
+  }
+  if (!forms_.empty()) {
+    residual -= rows_.columns(Eigen::all, forms_.columns) * forms_.mean;
   }
   for (const WalkTest& walk : walks_) {  // the walk's own estimate
     const Eigen::MatrixXd Z = rows_.columns(Eigen::all, walk.columns);
@@ -300,12 +308,21 @@ ParameterVector Naming::value() const {
   for (const Chosen& c : chosen_) {
     value -= rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
   }
+  if (!forms_.empty()) {
+    value += rows_.shift(Eigen::all, forms_.columns) * forms_.mean;
+  }
   return value;
 }
 
 ParameterMatrix Naming::covariance() const {
   const int at = rows_.pass.layout.parameters();
-  return rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
+  ParameterMatrix covariance =
+      rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
+  if (!forms_.empty()) {
+    const Eigen::MatrixXd S = rows_.shift(Eigen::all, forms_.columns);
+    covariance += S * forms_.covariance * S.transpose();
+  }
+  return covariance + covariance_of_closed_forms();
 }
 
 }  // namespace selfcal::diagnosis

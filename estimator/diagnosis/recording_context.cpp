@@ -170,6 +170,7 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
     c.since_turn_start_s = std::max(0.0, block.start_s - next[-1].end_s);
     c.since_turn_end_s = block.end_s - next[-1].end_s;
   }
+  c.turning = next != turns_.end() && 0.5 * (block.start_s + block.end_s) > next->start_s;
   const std::size_t middle = (block.first + block.last) / 2;
   if (!data_.gimbal_outer.empty() && !data_.gimbal_inner.empty()) {
     c.outer = data_.gimbal_outer[middle];

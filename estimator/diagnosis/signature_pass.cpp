@@ -31,10 +31,11 @@ class BlockSignatures : public ExtraSignatures {
       }
       candidate.effect->sensor(c, candidate.constant, velocity.middleCols(candidate.first, candidate.count),
                                angle.middleCols(candidate.first, candidate.count));
+      const double factor = candidate.modulation == nullptr ? 1.0 : candidate.modulation(c);
       for (int k = 0; k < candidate.count; ++k) {
         const EffectParameter& p = candidate.effect->parameters[static_cast<std::size_t>(k)];
-        velocity.col(candidate.first + k) *= p.typical * p.si_per_unit;
-        angle.col(candidate.first + k) *= p.typical * p.si_per_unit;
+        velocity.col(candidate.first + k) *= factor * p.typical * p.si_per_unit;
+        angle.col(candidate.first + k) *= factor * p.typical * p.si_per_unit;
       }
     }
     if (!map_.empty()) {

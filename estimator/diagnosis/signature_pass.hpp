@@ -15,10 +15,14 @@
 
 namespace selfcal::diagnosis {
 
+// A factor on the effect's sensor errors.
+using Modulation = double (*)(const EffectContext&);
+
 struct Candidate {
   const Effect* effect = nullptr;
-  double constant = 0.0;     // NaN: none
-  int first = 0, count = 0;  // columns
+  double constant = 0.0;            // NaN: none
+  int first = 0, count = 0;         // columns
+  Modulation modulation = nullptr;  // none: the effect as its equation says
 };
 
 std::vector<int> columns_of(const Candidate& candidate);
