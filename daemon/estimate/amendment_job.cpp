@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/estimate/judged_result.hpp"
@@ -95,7 +96,11 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
   }
   outcome.diagnosis->calibration.elapsed_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  Estimate estimate = amended_estimate(*outcome.diagnosis, request, loaded->recording);
+  std::optional<discovery::Discovery> beyond;
+  if (outcome.diagnosis->unexplained) {
+    beyond = search_beyond(data, *outcome.diagnosis, {}, stop);
+  }
+  Estimate estimate = amended_estimate(*outcome.diagnosis, request, loaded->recording, std::move(beyond));
   estimate.warnings = loaded->warnings;
   return estimate;
 }
@@ -103,15 +108,17 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
 }  // namespace
 
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording) {
+                          const Recording& recording, std::optional<discovery::Discovery> beyond) {
   const CalibrationOptions options = calibration_options(request.config);
   Estimate estimate;
   JudgedResult judged;
   judged.result = amended_result(diagnosis, options);
   judged.diagnosis = diagnosis;
-  judged.gate = judge_amended(judged.result, options.tolerance, request.config.limit, diagnosis, request.amends);
+  judged.beyond = std::move(beyond);
+  const discovery::Discovery* found = judged.beyond ? &*judged.beyond : nullptr;
+  judged.gate = judge_amended(judged.result, options.tolerance, request.config.limit, diagnosis, request.amends, found);
   estimate.recording = recording_path(request.folder).string();
-  judged.summary = summary_of_amended(judged.result, judged.gate, {estimate.recording, 0}, diagnosis);
+  judged.summary = summary_of_amended(judged.result, judged.gate, {estimate.recording, 0}, diagnosis, found);
   estimate.result = judged.result;
   estimate.objections = judged.gate.words();
   for (const diagnosis::Finding& finding : diagnosis.findings) {

@@ -7,6 +7,7 @@
 #include "daemon/estimate/estimate_worker.hpp"
 #include "daemon/store/run_store.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/discovery.hpp"
 
 namespace selfcal {
 
@@ -23,7 +24,8 @@ struct AmendmentRequest {
 EstimateJob amendment_job(AmendmentRequest request);
 
 // The same without files: what an amendment may not be written for comes first among the objections.
+// `beyond`: what was found where the catalogue explains nothing.
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording);
+                          const Recording& recording, std::optional<discovery::Discovery> beyond = std::nullopt);
 
 }  // namespace selfcal

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
+#include "daemon/estimate/effect_words.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
 namespace selfcal {
@@ -42,7 +44,11 @@ ordered_json to_json(const Finding& f) {
   }
   j["equivalent"] = f.equivalent;
   j["experiment"] = f.experiment;
+  for (const Symbol& symbol : symbols_of(f.equation)) {
+    j["symbols"][symbol.name] = symbol.meaning;
+  }
   j["significance"] = f.significance;
+  j["share"] = f.share;
   j["stochastic"] = f.stochastic;
   j["evidence"] = {{"delta_bic", f.delta_bic},
                    {"p_value", std::exp(f.log_p)},
@@ -69,6 +75,14 @@ ordered_json list(const std::vector<T>& all) {
   return j;
 }
 
+ordered_json to_json(const diagnosis::Remainder& r) {
+  ordered_json forms = ordered_json::array();
+  for (const diagnosis::FormLeft& f : r.forms) {
+    forms.push_back({{"effect", f.effect}, {"words", f.words}, {"share", f.share}});
+  }
+  return {{"share", r.share}, {"sigma", r.sigma}, {"forms", forms}, {"places", list(r.places)}};
+}
+
 ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diagnosis::Located>& by) {
   places.insert(places.end(), by.begin(), by.end());
   return list(places);
@@ -87,10 +101,11 @@ std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
   return {};
 }
 
-ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate, const document::InputFile& input) {
+ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate, const document::InputFile& input,
+                            const discovery::Discovery* beyond) {
   ordered_json j = document::head(document::diagnosis, input);
   if (!input.name.empty()) {
-    j["summary"] = summary_json(summary_of(d, {input.name, 0}));
+    j["summary"] = summary_json(summary_of(d, {input.name, 0}, beyond));
   }
   j["mismatch"] = d.mismatch;
   j["verdict"] = verdict_name(d.verdict);
@@ -108,6 +123,9 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
     j["expected_z"][u.effect] = u.expected_z;
   }
   j["unexplained"] = d.unexplained;
+  if (d.remainder) {
+    j["remainder"] = to_json(*d.remainder);
+  }
   j["rejected"] = list(d.rejected);
   j["suspected"] = list(d.suspected);
   j["remaining"] = list(d.remaining, d.remaining_by);
@@ -126,6 +144,9 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
                                {"sigma", d.sigma(k) / p.si_per_unit},
                                {"value_without", d.calibration.value(k) / p.si_per_unit},
                                {"sigma_without", d.calibration.sigma(k) / p.si_per_unit}});
+  }
+  if (beyond != nullptr) {
+    add_discovery(j, *beyond);
   }
   return j;
 }

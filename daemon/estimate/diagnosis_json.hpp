@@ -12,8 +12,10 @@
 namespace selfcal {
 
 std::string verdict_name(diagnosis::DiagnosisVerdict verdict);
-// `input` is the recording's file, and what the commands of the summary name; without one there is no summary.
+// `input` is the recording's file, and what the commands of the summary name; without one there is no summary. `beyond`: what
+// was found where the catalogue explains nothing.
 nlohmann::ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_alarm_rate,
-                                      const document::InputFile& input = {});
+                                      const document::InputFile& input = {},
+                                      const discovery::Discovery* beyond = nullptr);
 
 }  // namespace selfcal

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 
@@ -87,12 +88,15 @@ Gate judge(const CalibrationResult& result, const ParameterVector& tolerance, co
 }
 
 Gate judge_amended(const CalibrationResult& result, const ParameterVector& tolerance, const Limits& limits,
-                   const diagnosis::Diagnosis& diagnosis, long long amends) {
+                   const diagnosis::Diagnosis& diagnosis, long long amends, const discovery::Discovery* beyond) {
   std::vector<Objection> found = all_of(result, tolerance, limits);
   for (const diagnosis::DataFault& fault : diagnosis.faults) {
     found.push_back({ObjectionKind::data_fault, fmt::format("data fault in run {}: {}", amends, fault.words)});
   }
-  if (diagnosis.unexplained) {
+  if (diagnosis.unexplained && explains(beyond)) {
+    found.push_back({ObjectionKind::unexplained,
+                     fmt::format("run {} holds what no catalogue does: {}", amends, discovered_words(*beyond))});
+  } else if (diagnosis.unexplained) {
     found.push_back(
         {ObjectionKind::unexplained,
          fmt::format("nothing in the catalogue explains run {}: {}", amends,

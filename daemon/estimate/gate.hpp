@@ -16,6 +16,9 @@ namespace selfcal {
 namespace diagnosis {
 struct Diagnosis;
 }
+namespace discovery {
+struct Discovery;
+}
 
 // |value| beyond which a parameter is implausible for this type of INS, in the units of sensor_parameters.
 using Limits = std::array<std::optional<double>, sensor_parameter_count>;
@@ -50,8 +53,10 @@ struct Gate {
 // Of the 24 alone.
 Gate judge(const CalibrationResult& result, const ParameterVector& tolerance, const Limits& limits);
 
-// Of the 24 as fitted together with what a diagnosis named in the recording of run `amends`.
+// Of the 24 as fitted together with what a diagnosis named in the recording of run `amends`. `beyond`: what was found where the
+// catalogue explains nothing.
 Gate judge_amended(const CalibrationResult& result, const ParameterVector& tolerance, const Limits& limits,
-                   const diagnosis::Diagnosis& diagnosis, long long amends);
+                   const diagnosis::Diagnosis& diagnosis, long long amends,
+                   const discovery::Discovery* beyond = nullptr);
 
 }  // namespace selfcal

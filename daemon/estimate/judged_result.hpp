@@ -18,13 +18,15 @@ namespace selfcal {
 struct JudgedResult {
   CalibrationResult result;
   std::optional<diagnosis::Diagnosis> diagnosis;  // of the same recording, where one was made
+  std::optional<discovery::Discovery> beyond;     // where the catalogue explains nothing
   Gate gate;
   Summary summary;
 };
 
 // Judges what has been calibrated already.
 JudgedResult judged(CalibrationResult result, const ParameterVector& tolerance, const Limits& limits,
-                    const Subject& subject, std::optional<diagnosis::Diagnosis> diagnosis = std::nullopt);
+                    const Subject& subject, std::optional<diagnosis::Diagnosis> diagnosis = std::nullopt,
+                    std::optional<discovery::Discovery> beyond = std::nullopt);
 
 struct JudgedProgress {
   std::function<void(const CalibrationProgress&)> calibration;
@@ -32,7 +34,8 @@ struct JudgedProgress {
 };
 
 // calibrate_recording, then, where recording and model disagree and `find_cause` is set, the diagnosis of the same
-// recording: some seconds more. A diagnosis that cannot be made leaves the cause open; it is no error.
+// recording: some seconds more, and where the catalogue explains nothing the search beyond it: up to a minute. What cannot
+// be made leaves the cause open; it is no error.
 Expected<JudgedResult> judged_calibration(const Recording& recording, const CalibrationOptions& options,
                                           const Limits& limits, const Subject& subject, bool find_cause,
                                           const JudgedProgress& progress = {}, const std::stop_token& stop = {});

@@ -181,7 +181,8 @@ nlohmann::ordered_json result_json(const JudgedResult& judged, const Calibration
     document["correlation"] = correlation_json(result);
   }
   if (judged.diagnosis) {
-    document["diagnosis"] = diagnosis_json(*judged.diagnosis, diagnosis::DiagnosisOptions().false_alarm_rate);
+    document["diagnosis"] = diagnosis_json(*judged.diagnosis, diagnosis::DiagnosisOptions().false_alarm_rate, {},
+                                           judged.beyond ? &*judged.beyond : nullptr);
   }
   return document;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
@@ -114,7 +115,10 @@ std::string named_cause(const Diagnosis& d) {
   return text + (moved.empty() ? "." : fmt::format("; {}.", moved));
 }
 
-std::string unexplained_cause(const Diagnosis& d) {
+std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
+  if (explains(beyond)) {
+    return discovered_figures(*beyond) + ".";
+  }
   std::string text;
   // The mean over all hides what few places hold.
   const bool hidden = std::abs(d.after.nis - 1.0) < 0.1;
@@ -130,6 +134,10 @@ std::string unexplained_cause(const Diagnosis& d) {
     const Finding& best = d.rejected.front();
     text +=
         fmt::format("; the best of the catalogue, {} ({}), leaves it", best.effect, figures_with_significance(best));
+  }
+  if (beyond != nullptr && explained_share(*beyond) > 0.0) {
+    text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
+                        100.0 * explained_share(*beyond));
   }
   return text + ".";
 }
@@ -192,7 +200,8 @@ Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate,
   return s;
 }
 
-Summary summary_of_inconsistency(const CalibrationResult& result, const Subject& subject, const Diagnosis* d) {
+Summary summary_of_inconsistency(const CalibrationResult& result, const Subject& subject, const Diagnosis* d,
+                                 const discovery::Discovery* beyond) {
   Summary s{SummaryStanding::bad, {}, {}, {}};
   if (d != nullptr && d->verdict == DiagnosisVerdict::data_fault) {
     s.verdict = "The recording is faulty, so none of the 24 values may be used.";
@@ -203,8 +212,11 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
     s.cause = named_cause(*d);
     s.next = subject.run > 0 ? fmt::format("selfcal amend {}", subject.run) : command("diagnose", subject);
   } else if (d != nullptr && d->unexplained) {
-    s.verdict = "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.";
-    s.cause = unexplained_cause(*d);
+    s.verdict =
+        explains(beyond)
+            ? fmt::format("These 24 values are biased by what no catalogue holds: {}.", discovered_words(*beyond))
+            : "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.";
+    s.cause = unexplained_cause(*d, beyond);
     s.next = command("diagnose", subject);
   } else {
     s.verdict = "Recording and model disagree: do not use these 24 values, their sigma is too small.";
@@ -212,6 +224,20 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
     s.next = command("diagnose", subject);
   }
   return s;
+}
+
+// Equations are written with the 24 beside them; where several explain the recording as well, a next rotation parts them.
+Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
+  if (!explains(beyond)) {
+    return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
+            unexplained_cause(d, beyond), command("diagnose", subject, "--split-schedule next.toml")};
+  }
+  const bool ambiguous = std::any_of(beyond->laws.begin(), beyond->laws.end(),
+                                     [](const discovery::DiscoveredLaw& law) { return law.ambiguous.size() > 1; });
+  return {SummaryStanding::bad,
+          fmt::format("The model leaves out what no catalogue holds: {}.", discovered_words(*beyond)),
+          unexplained_cause(d, beyond),
+          command("diagnose", subject, ambiguous ? "--next-experiment next.toml" : "--amended amended")};
 }
 
 Summary acceptable_summary(const CalibrationResult& result, const Subject& subject) {
@@ -224,14 +250,15 @@ Summary acceptable_summary(const CalibrationResult& result, const Subject& subje
 
 }  // namespace
 
-Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subject& subject, const Diagnosis* d) {
+Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subject& subject, const Diagnosis* d,
+                   const discovery::Discovery* beyond) {
   if (gate.acceptable()) {
     return acceptable_summary(result, subject);
   }
   switch (gate.objections.front().kind) {
     case ObjectionKind::data_fault:
     case ObjectionKind::unexplained:
-    case ObjectionKind::inconsistent: return summary_of_inconsistency(result, subject, d);
+    case ObjectionKind::inconsistent: return summary_of_inconsistency(result, subject, d, beyond);
     case ObjectionKind::not_converged:
       return {SummaryStanding::bad, "The passes did not settle: none of the 24 values may be used.",
               gate.objections.front().words + ".", command("diagnose", subject)};
@@ -240,7 +267,7 @@ Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subj
 }
 
 Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, const Subject& subject,
-                           const Diagnosis& d) {
+                           const Diagnosis& d, const discovery::Discovery* beyond) {
   if (gate.acceptable()) {
     return {SummaryStanding::good,
             fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d)),
@@ -249,16 +276,16 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
   switch (gate.objections.front().kind) {
     case ObjectionKind::nothing_to_amend:
       return {SummaryStanding::bad, "Nothing to amend: no equation was named in the recording.",
-              summary_of(d, subject).verdict, command("diagnose", subject)};
+              summary_of(d, subject, beyond).verdict, command("diagnose", subject)};
     case ObjectionKind::data_fault:
     case ObjectionKind::unexplained:
     case ObjectionKind::inconsistent:
-      return summary_of_inconsistency(result, {subject.recording, 0}, &d);  // amending again would not help
-    default: return summary_of(result, gate, subject, &d);
+      return summary_of_inconsistency(result, {subject.recording, 0}, &d, beyond);  // amending again would not help
+    default: return summary_of(result, gate, subject, &d, beyond);
   }
 }
 
-Summary summary_of(const Diagnosis& d, const Subject& subject) {
+Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   switch (d.verdict) {
     case DiagnosisVerdict::adequate:
       return {SummaryStanding::good,
@@ -270,9 +297,7 @@ Summary summary_of(const Diagnosis& d, const Subject& subject) {
       return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
               subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
                               : command("diagnose", subject, "--amended amended")};
-    case DiagnosisVerdict::none_of_the_above:
-      return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
-              unexplained_cause(d), command("diagnose", subject, "--split-schedule next.toml")};
+    case DiagnosisVerdict::none_of_the_above: return summary_beyond(d, subject, beyond);
     case DiagnosisVerdict::not_enough_information:
       return {SummaryStanding::open, "Recording and model may differ, but too little to say by what.",
               d.suspected.empty()

@@ -5,6 +5,7 @@
 
 #include "daemon/estimate/gate.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/discovery.hpp"
 #include "estimator/passes/calibration.hpp"
 #include "protocol/document/summary.hpp"
 
@@ -16,15 +17,17 @@ struct Subject {
   long long run = 0;
 };
 
-// Of the 24. `diagnosis`, where there is one of the same recording, names the cause of an inconsistency.
+// Of the 24. `diagnosis`, where there is one of the same recording, names the cause of an inconsistency; `beyond` is what the
+// search found where the catalogue explains nothing.
 Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subject& subject,
-                   const diagnosis::Diagnosis* diagnosis = nullptr);
+                   const diagnosis::Diagnosis* diagnosis = nullptr, const discovery::Discovery* beyond = nullptr);
 
 // Of the 24 as fitted together with what `diagnosis` named.
 Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, const Subject& subject,
-                           const diagnosis::Diagnosis& diagnosis);
+                           const diagnosis::Diagnosis& diagnosis, const discovery::Discovery* beyond = nullptr);
 
 // Of the question whether a recording holds physics beyond the model.
-Summary summary_of(const diagnosis::Diagnosis& diagnosis, const Subject& subject);
+Summary summary_of(const diagnosis::Diagnosis& diagnosis, const Subject& subject,
+                   const discovery::Discovery* beyond = nullptr);
 
 }  // namespace selfcal

@@ -251,7 +251,8 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     description = diagnosis::describe_empirically(data, diagnosis, arguments.false_alarm_rate);
   }
   if (arguments.json) {
-    nlohmann::ordered_json json = diagnosis_json(diagnosis, arguments.false_alarm_rate, (*opened)->file);
+    nlohmann::ordered_json json =
+        diagnosis_json(diagnosis, arguments.false_alarm_rate, (*opened)->file, beyond->found_or_null());
     if (*holdout) {
       json["holdout"] = holdout_json(**holdout);
     }
@@ -265,7 +266,8 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     fmt::print("{}\n", json.dump());
   } else {
     fmt::print("{}{}{}{}{}{}",
-               diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout)),
+               diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout),
+                              beyond->found_or_null()),
                diagnosis.unexplained ? dwell_table(data, diagnosis) : std::string(), beyond->text(),
                description ? empirical_text(*description) : std::string(), splits_text(*splits),
                *holdout ? holdout_text(**holdout) : std::string());

@@ -14,8 +14,10 @@
 
 namespace selfcal::cli {
 
-// Verdict, cause and next step, broken to `columns` (0: not broken), then the figures. `subject` is what the commands name.
-std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis, const Subject& subject, bool colour, int columns);
+// Verdict, cause and next step, broken to `columns` (0: not broken), then the figures. `subject` is what the commands name,
+// `beyond` what was found where the catalogue explains nothing.
+std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis, const Subject& subject, bool colour, int columns,
+                           const discovery::Discovery* beyond = nullptr);
 Summary summary_of_comparison(const diagnosis::Comparison& comparison);
 // The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
 nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate,

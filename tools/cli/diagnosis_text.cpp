@@ -42,6 +42,25 @@ std::string findings_text(const char* head, const std::vector<Finding>& findings
   return text + symbols_text(findings);
 }
 
+// What the equations leave of what they explain.
+std::string remainder_text(const Diagnosis& d) {
+  if (!d.remainder) {
+    return {};
+  }
+  std::string text =
+      fmt::format("\nremainder: {:.2g} % of the misfit, {} sigma; the sigma of the 24 holds what it may do to them\n",
+                  100.0 * d.remainder->share, number_text(d.remainder->sigma));
+  for (const diagnosis::FormLeft& f : d.remainder->forms) {
+    text += fmt::format("  {:>5.2g} %  {} differs from its equation: {}\n", 100.0 * f.share, f.effect, f.words);
+  }
+  if (!d.remainder->places.empty()) {
+    const Located& first = d.remainder->places.front();
+    text += fmt::format("  largest in {}: {} {}, {} sigma\n", first.words, number_text(first.size),
+                        first.axis.starts_with("gyro") ? "deg/h" : "ug", number_text(first.significance));
+  }
+  return text;
+}
+
 // Those of the 24 that the omission moved by three sigma and more, most first.
 std::string corrections_text(const Diagnosis& d) {
   const auto moved = [&](int k) { return std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k); };
@@ -100,8 +119,9 @@ std::string undetectable_text(const Diagnosis& d) {
 
 }  // namespace
 
-std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colour, int columns) {
-  std::string text = summary_text(summary_of(d, subject), colour, columns);
+std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colour, int columns,
+                           const discovery::Discovery* beyond) {
+  std::string text = summary_text(summary_of(d, subject, beyond), colour, columns);
   if (!d.faults.empty()) {
     text += "\nfaults of the data:\n";
     for (const auto& f : d.faults) {
@@ -112,6 +132,7 @@ std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colo
   text += '\n';
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
+  text += remainder_text(d);
   text += corrections_text(d);
   if (!d.before.accepted) {
     text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);

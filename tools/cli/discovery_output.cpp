@@ -102,38 +102,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
   return text;
 }
 
-void add_discovery(ordered_json& document, const Discovery& found,
-                   const std::optional<discovery::NextExperiment>& next) {
-  document["discovered"] = ordered_json::array();
-  for (const DiscoveredLaw& law : found.laws) {
-    ordered_json members = ordered_json::array();
-    for (const ClassMember& m : law.ambiguous) {
-      members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
-    }
-    document["discovered"].push_back({{"axis", name_of_axis(law.term.axis)},
-                                      {"expression", law.expression},
-                                      {"coefficient", law.coefficient},
-                                      {"sigma", law.sigma},
-                                      {"unit", unit_of_axis(law.term.axis)},
-                                      {"constants", constants_json(law.constants)},
-                                      {"significance", law.significance},
-                                      {"held_out_gain", law.held_out_gain},
-                                      {"share", law.share},
-                                      {"class", members}});
-  }
-  document["processes"] = ordered_json::array();
-  for (const discovery::DiscoveredProcess& p : found.processes) {
-    document["processes"].push_back({{"axis", name_of_axis(p.axis)},
-                                     {"process", discovery::name_of(p.kind)},
-                                     {"coefficient", p.size},
-                                     {"sigma", p.sigma},
-                                     {"unit", unit_of_axis(p.axis)},
-                                     {"log_likelihood_gain", p.log_likelihood_gain}});
-  }
-  document["discovery"] = {{"functions_tried", found.functions_tried},
-                           {"misfit_before", found.misfit_before},
-                           {"misfit_after", found.misfit_after},
-                           {"refused", found.refused}};
+void add_next_experiment(ordered_json& document, const std::optional<discovery::NextExperiment>& next) {
   if (next) {
     ordered_json positions = ordered_json::array();
     for (const GimbalPosition& p : next->schedule.positions) {

@@ -14,9 +14,8 @@
 namespace selfcal::cli {
 
 std::string discovery_text(const discovery::Discovery& found, const std::optional<discovery::NextExperiment>& next);
-// "discovered", "processes", "next_experiment" of the document.
-void add_discovery(nlohmann::ordered_json& document, const discovery::Discovery& found,
-                   const std::optional<discovery::NextExperiment>& next);
+// "next_experiment" of the document, where there is one.
+void add_next_experiment(nlohmann::ordered_json& document, const std::optional<discovery::NextExperiment>& next);
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried);
 nlohmann::ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried);
 std::vector<LawText> laws_of(const discovery::Discovery& found);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "protocol/recording/atomic_file.hpp"
@@ -97,9 +98,7 @@ std::string BeyondCatalogue::text() const {
 }
 
 void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {
-  if (found) {
-    add_discovery(document, *found, next);
-  }
+  add_next_experiment(document, next);
   if (!tried.empty()) {
     document["laws"] = trial_json(tried);
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/error.hpp"
 #include "tools/cli/command.hpp"
@@ -26,8 +27,9 @@ struct BeyondCatalogue {
   std::optional<discovery::NextExperiment> next;
   std::vector<discovery::TriedLaw> tried;
 
-  // Whether equations or processes were found.
-  bool explains() const { return found && (!found->laws.empty() || !found->processes.empty()); }
+  // Whether equations or processes were found that take away the misfit.
+  bool explains() const { return selfcal::explains(found_or_null()); }
+  const discovery::Discovery* found_or_null() const { return found ? &*found : nullptr; }
   std::string text() const;
   void add_to(nlohmann::ordered_json& document) const;
 };

@@ -19,8 +19,11 @@ bool significant(const diagnosis::FindingParameter& p) {
 
 std::string finding_text(const diagnosis::Finding& f) {
   const std::string words = effect_words(f.effect);
-  std::string text = fmt::format("  {}{}{}, {:.1f} sigma\n", f.effect, words == f.effect ? "" : ": ",
-                                 words == f.effect ? "" : words, f.significance);
+  // A share of 100 % belongs to the only name.
+  const std::string share =
+      f.share > 0.0 && f.share < 0.995 ? fmt::format(", {:.2g} % of the misfit", 100.0 * f.share) : "";
+  std::string text = fmt::format("  {}{}{}, {:.1f} sigma{}\n", f.effect, words == f.effect ? "" : ": ",
+                                 words == f.effect ? "" : words, f.significance, share);
   if (!f.equation.empty()) {
     text += fmt::format("    {}\n", f.equation);
   }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/judged_result.hpp"
@@ -71,12 +72,17 @@ Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recor
   if (!outcome.diagnosis) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, outcome.failure));
   }
-  Json document = diagnosis_json(*outcome.diagnosis, false_alarm_rate);
+  std::optional<discovery::Discovery> beyond;
+  if (outcome.diagnosis->unexplained) {
+    beyond = search_beyond(data, *outcome.diagnosis, [&line](const std::string& words) { line.show(words); });
+  }
+  const discovery::Discovery* found = beyond ? &*beyond : nullptr;
+  Json document = diagnosis_json(*outcome.diagnosis, false_alarm_rate, {}, found);
   if (outcome.diagnosis->faults.empty()) {
     document["map"] = report::misfit_map(data, *outcome.diagnosis);
   }
   page["diagnosis"] = std::move(document);
-  page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*outcome.diagnosis));
+  page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*outcome.diagnosis, found));
   return {};
 }
 

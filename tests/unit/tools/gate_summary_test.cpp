@@ -145,6 +145,38 @@ TEST(Summary, EveryVerdictOfTheDiagnosisHasASentence) {
   EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("3 gaps"));
 }
 
+// Accelerometers y and z with a new offset at each turn: what discovery finds stands where "nothing explains it" stood.
+TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
+  diagnosis::Diagnosis d = creep();
+  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
+  d.unexplained = true;
+  d.rejected = d.findings;
+  d.findings.clear();
+  discovery::Discovery found;
+  found.rows = 5000.0;
+  found.misfit_before = 24000.0;  // NIS 5.8
+  found.misfit_after = -50.0;     // NIS 0.99
+  EXPECT_THAT(summary_of(d, {"r.h5", 0}, &found).verdict, HasSubstr("nothing in the catalogue explains it"));
+  found.processes = {{discovery::ProcessKind::jump_per_turn, 4, 24.5, 4.2, 900.0},
+                     {discovery::ProcessKind::jump_per_turn, 5, 18.2, 3.1, 600.0}};
+  const Summary s = summary_of(d, {"r.h5", 0}, &found);
+  EXPECT_EQ(s.standing, SummaryStanding::bad);
+  EXPECT_THAT(s.verdict, HasSubstr("accel_y and accel_z take a new offset at each turn"));
+  EXPECT_THAT(s.cause, HasSubstr("accel_y: jump per turn, 24.5 +- 4.2 ug; accel_z: jump per turn, 18.2 +- 3.1 ug"));
+  EXPECT_THAT(s.cause, HasSubstr("NIS 5.8 becomes 0.99"));
+  EXPECT_EQ(s.next, "selfcal diagnose r.h5 --amended amended");
+  // The same in what `estimate`, a run and an amendment say.
+  const JudgedResult all = judged(inconsistent_result(), default_tolerance(), {}, {"r.h5", 0}, d, found);
+  EXPECT_THAT(all.summary.verdict, HasSubstr("accel_y and accel_z take a new offset at each turn"));
+  const Gate gate = judge_amended(inconsistent_result(), default_tolerance(), {}, d, 7, &found);
+  EXPECT_THAT(gate.objections.front().words, HasSubstr("accel_y and accel_z take a new offset at each turn"));
+  // What takes away a part is no explanation, but it is said.
+  found.misfit_after = 12000.0;
+  const Summary part = summary_of(d, {"r.h5", 0}, &found);
+  EXPECT_THAT(part.verdict, HasSubstr("nothing in the catalogue explains it"));
+  EXPECT_THAT(part.cause, HasSubstr("50 % of the misfit"));
+}
+
 TEST(Summary, IsBrokenToTheTerminalAndItsNextStepIsNeverCut) {
   const Summary summary{SummaryStanding::bad, "one two three four five six seven eight nine ten eleven twelve",
                         "why so", "selfcal diagnose /a/long/path/to/a/recording.h5 --split-schedule"};

@@ -45,6 +45,37 @@ function findingsTable(findings, id) {
   ], {id});
 }
 
+// What the letters of the equations stand for.
+function symbolsNote(findings) {
+  const all = Object.assign({}, ...findings.map((f) => objectOf(f.symbols)));
+  const words = Object.entries(all).map(([name, meaning]) => `${name}: ${textOf(meaning)}`);
+  return element('p', {class: 'note symbols'}, words.length > 0 ? words.join('; ') + '.' : '');
+}
+
+// Laws and processes that take away all but a tenth of the misfit.
+function explained(d) {
+  return d.unexplained && objectOf(d.discovery).explained_share >= 0.9;
+}
+
+function discoveredTable(d) {
+  const laws = listOf(d.discovered);
+  const processes = listOf(d.processes);
+  const all = [...laws, ...processes];
+  return table([
+    {title: 'sensor', cells: all.map((l) => textOf(l.axis)), class: 'left'},
+    {title: 'law', cells: [...laws.map((l) => textOf(l.expression)), ...processes.map((p) => textOf(p.process))], class: 'words'},
+    {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
+    {title: 'explains it as well', cells: all.map((l) => listOf(l.class).length > 1 ? `${l.class.length - 1} others` : '–'), class: 'words'},
+  ], {id: 'discovered'});
+}
+
+function remainderWords(r) {
+  const place = listOf(r.places)[0];
+  return element('p', {id: 'remainder'}, `${significant(100 * r.share, 2)} % of the misfit (${significant(r.sigma, 3)} σ) is left: `
+      + listOf(r.forms).map((f) => `${textOf(f.effect)} differs from its equation (${textOf(f.words)}, ${significant(100 * f.share, 2)} %)`).join('; ')
+      + `. ${place ? `Largest in ${textOf(place.words)}. ` : ''}The σ of the corrected values holds what it may do to them.`);
+}
+
 // Strongest first; those that chance makes too are grey.
 function placesTable(places) {
   const sorted = [...places].sort((a, b) => (b.significance ?? 0) - (a.significance ?? 0));
@@ -177,11 +208,18 @@ function showDiagnosisTables(d) {
   const rejected = listOf(d.rejected);
   const suspected = listOf(d.suspected);
   add(findings.length > 0 ? 'Before and after' : 'Recording against model', adequacyTable(objectOf(d.adequacy), findings.length > 0));
-  if (d.unexplained) {
+  const found = listOf(d.discovered).length + listOf(d.processes).length > 0;
+  if (found) {
+    add('Found beyond the catalogue', discoveredTable(d));
+  }
+  if (d.unexplained && !explained(d)) {
     add('What to do', adviceForUnexplained(d.adequacy));
   }
   if (findings.length > 0) {
-    add('Effects left out, best first', findingsTable(findings, 'findings'));
+    add('Effects left out, best first', findingsTable(findings, 'findings'), symbolsNote(findings));
+    if (d.remainder) {
+      add('What the equations leave of it', remainderWords(d.remainder));
+    }
     add('What the omission did to the 24', element('p', {class: 'note', id: 'corrections'}, correctionWords(listOf(d.parameters))));
   }
   if (suspected.length > 0) {
@@ -189,7 +227,7 @@ function showDiagnosisTables(d) {
         (f) => element('li', {}, `${textOf(f.effect)} (${significant(f.significance, 2)} σ): ${textOf(f.experiment) || 'a longer recording'}`))));
   }
   if (rejected.length > 0) {
-    add('Fitted best, but rejected by what remains', findingsTable(rejected, 'rejected'));
+    add('Fitted best, but rejected by what remains', findingsTable(rejected, 'rejected'), symbolsNote(rejected));
   }
   if (listOf(d.located).length > 0) {
     add('Largest misfits of the 24 alone, each place tested on its own', placesTable(d.located));
@@ -209,7 +247,7 @@ function showDiagnosis(report) {
     return;
   }
   document.getElementById('diagnosis-words').textContent =
-      `${verdictWords[d.verdict] || textOf(d.verdict)} False alarms: ${significant(100 * d.false_alarm_rate, 2)} % of recordings.`;
+      `${explained(d) ? '✘ The recording holds what no catalogue does; it is described below.' : verdictWords[d.verdict] || textOf(d.verdict)} False alarms: ${significant(100 * d.false_alarm_rate, 2)} % of recordings.`;
   const faults = listOf(d.data_faults);
   if (faults.length > 0) {
     document.getElementById('diagnosis-tables').append(element('h3', {}, 'Faults of the data'), element('ul', {}, ...faults.map(

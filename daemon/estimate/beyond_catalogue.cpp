@@ -1,0 +1,152 @@
+#include "daemon/estimate/beyond_catalogue.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "daemon/estimate/quantity_text.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/named_effects.hpp"
+#include "protocol/law_file/law_file.hpp"
+
+namespace selfcal {
+namespace {
+
+using discovery::DiscoveredLaw;
+using discovery::DiscoveredProcess;
+using discovery::Discovery;
+using discovery::ProcessKind;
+using nlohmann::ordered_json;
+
+constexpr std::size_t most_told = 3;  // equations in a sentence
+
+bool leaves_noise(const Discovery& found) { return found.misfit_after < 3.0 * std::sqrt(2.0 * found.rows); }
+
+std::string process_unit(const DiscoveredProcess& p) {
+  return fmt::format("{}{}", unit_of_axis(p.axis), p.kind == ProcessKind::random_walk ? "/sqrt(h)" : "");
+}
+
+// "accel_y and accel_z take a new offset at each turn"
+std::string processes_words(const Discovery& found, ProcessKind kind, const char* one, const char* several) {
+  std::vector<std::string_view> axes;
+  for (const DiscoveredProcess& p : found.processes) {
+    if (p.kind == kind) {
+      axes.push_back(name_of_axis(p.axis));
+    }
+  }
+  if (axes.empty()) {
+    return {};
+  }
+  const std::string_view last = axes.back();
+  axes.pop_back();
+  return axes.empty() ? fmt::format("{} {}", last, one)
+                      : fmt::format("{} and {} {}", fmt::join(axes, ", "), last, several);
+}
+
+}  // namespace
+
+std::optional<Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
+                                       const discovery::Progress& progress, const std::stop_token& stop) {
+  const discovery::Increments increments = discovery::without_named(data, diagnosis);
+  ImuData rest = data;
+  rest.delta_theta = increments.delta_theta;
+  rest.delta_v = increments.delta_v;
+  const CalibrationOutcome calibration = diagnosis::calibrate_still(rest, {}, stop);
+  if (!calibration.result) {
+    return std::nullopt;
+  }
+  discovery::DiscoveryOptions options;
+  options.stop = stop;
+  return discovery::discover(rest, *calibration.result, options, progress);
+}
+
+double explained_share(const Discovery& found) {
+  if (found.laws.empty() && found.processes.empty()) {
+    return 0.0;
+  }
+  return std::clamp(1.0 - found.misfit_after / std::max(1.0, found.misfit_before), 0.0, 1.0);
+}
+
+bool explains(const Discovery* found) {
+  constexpr double most = 0.9;
+  const bool any = found != nullptr && !(found->laws.empty() && found->processes.empty());
+  return any && (leaves_noise(*found) || explained_share(*found) >= most);
+}
+
+std::string discovered_words(const Discovery& found) {
+  std::vector<std::string> all;
+  for (const DiscoveredLaw& law : found.laws) {
+    all.push_back(fmt::format("{} follows {}", name_of_axis(law.term.axis), law.expression));
+  }
+  for (std::string words : {processes_words(found, ProcessKind::jump_per_turn, "takes a new offset at each turn",
+                                            "take a new offset at each turn"),
+                            processes_words(found, ProcessKind::random_walk, "has a bias that walks at random",
+                                            "have biases that walk at random")}) {
+    if (!words.empty()) {
+      all.push_back(std::move(words));
+    }
+  }
+  const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
+  all.resize(all.size() - more);
+  return fmt::format("{}{}", fmt::join(all, "; "), more > 0 ? fmt::format("; and {} more", more) : std::string());
+}
+
+std::string discovered_figures(const Discovery& found) {
+  std::vector<std::string> all;
+  for (const DiscoveredLaw& law : found.laws) {
+    all.push_back(fmt::format("{}: ({}) * {}", name_of_axis(law.term.axis),
+                              with_sigma(law.coefficient, law.sigma, std::string(unit_of_axis(law.term.axis))),
+                              law.expression));
+  }
+  for (const DiscoveredProcess& p : found.processes) {
+    all.push_back(fmt::format("{}: {}, {}", name_of_axis(p.axis), discovery::name_of(p.kind),
+                              with_sigma(p.size, p.sigma, process_unit(p))));
+  }
+  all.resize(std::min(all.size(), most_told));
+  const auto nis = [&](double misfit) { return 1.0 + misfit / std::max(1.0, found.rows); };
+  return fmt::format("{}; NIS {:.3g} becomes {:.3g}", fmt::join(all, "; "), nis(found.misfit_before),
+                     nis(found.misfit_after));
+}
+
+void add_discovery(ordered_json& document, const Discovery& found) {
+  document["discovered"] = ordered_json::array();
+  for (const DiscoveredLaw& law : found.laws) {
+    ordered_json constants = ordered_json::object();
+    for (const discovery::Constant& c : law.constants) {
+      constants[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
+    }
+    ordered_json members = ordered_json::array();
+    for (const discovery::ClassMember& m : law.ambiguous) {
+      members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
+    }
+    document["discovered"].push_back({{"axis", name_of_axis(law.term.axis)},
+                                      {"expression", law.expression},
+                                      {"coefficient", law.coefficient},
+                                      {"sigma", law.sigma},
+                                      {"unit", unit_of_axis(law.term.axis)},
+                                      {"constants", constants},
+                                      {"significance", law.significance},
+                                      {"held_out_gain", law.held_out_gain},
+                                      {"share", law.share},
+                                      {"class", members}});
+  }
+  document["processes"] = ordered_json::array();
+  for (const DiscoveredProcess& p : found.processes) {
+    document["processes"].push_back({{"axis", name_of_axis(p.axis)},
+                                     {"process", discovery::name_of(p.kind)},
+                                     {"coefficient", p.size},
+                                     {"sigma", p.sigma},
+                                     {"unit", unit_of_axis(p.axis)},
+                                     {"log_likelihood_gain", p.log_likelihood_gain}});
+  }
+  document["discovery"] = {{"functions_tried", found.functions_tried},
+                           {"misfit_before", found.misfit_before},
+                           {"misfit_after", found.misfit_after},
+                           {"explained_share", explained_share(found)},
+                           {"refused", found.refused}};
+}
+
+}  // namespace selfcal

@@ -1,0 +1,34 @@
+// What the search for laws (estimator/discovery) found where nothing in the catalogue explains a recording: for the summary, for
+// people and as JSON.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/discovery.hpp"
+
+namespace selfcal {
+
+// The search, on the recording less what was named. None where its calibration fails.
+std::optional<discovery::Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
+                                                  const discovery::Progress& progress = {},
+                                                  const std::stop_token& stop = {});
+
+// Of the misfit that the catalogue leaves, the share that laws and processes take away; 0 where none was found.
+double explained_share(const discovery::Discovery& found);
+// Laws or processes were found that take away all but a tenth of the misfit, or leave noise.
+bool explains(const discovery::Discovery* found);
+
+// "accel_y and accel_z take a new offset at each turn"; empty where nothing was found.
+std::string discovered_words(const discovery::Discovery& found);
+// "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
+std::string discovered_figures(const discovery::Discovery& found);
+
+// "discovered", "processes" and "discovery" of the document.
+void add_discovery(nlohmann::ordered_json& document, const discovery::Discovery& found);
+
+}  // namespace selfcal
