@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "daemon/estimate/quantity_text.hpp"
+#include "daemon/estimate/undetermined_text.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal {
@@ -87,6 +90,26 @@ std::string surroundings_text(const CalibrationResult& result, const Recording& 
                      number_text(result.accel_vrw / units::micro_g_per_sqrt_hz), number_text(result.position_sigma));
 }
 
+// Many undetermined parameters are one objection for people: the table marks them, undetermined_text says which.
+std::string objections_text(const Gate& gate) {
+  if (gate.acceptable()) {
+    return {};
+  }
+  const auto undetermined = [](const Objection& o) { return o.kind == ObjectionKind::undetermined; };
+  constexpr std::ptrdiff_t told_singly = 4;
+  const std::ptrdiff_t open = std::count_if(gate.objections.begin(), gate.objections.end(), undetermined);
+  std::string text = "objections:\n";
+  if (open > told_singly) {
+    text += fmt::format("  {} parameters not determined\n", open);
+  }
+  for (const Objection& objection : gate.objections) {
+    if (open <= told_singly || !undetermined(objection)) {
+      text += fmt::format("  {}\n", objection.words);
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string result_table(const JudgedResult& judged, const CalibrationOptions& options, const Recording& recording,
@@ -94,16 +117,8 @@ std::string result_table(const JudgedResult& judged, const CalibrationOptions& o
   std::string text = summary_text(judged.summary, colour, columns) + "\n";
   text += parameters_text(judged, options, colour) + "\n" + surroundings_text(judged.result, recording) +
           passes_text(judged.result);
-  for (const UndeterminedDirection& direction : judged.result.undetermined) {
-    text += fmt::format("undetermined: {}\n", direction.words);
-  }
-  if (!judged.gate.acceptable()) {
-    text += "objections:\n";
-    for (const Objection& objection : judged.gate.objections) {
-      text += fmt::format("  {}\n", objection.words);
-    }
-  }
-  return text;
+  text += undetermined_text(judged.result);
+  return text + objections_text(judged.gate);
 }
 
 }  // namespace selfcal

@@ -187,7 +187,8 @@ Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate,
       return s;
     default: break;
   }
-  s.verdict = those + " not determined to tolerance; the others may be used.";
+  s.verdict = same == sensor_parameter_count ? "None of the 24 parameters is determined to tolerance: none may be used."
+                                             : those + " not determined to tolerance; the others may be used.";
   s.next = result.undetermined.empty() || result.undetermined.front().supply.empty()
                ? std::string("selfcal plan --optimize")
                : fmt::format(
