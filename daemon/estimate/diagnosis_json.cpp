@@ -134,6 +134,7 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
     j["data_faults"].push_back(
         {{"id", f.id}, {"words", f.words}, {"first_sample", f.first_sample}, {"count", f.count}});
   }
+  j["nothing_turned"] = d.nothing_turned;
   j["base"] = d.calibration.moored ? "moored" : "still";
   j["parameters"] = ordered_json::array();
   for (int k = 0; k < sensor_parameter_count; ++k) {

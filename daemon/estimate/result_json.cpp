@@ -120,10 +120,24 @@ Json correlation_json(const CalibrationResult& result) {
   return rows;
 }
 
+std::string_view noise_source(const CalibrationResult& result) {
+  return result.noise_given ? "given" : result.noise_of_drift ? "drift" : "spectra";
+}
+
 Json noise_json(const CalibrationResult& result) {
-  return {{"gyro_arw_deg_per_sqrt_h", result.gyro_arw / units::degree_per_sqrt_hour},
+  Json walk = Json::array(), disturbed = Json::array();
+  for (const MotionModel& motion : result.noise.observation.motion) {
+    walk.push_back(walk_density(motion));
+  }
+  for (const Disturbance& d : result.noise.disturbed) {
+    disturbed.push_back({{"start_s", d.start_s}, {"end_s", d.end_s}, {"variance_factor", d.factor}});
+  }
+  return {{"source", noise_source(result)},
+          {"gyro_arw_deg_per_sqrt_h", result.gyro_arw / units::degree_per_sqrt_hour},
           {"accel_vrw_ug_per_sqrt_hz", result.accel_vrw / units::micro_g_per_sqrt_hz},
           {"position_sigma_m", result.position_sigma},
+          {"position_walk_m_per_sqrt_s", std::move(walk)},
+          {"disturbed", std::move(disturbed)},
           {"gyro_quantum_arcsec", result.gyro_quantum / units::arcsecond},
           {"accel_quantum_m_per_s", result.accel_quantum},
           {"base", result.moored ? "moored" : "still"}};

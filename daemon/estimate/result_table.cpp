@@ -78,6 +78,26 @@ std::string passes_text(const CalibrationResult& result) {
   return text;
 }
 
+// What the spectra do not show: the walk of position that a coarse quantum makes, and seconds disturbed from outside.
+std::string disturbed_text(const CalibrationResult& result) {
+  if (!result.noise_of_drift) {
+    return {};
+  }
+  const auto walk = [&](std::size_t axis) { return number_text(walk_density(result.noise.observation.motion[axis])); };
+  std::string text =
+      fmt::format("position walks by {}, {}, {} m/sqrt(s) (north, up, east): a coarse velocity quantum\n", walk(0),
+                  walk(1), walk(2));
+  const std::vector<Disturbance>& all = result.noise.disturbed;
+  if (!all.empty()) {
+    const auto worst = std::max_element(all.begin(), all.end(),
+                                        [](const Disturbance& a, const Disturbance& b) { return a.factor < b.factor; });
+    text += fmt::format(
+        "disturbed from outside in {} intervals of 1 s, which count for less: the worst at {:.0f} s, {} sigma\n",
+        all.size(), worst->start_s, number_text(std::sqrt(worst->factor)));
+  }
+  return text;
+}
+
 std::string surroundings_text(const CalibrationResult& result, const Recording& recording) {
   const Attitude& attitude = result.initial_attitude;
   return fmt::format("{}: {} samples, {:.0f} s, answer in {:.1f} s\n",
@@ -85,9 +105,11 @@ std::string surroundings_text(const CalibrationResult& result, const Recording& 
                      static_cast<double>(recording.size()) / recording.sample_rate_hz, result.elapsed_s) +
          fmt::format("attitude at the start: roll {:.4f}, pitch {:.4f}, heading {:.4f} deg\n",
                      attitude.roll / units::degree, attitude.pitch / units::degree, attitude.heading / units::degree) +
-         fmt::format("{} base; noise: ARW {} deg/sqrt(h), VRW {} ug/sqrt(Hz), position {} m\n",
-                     result.moored ? "moored" : "still", number_text(result.gyro_arw / units::degree_per_sqrt_hour),
-                     number_text(result.accel_vrw / units::micro_g_per_sqrt_hz), number_text(result.position_sigma));
+         fmt::format("{} base; noise {}: ARW {} deg/sqrt(h), VRW {} ug/sqrt(Hz), position {} m\n",
+                     result.moored ? "moored" : "still", result.noise_given ? "given" : "estimated",
+                     number_text(result.gyro_arw / units::degree_per_sqrt_hour),
+                     number_text(result.accel_vrw / units::micro_g_per_sqrt_hz), number_text(result.position_sigma)) +
+         disturbed_text(result);
 }
 
 // Many undetermined parameters are one objection for people: the table marks them, undetermined_text says which.

@@ -287,6 +287,16 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
 }
 
 Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
+  if (d.nothing_turned && d.verdict != DiagnosisVerdict::data_fault) {
+    return {SummaryStanding::open,
+            d.findings.empty() ? std::string("Nothing turned: no sensor effect can be told from motion of the base.")
+                               : fmt::format("Nothing turned, so only the noise was judged: {}.", named(d)),
+            fmt::format("NIS {:.3g}{}.", d.before.nis,
+                        d.calibration.noise.disturbed.empty()
+                            ? std::string()
+                            : fmt::format(", {} s disturbed from outside", d.calibration.noise.disturbed.size())),
+            "selfcal plan --optimize"};
+  }
   switch (d.verdict) {
     case DiagnosisVerdict::adequate:
       return {SummaryStanding::good,

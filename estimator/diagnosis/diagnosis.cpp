@@ -245,6 +245,7 @@ class Diagnoser {
   ImuData quiet_dwells();
   void name();
   void leave_unjudged();
+  void judge_noise_alone();
   void decide(const Naming& naming);
   void say(const std::string& words) const {
     if (say_) {
@@ -397,6 +398,24 @@ void Diagnoser::leave_unjudged() {
   d_.sigma = d_.calibration.sigma;
 }
 
+// The verdict on the noise needs no turn, and nothing else has one.
+void Diagnoser::judge_noise_alone() {
+  d_.nothing_turned = true;
+  const Consistency& consistency = d_.calibration.consistency;
+  for (Adequacy* a : {&d_.before, &d_.after}) {
+    a->nis = consistency.nis_mean;
+    a->log_p_white = std::log(consistency.whiteness_p_value);
+    a->accepted = consistency.verdict == Verdict::consistent;
+  }
+  judge_noise(d_.calibration, d_.calibration.noise, d_.noise, options_.assumed,
+              std::log(share_noise * options_.false_alarm_rate), d_.findings);
+  d_.verdict = d_.findings.empty() ? DiagnosisVerdict::not_enough_information : DiagnosisVerdict::named;
+  d_.mismatch = !d_.findings.empty();
+  d_.value = d_.value_as_named = d_.calibration.value;
+  d_.covariance = d_.calibration.covariance;
+  d_.sigma = d_.calibration.sigma;
+}
+
 DiagnosisOutcome Diagnoser::run() {
   say("data");
   d_.faults = find_data_faults(data_);
@@ -412,7 +431,12 @@ DiagnosisOutcome Diagnoser::run() {
     leave_unjudged();
     return {std::move(d_), {}};
   }
-  name();
+  const auto turns = [](const SegmentSummary& s) { return s.rotation; };
+  if (std::any_of(d_.calibration.segments.begin(), d_.calibration.segments.end(), turns)) {
+    name();
+  } else {
+    judge_noise_alone();
+  }
   if (options_.stop.stop_requested()) {
     return {std::nullopt, "stopped"};
   }

@@ -91,6 +91,8 @@ struct Diagnosis {
   DiagnosisVerdict verdict = DiagnosisVerdict::adequate;
   bool mismatch = false;
   bool unexplained = false;
+  // No rotation: a bias that changes and a base that moves look alike, and the 24 are open. Only the noise was judged.
+  bool nothing_turned = false;
   std::vector<DataFault> faults;
   std::vector<Finding> findings;   // best first
   std::vector<Finding> rejected;   // fitted best, but what remains says no

@@ -156,6 +156,9 @@ void Naming::relinearise() {
     }
     for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
       input_.sign = sign;
+      if (input_.held) {
+        break;
+      }
       const PassOutput out = run_pass(input_);
       input_.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
       input_.C_nb = out.C_nb;

@@ -28,12 +28,13 @@ CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions op
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop) {
   constexpr double largest_still_sigma = 3e-6;  // m: a calibration that asks for more does so because of an omission
   CalibrationOutcome outcome = calibrate(data, options, {}, stop);
-  if (outcome.result && !outcome.result->moored && !options.noise.position_sigma &&
+  if (outcome.result && !outcome.result->moored && !outcome.result->noise_of_drift && !options.noise.position_sigma &&
       outcome.result->position_sigma > largest_still_sigma) {
     options.noise.position_sigma = largest_still_sigma;
     outcome = calibrate(data, options, {}, stop);
   }
-  if (!options.noise.gyro_arw && !options.noise.accel_vrw && outcome.result && !outcome.result->moored) {
+  if (!options.noise.gyro_arw && !options.noise.accel_vrw && outcome.result && !outcome.result->moored &&
+      !outcome.result->noise_of_drift) {
     outcome = with_smaller_noise(data, options, std::move(outcome), stop);
   }
   return outcome;
@@ -42,9 +43,11 @@ CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions optio
 PassInput forward_pass(const ImuData& data, const CalibrationResult& calibration) {
   PassInput input;
   input.data = &data;
-  input.parameters = calibration.value;
-  input.C_nb = calibration.C_nb_start;
+  input.parameters = calibration.linearised_value;
+  input.C_nb = calibration.linearised_C_nb;
+  input.held = calibration.held;
   input.noise = calibration.noise;
+  input.force = calibration.noise_of_drift ? ForceSource::gravity : ForceSource::accelerometers;
   input.prior.parameter_sigma = 2.0 * plausible_limit();
   return input;
 }

@@ -9,10 +9,6 @@ namespace {
 
 constexpr double colours = 0.1;          // share of an interval's position variance from which it is modelled
 constexpr double least_log_gain = 10.0;  // of the likelihood, for three densities more
-constexpr double correlation_s = 1e5;    // of the walk: far beyond any recording
-
-// Walk of `density` (m/sqrt(s)) as an oscillation that never turns: variance 2 sigma^2 T/decay per interval.
-MotionModel walk(double density) { return {{{0.0, correlation_s, density * std::sqrt(0.5 * correlation_s)}}}; }
 
 // Climbs from `best` along one density after the other, by ever smaller factors; `top` is the value there. Velocity and
 // position trade against each other along a ridge: that takes many rounds.
@@ -51,7 +47,7 @@ PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& d) {
   PassInput changed = input;
   changed.noise.gyro_arw = d[0];
   changed.noise.accel_vrw = d[1];
-  changed.noise.observation.motion.fill(walk(d[2]));
+  changed.noise.observation.motion.fill(position_walk(d[2]));
   return changed;
 }
 
@@ -82,11 +78,10 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
 }
 
 bool refit_velocity_noise(PassInput& input, const std::function<double(const PassInput&)>& log_likelihood) {
-  const std::vector<Oscillation>& north = input.noise.observation.motion.front().oscillations;
-  if (north.size() != 1 || north.front().decay_s != correlation_s) {
+  const double density = walk_density(input.noise.observation.motion.front());
+  if (density == 0.0) {
     return false;
   }
-  const double density = north.front().sigma / std::sqrt(0.5 * correlation_s);
   const NoiseDensities before = {input.noise.gyro_arw, input.noise.accel_vrw, density};
   const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(input, d)); };
   NoiseDensities best = before;

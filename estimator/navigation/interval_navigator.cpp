@@ -30,14 +30,15 @@ struct IntervalNavigator::Moments {
 };
 
 IntervalNavigator::IntervalNavigator(const ImuData& data, const ParameterVector& parameters, const Matrix3& C_nb,
-                                     double sign, double interval_s, ExtraSignatures* extra)
+                                     double sign, double interval_s, ExtraSignatures* extra, ForceSource force)
     : data_(data),
       compensation_(parameters),
       site_(data.site),
       q_nb_(C_nb),
       sign_(sign),
       samples_per_interval_(static_cast<std::size_t>(std::max(1.0, std::round(interval_s * data.sample_rate_hz)))),
-      extra_(extra) {}
+      extra_(extra),
+      force_(force) {}
 
 double IntervalNavigator::sample_dt(std::size_t index) const {
   return index == 0 ? 1.0 / data_.sample_rate_hz : data_.time_s[index] - data_.time_s[index - 1];
@@ -134,6 +135,11 @@ void IntervalNavigator::close_block(Moments& m, double length) {
   const double rest2 = 0.5 * (rest * rest + dt * dt / 12.0);  // mean of (length - tau)^2 / 2 over the block
   m.block.C_nb = 0.5 * (m.C_block + m.C_now);
   const Matrix3& C = m.block.C_nb;
+  if (force_ == ForceSource::gravity) {
+    const Vector3 velocity = -dt * (C.transpose() * site_.gravity_n);
+    m.block.integrals.velocity_pos = velocity.cwiseMax(0.0);
+    m.block.integrals.velocity_neg = (-velocity).cwiseMax(0.0);
+  }
   const SensorIntegrals& s = m.block.integrals;
   add_accel_sensitivity(C, s, 1.0, m.A0);
   add_accel_sensitivity(C, s, rest, m.A1);

@@ -48,12 +48,18 @@ struct Interval {
   Vector9 drive;  // minus the drift of the computed position and velocity, zero attitude
 };
 
+// Where the sensitivities to force come from. Of the accelerometers' output they hold its noise: beside a quantum of
+// millimetres a second a scale factor then fits the noise itself (errors in variables). Gravity through the attitude
+// has none, and is all the force there is on a still base.
+enum class ForceSource { accelerometers, gravity };
+
 class IntervalNavigator {
  public:
   // C_nb: attitude at the start (forward) or at the end (reverse) of the recording. `data` and `extra` must outlive
   // the navigator.
   IntervalNavigator(const ImuData& data, const ParameterVector& parameters, const Matrix3& C_nb, double sign,
-                    double interval_s, ExtraSignatures* extra = nullptr);
+                    double interval_s, ExtraSignatures* extra = nullptr,
+                    ForceSource force = ForceSource::accelerometers);
 
   // Navigates the next interval; false at the end of the data.
   bool next(Interval& interval);
@@ -78,6 +84,7 @@ class IntervalNavigator {
   std::size_t samples_per_interval_;
   std::size_t done_ = 0;  // samples navigated so far
   ExtraSignatures* extra_;
+  ForceSource force_;
   Vector3 previous_angle_ = Vector3::Zero(), previous_velocity_ = Vector3::Zero();  // of the sample before, in time
   Vector3 angle_ = Vector3::Zero(), velocity_ = Vector3::Zero();
   std::size_t loaded_ = static_cast<std::size_t>(-1);

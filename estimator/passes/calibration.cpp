@@ -1,5 +1,7 @@
 #include "estimator/passes/calibration.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +11,7 @@
 #include "estimator/navigation/coarse_alignment.hpp"
 #include "estimator/passes/consistency.hpp"
 #include "estimator/passes/motion_fit.hpp"
+#include "estimator/passes/noise_fit.hpp"
 #include "estimator/passes/pass.hpp"
 
 namespace selfcal {
@@ -22,6 +25,9 @@ constexpr double first_moored_sigma = 0.2;     // m
 constexpr double least_position_sigma = 1e-6;  // m: a still base stands to micrometres
 constexpr int motion_rounds = 2;
 constexpr double fair_nis = 10.0;  // beyond it another heading is tried
+// Whatever is left out makes innovations larger than predicted. Where they are far smaller the densities were taken too
+// large: lines and a coarse quantum beside little white noise do that to a spectrum.
+constexpr double far_below_one = 0.5;
 
 ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale, double accel_angle, double gyro_scale,
                        double gyro_angle) {
@@ -33,6 +39,21 @@ ParameterVector groups(double accel_bias, double gyro_drift, double accel_scale,
   v.segment<3>(parameter::gyro_scale).setConstant(gyro_scale);
   v.segment<6>(parameter::gyro_misalignment).setConstant(gyro_angle);
   return v;
+}
+
+// NIS per degree of freedom from the median of the epochs: a few seconds disturbed from outside do not count.
+double typical_nis(const PassOutput& pass) {
+  constexpr double median_of_chi_squared_3 = 2.366;
+  std::vector<double> squares;
+  for (const Epoch& e : pass.epochs) {
+    squares.push_back(e.innovation.cwiseAbs2().cwiseQuotient(e.variance).sum());
+  }
+  if (squares.empty()) {
+    return 1.0;
+  }
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return *middle / median_of_chi_squared_3;
 }
 
 // What the passes hand on to each other, and the answer so far.
@@ -57,8 +78,12 @@ class Calibration {
   bool align();
   bool pass(double sign);
   bool settle(int least_passes);
+  void freeze_open_directions();
+  bool settle_at_last();
   bool fit_position_sigma();
   bool fit_base_motion();
+  bool spectra_mislead() const;
+  void fit_noise();
   CalibrationResult result();
   ParameterVector sigma() const {
     return last_.covariance.diagonal().segment<sensor_parameter_count>(last_.layout.parameters()).cwiseSqrt();
@@ -72,12 +97,15 @@ class Calibration {
   SensorNoise noise_;
   PassInput input_;
   PassOutput last_;
+  ParameterVector value_ = ParameterVector::Zero();  // the answer of the last pass
+  bool freeze_open_ = false;
   double next_sign_ = 1.0;
   std::vector<PassSummary> passes_;
   std::array<std::optional<ParameterVector>, 2> answers_;  // of the last forward and the last reverse pass
   double last_move_ = 0.0;                                 // in sigma, since the pass before
   double same_way_move_ = 0.0;                             // in sigma, since the last pass of the same direction
   bool converged_ = false;
+  bool noise_of_drift_ = false;
 };
 
 // One pass from where the last one ended; the next will go the other way.
@@ -97,14 +125,18 @@ bool Calibration::pass(double sign) {
   }
   const ParameterVector value =
       input_.parameters + last_.mean.segment<sensor_parameter_count>(last_.layout.parameters());
-  last_move_ = (value - input_.parameters).cwiseAbs().cwiseQuotient(sigma()).maxCoeff();
+  last_move_ = (value - value_).cwiseAbs().cwiseQuotient(sigma()).maxCoeff();
   std::optional<ParameterVector>& same_way = answers_[sign > 0.0 ? 0 : 1];
   same_way_move_ = same_way ? (value - *same_way).cwiseAbs().cwiseQuotient(sigma()).maxCoeff() : HUGE_VAL;
   same_way = value;
   passes_.push_back({direction, static_cast<double>(data_.size()) / data_.sample_rate_hz, last_.nis_mean, last_move_,
                      last_.history_s, last_.history_value, last_.history_sigma});
+  value_ = value;
   input_.parameters = value;
   input_.C_nb = last_.C_nb;
+  if (freeze_open_) {
+    freeze_open_directions();
+  }
   next_sign_ = -sign;
   if (options_.carried_covariance) {
     const int at = last_.layout.parameters();
@@ -126,6 +158,7 @@ bool Calibration::align() {
     const Matrix3 C_try = rotation_y(0.5 * M_PI * quadrant) * C_coarse;
     input_.C_nb = C_try;
     input_.parameters.setZero();
+    value_.setZero();
     passes_.clear();
     if (!pass(+1.0)) {
       return false;
@@ -140,6 +173,7 @@ bool Calibration::align() {
   }
   input_.C_nb = C_best;
   input_.parameters.setZero();
+  value_.setZero();
   passes_.clear();
   return pass(+1.0);
 }
@@ -160,6 +194,44 @@ bool Calibration::settle(int least_passes) {
     }
   }
   return true;
+}
+
+// Linearises the next pass where the parameters that the data leave open are zero, and the attitude what it would then be:
+// beyond first order nothing is known along such directions, and an iteration walks along them for ever. The answer
+// holds them all the same, to first order, as far as the prior lets them.
+void Calibration::freeze_open_directions() {
+  const int at = last_.layout.parameters();
+  const ParameterMatrix P = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
+  const ParameterVector& scale = options_.tolerance;
+  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> eigen(scale.cwiseInverse().asDiagonal() * P *
+                                                             scale.cwiseInverse().asDiagonal());
+  ParameterVector held = ParameterVector::Zero();
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (eigen.eigenvalues()(k) <= 1.0) {
+      const ParameterVector direction = eigen.eigenvectors().col(k);
+      held += direction * direction.dot(value_.cwiseQuotient(scale));
+    }
+  }
+  held = held.cwiseProduct(scale);
+  const Eigen::Matrix<double, 3, sensor_parameter_count> cross =
+      last_.covariance.block<3, sensor_parameter_count>(StateLayout::attitude, at);
+  const Vector3 phi = cross * P.ldlt().solve(held - value_);
+  input_.C_nb = matrix_from_rotation_vector(phi) * last_.C_nb;
+  input_.parameters = held;
+}
+
+// Where the passes do not settle, what the data leave open is held.
+bool Calibration::settle_at_last() {
+  constexpr int least_passes = 3;
+  if (!settle(least_passes)) {
+    return false;
+  }
+  if (converged_) {
+    return true;
+  }
+  freeze_open_ = true;
+  freeze_open_directions();
+  return settle(least_passes);
 }
 
 // A still base: the white position noise is the one with the greatest likelihood, from 1 um upwards by factors of 3;
@@ -207,6 +279,32 @@ bool Calibration::fit_base_motion() {
   return !stop_.stop_requested();
 }
 
+bool Calibration::spectra_mislead() const {
+  const NoiseOptions& given = options_.noise;
+  return !noise_.base_moves && !given.gyro_arw && !given.accel_vrw && !given.position_sigma &&
+         typical_nis(last_) < far_below_one;
+}
+
+// All densities from the drift of the navigation, with the walk that a coarse quantum makes of the position.
+void Calibration::fit_noise() {
+  PassInput trial = input_;
+  trial.sign = next_sign_;
+  const double scale = std::sqrt(typical_nis(last_));
+  const double walk = noise_.accel.quantum / std::sqrt(12.0 * data_.sample_rate_hz);  // one rounding a sample
+  const StillNoiseFit fit = fit_still_noise(
+      drift_series(trial), {scale * input_.noise.gyro_arw, scale * input_.noise.accel_vrw, first_still_sigma,
+                            Vector3::Constant(std::max(walk, least_position_sigma))});
+  input_.noise.gyro_arw = fit.noise.gyro_arw;
+  input_.noise.accel_vrw = fit.noise.accel_vrw;
+  input_.noise.observation.sigma = std::max(fit.noise.position_sigma, least_position_sigma);
+  for (int axis = 0; axis < 3; ++axis) {
+    input_.noise.observation.motion[static_cast<std::size_t>(axis)] = position_walk(fit.noise.position_walk(axis));
+  }
+  input_.noise.disturbed = fit.disturbed;
+  input_.force = ForceSource::gravity;
+  noise_of_drift_ = true;
+}
+
 CalibrationOutcome Calibration::run() {
   CalibrationOutcome stopped{std::nullopt, {"stopped"}};
   if (!align()) {
@@ -218,12 +316,14 @@ CalibrationOutcome Calibration::run() {
       return stopped;
     }
   } while (last_move_ > 1.0 && static_cast<int>(passes_.size()) < 6);
-  if (!options_.noise.position_sigma) {
+  if (spectra_mislead()) {
+    fit_noise();
+  } else if (!options_.noise.position_sigma) {
     if (noise_.base_moves ? !fit_base_motion() : !fit_position_sigma()) {
       return stopped;
     }
   }
-  if (!settle(3)) {
+  if (!settle_at_last()) {
     return stopped;
   }
   if (next_sign_ < 0.0 && !pass(next_sign_)) {  // end at the start: its attitude is part of the answer
@@ -234,7 +334,7 @@ CalibrationOutcome Calibration::run() {
 
 CalibrationResult Calibration::result() {
   CalibrationResult r;
-  r.value = input_.parameters;
+  r.value = value_;
   r.sigma = sigma();
   const int at = last_.layout.parameters();
   r.covariance = last_.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at);
@@ -246,11 +346,16 @@ CalibrationResult Calibration::result() {
   r.gyro_arw_sigma = noise_.gyro.white_sigma;
   r.gyro_quantum = noise_.gyro.quantum;
   r.accel_quantum = noise_.accel.quantum;
-  r.moored = input_.noise.observation.state_count() > 0;
-  r.consistency = judge_innovations(last_, converged_, last_move_);
+  r.moored = noise_.base_moves && input_.noise.observation.state_count() > 0;
+  r.noise_given = options_.noise.gyro_arw || options_.noise.accel_vrw || options_.noise.position_sigma;
+  r.noise_of_drift = noise_of_drift_;
+  r.consistency = judge_innovations(last_, converged_, last_move_, r.noise_given);
   r.segments = summarise_segments(segments_, last_);
 
   r.C_nb_start = last_.C_nb;
+  r.linearised_value = input_.parameters;
+  r.linearised_C_nb = input_.C_nb;
+  r.held = freeze_open_;
   r.attitude_sigma = last_.covariance.diagonal().segment<3>(StateLayout::attitude).cwiseSqrt();
   const bool gimbal = !data_.gimbal_outer.empty() && !data_.gimbal_inner.empty();
   const Matrix3 C_vb = gimbal ? gimbal_matrix(data_.gimbal_outer[0], data_.gimbal_inner[0]) : Matrix3::Identity();

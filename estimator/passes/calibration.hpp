@@ -94,15 +94,22 @@ struct CalibrationResult {
   ParameterVector value;  // SI
   ParameterVector sigma;  // SI
   std::array<bool, sensor_parameter_count> determined{};
-  std::array<bool, sensor_parameter_count> plausible{};  // inside the physically possible range
+  std::array<bool, sensor_parameter_count> plausible{};  // inside the possible range, or too poorly known to say
   ParameterMatrix covariance;                            // SI
   Matrix3 C_nb_start;                                    // attitude of the IMU at the first sample's start
+  // About what the next pass, from the start, would be linearised: value and C_nb_start, but for what the data leave
+  // open where the passes settled only without it (`held`).
+  ParameterVector linearised_value;  // SI
+  Matrix3 linearised_C_nb;
+  bool held = false;
   Attitude initial_attitude;  // of the vehicle, using the gimbal read-out there (zero where absent), rad
   Vector3 attitude_sigma;     // phi north, up, east at the start, rad
   double gyro_arw = 0.0, accel_vrw = 0.0, position_sigma = 0.0;  // in use; SI
   double gyro_arw_sigma = 0.0;                                   // of the density as found; 0: not stated
   double gyro_quantum = 0.0, accel_quantum = 0.0;                // found in the increments; rad, m/s; 0: none
   NoiseModel noise;                                              // in use, with the motion of a moored base
+  bool noise_given = false;                                      // a density, or the position's noise, was an option
+  bool noise_of_drift = false;                                   // the spectra mislead: noise_fit.hpp
   bool moored = false;                                           // coloured motion of the base was found and modelled
   std::vector<PassSummary> passes;
   std::vector<SegmentSummary> segments;

@@ -27,7 +27,7 @@ std::string format(const char* pattern, auto... values) {
 
 }  // namespace
 
-Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma) {
+Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma, bool noise_given) {
   Consistency c;
   const auto n = static_cast<double>(pass.epochs.size());
   c.nis_mean = pass.nis_mean;
@@ -70,9 +70,9 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
         c.nis_mean, c.autocorrelation, c.whiteness_p_value);
   } else if (c.nis_mean < c.nis_low - density_margin) {
     c.words = format(
-        "Nothing contradicts the model, but innovations are weaker than predicted (NIS %.3f): the noise given "
+        "Nothing contradicts the model, but innovations are weaker than predicted (NIS %.3f): the noise %s "
         "is larger than that of the data, and the sigmas are larger than they need be.",
-        c.nis_mean);
+        c.nis_mean, noise_given ? "given" : "estimated from the increments' spectra");
   } else {
     const char* colour = c.whiteness_p_value < 1e-3 ? "nearly white" : "white";
     c.words = format(
@@ -141,7 +141,8 @@ void judge_parameters(CalibrationResult& result, const ParameterVector& toleranc
   for (int i = 0; i < sensor_parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     result.determined[k] = result.sigma(i) <= tolerance(i);
-    result.plausible[k] = std::abs(result.value(i)) <= limit(i);
+    // A value known no better than to a third of the range says nothing about what is possible.
+    result.plausible[k] = std::abs(result.value(i)) <= limit(i) || 3.0 * result.sigma(i) > limit(i);
   }
   result.undetermined = undetermined_directions(result.covariance, tolerance);
 }

@@ -8,7 +8,7 @@
 namespace selfcal {
 
 // Innovations of the final pass.
-Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma);
+Consistency judge_innovations(const PassOutput& pass, bool converged, double parity_max_sigma, bool noise_given);
 
 std::vector<SegmentSummary> summarise_segments(const std::vector<Segment>& segments, const PassOutput& pass);
 

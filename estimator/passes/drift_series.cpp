@@ -41,21 +41,23 @@ class AxisFilter {
     q_bb_ = gravity * gravity * noise.gyro_arw * noise.gyro_arw * T;
   }
 
-  void propagate(double drift_p, double drift_v, bool turning) {
+  // `inflation`: of the noise in this interval and of the position observed at its end.
+  void propagate(double drift_p, double drift_v, bool turning, double inflation) {
+    inflation_ = inflation;
     step_rows(x_);
     x_(0) += drift_p;
     x_(1) += drift_v;
     step_rows(P_);
     step_columns(P_);
-    P_(0, 0) += q_pp_;
-    P_(0, 1) += q_pv_;
-    P_(1, 0) += q_pv_;
-    P_(1, 1) += q_vv_;
-    P_(2, 2) += q_bb_ + (turning ? turn_acceleration * turn_acceleration : 0.0);
+    P_(0, 0) += inflation * q_pp_;
+    P_(0, 1) += inflation * q_pv_;
+    P_(1, 0) += inflation * q_pv_;
+    P_(1, 1) += inflation * q_vv_;
+    P_(2, 2) += inflation * q_bb_ + (turning ? turn_acceleration * turn_acceleration : 0.0);
     for (std::size_t k = 0; k < steps_.size(); ++k) {
       const auto at = drift_states + 2 * static_cast<Eigen::Index>(k);
-      P_(at, at) += steps_[k].drive_variance;
-      P_(at + 1, at + 1) += steps_[k].drive_variance;
+      P_(at, at) += inflation * steps_[k].drive_variance;
+      P_(at + 1, at + 1) += inflation * steps_[k].drive_variance;
     }
   }
 
@@ -67,7 +69,7 @@ class AxisFilter {
       Ph += P_.col(at);
       predicted += x_(at);
     }
-    double variance = white_ + Ph(0);
+    double variance = inflation_ * white_ + Ph(0);
     for (Eigen::Index at = drift_states; at < x_.size(); at += 2) {
       variance += Ph(at);
     }
@@ -105,7 +107,7 @@ class AxisFilter {
     }
   }
 
-  double sT_, white_;
+  double sT_, white_, inflation_ = 1.0;
   double q_pp_ = 0.0, q_pv_ = 0.0, q_vv_ = 0.0, q_bb_ = 0.0;
   std::vector<OscillationStep> steps_;
   State x_;
@@ -125,6 +127,8 @@ DriftSeries drift_series(const PassInput& input) {
       series.position.emplace_back(interval.drive.segment<3>(StateLayout::position));
       series.velocity.emplace_back(interval.drive.segment<3>(StateLayout::velocity));
       series.turning.push_back(interval.angle_b.norm() > turning_rate * interval.length_s);
+      series.start_s.push_back(interval.start_s);
+      series.end_s.push_back(interval.end_s);
     }
   }
   return series;
@@ -139,7 +143,8 @@ void filter_axis(const DriftSeries& series, int axis, const DriftNoise& noise, c
   filter.update();  // where the pass begins the position is known as well
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    filter.propagate(series.position[i](axis), series.velocity[i](axis), series.turning[i]);
+    filter.propagate(series.position[i](axis), series.velocity[i](axis), series.turning[i],
+                     series.inflation.empty() ? 1.0 : series.inflation[i]);
     std::tie(out.value(k), out.variance(k)) = filter.update();
   }
   out.log_likelihood = -0.5 * (out.value.square() / out.variance + out.variance.log()).sum();

@@ -3,6 +3,22 @@
 #include <cmath>
 
 namespace selfcal {
+namespace {
+
+constexpr double walk_correlation_s = 1e5;
+
+}  // namespace
+
+// Variance 2 sigma^2 T/decay per interval.
+MotionModel position_walk(double density) {
+  return {{{0.0, walk_correlation_s, density * std::sqrt(0.5 * walk_correlation_s)}}};
+}
+
+double walk_density(const MotionModel& motion) {
+  const bool walk = motion.oscillations.size() == 1 && motion.oscillations.front().omega == 0.0 &&
+                    motion.oscillations.front().decay_s == walk_correlation_s;
+  return walk ? motion.oscillations.front().sigma / std::sqrt(0.5 * walk_correlation_s) : 0.0;
+}
 
 OscillationStep::OscillationStep(const Oscillation& oscillation, double interval_s) {
   const double damping = std::exp(-interval_s / oscillation.decay_s);

@@ -25,6 +25,12 @@ struct MotionModel {
   double unforeseen(double interval_s) const;
 };
 
+// A random walk of `density` (m/sqrt(s)): an oscillation that never turns and whose correlation, 1e5 s, lies far beyond
+// any recording. White noise of the accelerometers' integral (a coarse quantum, dither that leaks through) walks so.
+MotionModel position_walk(double density);
+// The density of such a walk; 0 for any other motion.
+double walk_density(const MotionModel& motion);
+
 // One interval of an oscillation: c' = cosine c - sine s, s' = sine c + cosine s, each plus noise.
 struct OscillationStep {
   double cosine = 0.0, sine = 0.0;  // damping included

@@ -1,5 +1,6 @@
 #include "estimator/passes/pass.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -70,6 +71,12 @@ UdFilter make_filter(const PassInput& input, const StateLayout& layout) {
 
 }  // namespace
 
+double NoiseModel::inflation(double time_s) const {
+  const auto after = std::upper_bound(disturbed.begin(), disturbed.end(), time_s,
+                                      [](double t, const Disturbance& d) { return t < d.end_s; });
+  return after != disturbed.end() && after->start_s <= time_s ? after->factor : 1.0;
+}
+
 PassOutput run_pass(const PassInput& input, const PassProgress& progress, const std::stop_token& stop,
                     PassObserver* observer) {
   PassOutput out;
@@ -77,7 +84,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   out.layout.extra_count = input.extra != nullptr ? input.extra->count() : 0;
   const StateLayout& layout = out.layout;
   UdFilter filter = make_filter(input, layout);
-  IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra);
+  IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra,
+                              input.force);
   DynamicModel model(
       input.noise.observation, input.interval_s,
       process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s, input.sign));
@@ -112,7 +120,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     model.Phi.topLeftCorner<9, 9>() = interval.Phi;
     model.drive.head<9>() = interval.drive;
     Gamma.topRows<9>() = interval.Gamma;
-    filter.propagate(model.Phi, Gamma, model.drive, model.L, model.q);
+    const double inflation = input.noise.inflation(0.5 * (interval.start_s + interval.end_s));
+    filter.propagate(model.Phi, Gamma, model.drive, model.L, inflation * model.q);
     ++index;
     if (std::abs(interval.length_s - input.interval_s) > 0.1 * input.interval_s) {
       continue;  // the remainder at the end of the data: noise and motion are those of a whole interval
@@ -125,7 +134,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     epoch.interval_middle_s = 0.5 * (interval.start_s + interval.end_s);
     for (int axis = 0; axis < 3; ++axis) {
       const VectorX& h = model.h[static_cast<std::size_t>(axis)];
-      const ScalarInnovation innovation = filter.update(h, 0.0, noise_variance);
+      const ScalarInnovation innovation = filter.update(h, 0.0, inflation * noise_variance);
       if (observer != nullptr) {
         observer->updated(axis, h, innovation, filter);
       }

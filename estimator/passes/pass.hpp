@@ -16,10 +16,19 @@
 
 namespace selfcal {
 
+// A stretch in which people, wind or a knock made the noise larger: its variance, by `factor`.
+struct Disturbance {
+  double start_s = 0.0, end_s = 0.0;
+  double factor = 1.0;
+};
+
 struct NoiseModel {
   double gyro_arw = 0.0;   // rad/s/sqrt(Hz)
   double accel_vrw = 0.0;  // m/s^2/sqrt(Hz)
   ObservationModel observation;
+  std::vector<Disturbance> disturbed;  // chronological, no two overlap
+  // Of the variance of an interval whose middle is at `time_s`.
+  double inflation(double time_s) const;
 };
 
 // 1 sigma before any data. The navigation part is wide enough to say nothing.
@@ -41,6 +50,8 @@ struct PassInput {
   NoiseModel noise;
   PriorModel prior;
   ExtraSignatures* extra = nullptr;
+  ForceSource force = ForceSource::accelerometers;
+  bool held = false;  // who iterates keeps the linearisation: along what the data leave open it would walk away
 };
 
 struct Epoch {

@@ -8,6 +8,7 @@
 
 #include "daemon/estimate/quantity_text.hpp"
 #include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/cli/finding_text.hpp"
 
@@ -21,13 +22,7 @@ constexpr double visible = 1e-6;  // information below which a bias in the dwell
 std::map<int, std::array<std::string, 6>> biases(const ImuData& data, const diagnosis::Diagnosis& d) {
   const diagnosis::RecordingContext context(data);
   diagnosis::SignaturePass pass(context, {}, true);
-  PassInput input;
-  input.data = &data;
-  input.parameters = d.calibration.value;
-  input.C_nb = d.calibration.C_nb_start;
-  input.noise = d.calibration.noise;
-  input.prior.parameter_sigma = 2.0 * plausible_limit();
-  const diagnosis::SignatureRows rows = pass.run(input);
+  const diagnosis::SignatureRows rows = pass.run(diagnosis::forward_pass(data, d.calibration));
   std::map<int, std::array<std::string, 6>> table;
   Eigen::Index column = pass.first_map_column();
   for (const LocatedColumn& m : pass.map()) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/report/page.hpp"
 
@@ -140,13 +141,7 @@ Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d) {
   Layout layout = lay_out(context, d.model);
   diagnosis::SignaturePass pass(context, layout.candidates, true);
   add_turns(pass, layout.cells);
-  PassInput input;
-  input.data = &data;
-  input.parameters = d.calibration.value;
-  input.C_nb = d.calibration.C_nb_start;
-  input.noise = d.calibration.noise;
-  input.prior.parameter_sigma = 2.0 * plausible_limit();
-  const diagnosis::SignatureRows rows = pass.run(input);
+  const diagnosis::SignatureRows rows = pass.run(diagnosis::forward_pass(data, d.calibration));
   const Eigen::VectorXd explained = rows.columns.leftCols(layout.model_size.size()) * layout.model_size;
 
   Json position = Json::array(), axis = Json::array(), bin = Json::array(), middle = Json::array();
