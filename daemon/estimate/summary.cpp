@@ -286,11 +286,28 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
   }
 }
 
+namespace {
+
+// Every kind of finding once.
+std::string kinds(const Diagnosis& d) {
+  std::string text;
+  std::vector<std::string> told;
+  for (const Finding& f : d.findings) {
+    if (std::find(told.begin(), told.end(), f.effect) == told.end()) {
+      text += fmt::format("{}{}", told.empty() ? "" : ", ", effect_words(f.effect));
+      told.push_back(f.effect);
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
 Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (d.nothing_turned && d.verdict != DiagnosisVerdict::data_fault) {
     return {SummaryStanding::open,
             d.findings.empty() ? std::string("Nothing turned: no sensor effect can be told from motion of the base.")
-                               : fmt::format("Nothing turned, so only the noise was judged: {}.", named(d)),
+                               : fmt::format("Nothing turned, so only the noise was judged: {}.", kinds(d)),
             fmt::format("NIS {:.3g}{}.", d.before.nis,
                         d.calibration.noise.disturbed.empty()
                             ? std::string()
