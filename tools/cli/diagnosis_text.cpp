@@ -31,15 +31,41 @@ std::string adequacy_text(const Diagnosis& d) {
   return text;
 }
 
+bool is_line(const Finding& finding) { return finding.parameters.size() == 2 && finding.parameters[1].unit == "Hz"; }
+
+// An engine makes dozens: one line each, the strongest first.
+std::string vibration_text(std::vector<Finding> lines) {
+  constexpr std::size_t most_lines = 8;
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const Finding& a, const Finding& b) { return a.significance > b.significance; });
+  std::string text = fmt::format("  {}: {}, {} of them{}\n", lines.front().effect, effect_words(lines.front().effect),
+                                 lines.size(), lines.size() > most_lines ? ", the strongest:" : ":");
+  for (std::size_t i = 0; i < std::min(most_lines, lines.size()); ++i) {
+    const diagnosis::FindingParameter &size = lines[i].parameters[0], &frequency = lines[i].parameters[1];
+    text += fmt::format("    {:<8} {:>6} Hz  {:>6} {:<5} {:>6} sigma\n", size.name, number_text(frequency.value),
+                        number_text(size.value), size.unit, number_text(lines[i].significance));
+  }
+  return text;
+}
+
 std::string findings_text(const char* head, const std::vector<Finding>& findings) {
   if (findings.empty()) {
     return {};
   }
-  std::string text = fmt::format("\n{}:\n", head);
+  constexpr std::size_t told_singly = 3;
+  std::vector<Finding> lines, others;
   for (const Finding& finding : findings) {
+    (is_line(finding) ? lines : others).push_back(finding);
+  }
+  if (lines.size() <= told_singly) {
+    others = findings;
+    lines.clear();
+  }
+  std::string text = fmt::format("\n{}:\n", head);
+  for (const Finding& finding : others) {
     text += finding_text(finding);
   }
-  return text + symbols_text(findings);
+  return text + (lines.empty() ? std::string() : vibration_text(lines)) + symbols_text(findings);
 }
 
 // What the equations leave of what they explain.
