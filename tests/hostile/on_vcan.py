@@ -34,7 +34,7 @@ SUBSET = {
     "state": "set state.state = 255",
     "schedule": "withhold 2E0201",
     "upload": "first frames for ever instead of a block",
-    "busy": "busyRepeatRequest once to TransferData",
+    "busy": "busyRepeatRequest once to TransferData from 3",
     "status": "status frames of ones",
     "read back": "set inactive.version = 7",
     "commit": "commit agreed to and not done",
@@ -48,6 +48,7 @@ def says(name):
             action = entry.get("action", "set")
             about = entry.get("field") or entry.get("signal") or entry.get("request", "")
             own = entry.get("name") or f"{action} {about}"
+            own += f" from {entry['at']}" if entry.get("at", 1) != 1 else ""
             names = [own] if "values" not in entry else [f"{own} = {v}" for v in entry["values"].split()]
             if name in names:
                 return entry.get("says", ""), entry.get("end", "failed")
@@ -97,6 +98,14 @@ class Trial:
     def _begin(self, unit):
         return unit.start_run("--schedule", self.schedule, "--force", "trial")
 
+    def _await_node(self, node, seconds=60.0):
+        """Until the man in the middle has both interfaces open: he prints the case's name then."""
+        end = time.monotonic() + seconds
+        while not self.log.read_bytes() and node.poll() is None and time.monotonic() < end:
+            time.sleep(0.05)
+        if node.poll() is not None or not self.log.read_bytes():
+            raise RuntimeError(f"hostile_node is not ready: {self.log.read_text(encoding='utf-8').strip()}")
+
     def play(self, name):
         """What was broken, as lines."""
         pattern, ending = says(name)
@@ -106,6 +115,7 @@ class Trial:
             node = subprocess.Popen([bench.BIN / "hostile_node", "--tester", "vcan0", "--ins", "vcan1", "--cases", CASES,
                                      "--case", name], stderr=log)
         try:
+            self._await_node(node)
             run, other = self._begin(self.hostile), self._begin(self.other)
             try:
                 document = self.hostile.wait_for_end(run, END_S)

@@ -30,6 +30,23 @@ class Operators(case.OnBench):
         self.assertEqual(unit.document(1)["state"], "aborted")
         self.assert_old_coefficients(unit)
 
+    def test_status_tells_how_the_bus_is(self):
+        """An INS that answers, one that is off, an interface that is down. It is asked every 6 s at the most."""
+        unit = self.bench().start()
+        self.addCleanup(subprocess.run, ["ip", "link", "set", unit.interface, "up"], check=False)
+        self.await_status(unit, f"bus               {unit.interface}: up, the INS answers\n")
+        unit.kill_ins()
+        self.await_status(unit, f"{unit.interface}: up, no answer to 0x640: no frame at all is on the bus")
+        subprocess.run(["ip", "link", "set", unit.interface, "down"], check=True)
+        self.await_status(unit, f"{unit.interface}: down (ip link set {unit.interface} up)")
+
+    def await_status(self, unit, words, seconds=30.0):
+        end = time.monotonic() + seconds
+        while words not in (text := unit.selfcal("status").stdout):
+            self.assertLess(time.monotonic(), end, f"'{words}' expected: {text}")
+            time.sleep(0.5)
+        print(text, end="", flush=True)
+
     @unittest.skipIf(os.getuid() != 0 or os.environ.get("VCAN_RUN") != "uml", "needs other users: user-mode Linux")
     def test_an_outsider_may_look_but_not_act(self):
         unit = self.bench().start()
