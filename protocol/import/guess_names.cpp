@@ -250,7 +250,7 @@ Role triad_role(const Words& w) {
       (inc && (holds(w, {"vel"}) || is_one_of(w, {"v"})))) {
     return Role::accelerometer;
   }
-  return Role::other;
+  return Role::unknown;
 }
 
 Role single_role(const Words& w) {
@@ -273,7 +273,12 @@ Role single_role(const Words& w) {
   if (holds(w, {"count", "index", "seq", "sample", "packet", "frame"}) || is_one_of(w, {"n", "i", "id", "nr", "no"})) {
     return Role::counter;
   }
-  return Role::other;
+  // Known, and of no use here.
+  if (holds(w, {"lat", "lon", "alt", "height", "press", "baro", "volt", "status", "flag", "mode", "sat", "vel", "quat",
+                "speed"})) {
+    return Role::other;
+  }
+  return Role::unknown;
 }
 
 }  // namespace

@@ -376,15 +376,32 @@ class Assigner {
     }
   }
 
+  bool is_angle(std::size_t column) const {
+    const std::string& unit = named_[column].unit;
+    const std::string& name = source_.names()[column];
+    const auto says = [&name](std::string_view word) {
+      return std::search(name.begin(), name.end(), word.begin(), word.end(),
+                         [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; }) != name.end();
+    };
+    return unit == "deg" || unit == "rad" || says("gimbal") || says("outer") || says("inner") || says("axis") ||
+           says("angle") || says("azimuth") || says("pitch") || says("yaw") || says("roll") || says("encoder");
+  }
+
   void tell_unused() {
     std::string rest;
+    std::string angle;
     for (std::size_t k = 0; k < values_.size(); ++k) {
       if (std::find(taken_.begin(), taken_.end(), k) == taken_.end()) {
         rest += fmt::format("{}{}", rest.empty() ? "" : ", ", source_.title(k));
+        angle = angle.empty() && is_angle(k) ? source_.title(k) : angle;
       }
     }
     if (!rest.empty()) {
       say("columns", fmt::format("not taken over: {}", rest));
+    }
+    if (!angle.empty() && !roles_.gimbal) {
+      doubt("gimbal",
+            fmt::format("{}: angles by the name, but no two columns side by side fit gravity and the turns", angle));
     }
   }
 

@@ -119,8 +119,8 @@ Field kind_of(std::string_view field, char decimal) {
   if (date_of(field)) {
     return Field::date;
   }
-  // What holds a separator or a digit is a sign that the text is split in the wrong way.
-  return field.find_first_of(",;\t 0123456789") == std::string_view::npos ? Field::word : Field::wrong;
+  // What holds a separator is a sign that the text is split in the wrong way.
+  return field.find_first_of(",;\t ") == std::string_view::npos ? Field::word : Field::wrong;
 }
 
 // Number of fields of a line of numbers (a date and a few words may be among them), 0 for any other.

@@ -113,7 +113,7 @@ def draw(rng):
     separator, decimal = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), (" ", ",")][rng.integers(7)]
     gyro_kind, accel_kind = [("rates", "rates"), ("rates", "rates"), ("increments", "increments"), ("rates", "increments"),
                              ("increments", "rates")][rng.integers(5)]
-    strangers = [s for s in ("magnetometer", "counter", "status", "height") if rng.random() < 0.15]
+    strangers = [s for s in ("magnetometer", "counter", "status", "height", "word") if rng.random() < 0.15]
     order = ["gyro", "accel", "gimbal", "temperature", *strangers]
     rng.shuffle(order)
     gyro_axes = signed_permutation(rng, 0.4)
@@ -154,7 +154,8 @@ def columns(rng, d, t):
         names = NAMES[group][kind][rng.integers(len(NAMES[group][kind]))]
         groups[group] = [(names[k], unit, text(values[:, k], 12)) for k in range(3)]
     read_outs = {"outer": t["outer"] * d.gimbal_signs[0], "inner": t["inner"] * d.gimbal_signs[1]}
-    gimbal_names = {"outer": "outer", "inner": "inner"} if rng.random() < 0.5 else dict(zip(d.gimbal_order, ("axis1", "axis2")))
+    gimbal_names = [{"outer": "outer", "inner": "inner"}, dict(zip(d.gimbal_order, ("axis1", "axis2"))),
+                    {"outer": "Kippwinkel", "inner": "Drehwinkel"}, {"outer": "pitch", "inner": "azimuth"}][rng.integers(4)]
     groups["gimbal"] = [(gimbal_names[w], d.gimbal_unit, text(read_outs[w] / ANGLES[d.gimbal_unit], 10)) for w in d.gimbal_order]
     c = t["temperature"]
     if d.temperature != "none":
@@ -164,6 +165,7 @@ def columns(rng, d, t):
     field = numpy.einsum("nji,j->ni", turn(2, t["outer"]) @ turn(1, t["inner"]), [18.0, -43.0, 5.0]) + rng.normal(0, 0.3, (n, 3))
     groups["magnetometer"] = [(f"m{a}", "", text(field[:, k], 5)) for k, a in enumerate("xyz")]
     groups["counter"] = [("packet", "", [str(k % 256) for k in range(n)])]
+    groups["word"] = [("unit", "", ["IMU-1"] * n)]
     groups["status"] = [("status", "", ["0"] * n)]
     groups["height"] = [("baro_height", "", text(480 + numpy.cumsum(rng.normal(0, 0.01, n)), 6))]
     result = []

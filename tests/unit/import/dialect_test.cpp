@@ -39,6 +39,14 @@ TEST(Dialect, ACommaAndABlankAreACommaAndABlank) {
   EXPECT_EQ(d->separator, ',');
 }
 
+TEST(Dialect, WordsAndDaysAmongTheNumbers) {
+  const auto d = dialect_of({"IMU1;17.05.2024;0,1;-2,5;3", "IMU1;17.05.2024;0,2;-2,4;4"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->separator, ';');
+  EXPECT_EQ(d->decimal, ',');
+  EXPECT_EQ(d->first_line, 1U);
+}
+
 TEST(Dialect, CommentsNamesInACommentAndALineOfUnits) {
   const auto d = dialect_of({"# made in 2024", "# t;gx;gy", "", "1;2;3", "4;5;6"});
   ASSERT_TRUE(d);
