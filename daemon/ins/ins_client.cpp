@@ -62,7 +62,7 @@ class Exchange {
 };
 
 // An answer that came, but makes no sense.
-tl::unexpected<PortError> senseless(const InsPort& port, const Error& error) {
+tl::unexpected<PortError> protocol_error(const InsPort& port, const Error& error) {
   return tl::unexpected<PortError>(
       PortError{PortError::Kind::protocol, 0, fmt::format("{}: {}", port.interface(), error.message)});
 }
@@ -74,7 +74,7 @@ Answer<Record> decoded(const InsPort& port, const Answer<Bytes>& bytes, Expected
   }
   auto record = decode(*bytes);
   if (!record) {
-    return senseless(port, record.error());
+    return protocol_error(port, record.error());
   }
   return std::move(*record);
 }
@@ -117,7 +117,7 @@ Task<Answer<Bytes>> InsClient::read_record(std::uint16_t did) {
       co_return Bytes(record->begin(), record->end());
     }
     if (attempt == attempts) {
-      co_return senseless(port_, record.error());
+      co_return protocol_error(port_, record.error());
     }
   }
 }
@@ -128,7 +128,7 @@ Task<Answer<Done>> InsClient::write_record(std::uint16_t did, Bytes record) {
     co_return tl::unexpected(response.error());
   }
   if (const auto well = uds::read_write_response(*response, did); !well) {
-    co_return senseless(port_, well.error());
+    co_return protocol_error(port_, well.error());
   }
   co_return Done{};
 }
@@ -140,7 +140,7 @@ Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t 
   }
   const auto record = uds::read_routine_response(*response, action, routine);
   if (!record) {
-    co_return senseless(port_, record.error());
+    co_return protocol_error(port_, record.error());
   }
   co_return Bytes(record->begin(), record->end());
 }
@@ -156,7 +156,7 @@ Task<Answer<InsClient::Identity>> InsClient::identify() {
   }
   Identity identity{text(*serial), text(*software)};
   if (identity.serial.empty()) {
-    co_return senseless(port_, {ErrorKind::device, "the INS tells an empty serial number"});
+    co_return protocol_error(port_, {ErrorKind::device, "the INS tells an empty serial number"});
   }
   co_return identity;
 }
@@ -169,7 +169,7 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   }
   const auto timings = uds::read_session_response(*response, uds::Session::extended);
   if (!timings) {
-    co_return senseless(port_, timings.error());
+    co_return protocol_error(port_, timings.error());
   }
   port_.take_timings(*timings);
   port_.keep_session(true);
@@ -179,21 +179,21 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   }
   const auto seed = uds::read_seed_response(*response);
   if (!seed) {
-    co_return senseless(port_, seed.error());
+    co_return protocol_error(port_, seed.error());
   }
   if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) {
     co_return Done{};
   }
   const auto secret = uds::answer_seed(key, *seed);
   if (!secret) {
-    co_return senseless(port_, secret.error());
+    co_return protocol_error(port_, secret.error());
   }
   response = co_await ask(uds::key_request(*secret), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
   if (auto well = uds::read_key_response(*response); !well) {
-    co_return senseless(port_, well.error());
+    co_return protocol_error(port_, well.error());
   }
   co_return Done{};
 }
@@ -224,7 +224,7 @@ Task<Answer<Done>> InsClient::reset() {
     co_return tl::unexpected(response.error());
   }
   if (const auto well = uds::read_reset_response(*response, uds::ResetType::hard); !well) {
-    co_return senseless(port_, well.error());
+    co_return protocol_error(port_, well.error());
   }
   co_return Done{};
 }
@@ -241,7 +241,7 @@ Task<Answer<Bytes>> InsClient::next_block(std::uint8_t block, std::uint32_t long
     }
     const auto part = uds::read_transfer_response(*response, block);
     if (!part) {
-      co_return senseless(port_, part.error());
+      co_return protocol_error(port_, part.error());
     }
     co_return Bytes(part->begin(), part->end());
   }
@@ -255,7 +255,7 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
   }
   const auto longest = uds::read_upload_response(*response);
   if (!longest) {
-    co_return senseless(port_, longest.error());
+    co_return protocol_error(port_, longest.error());
   }
   Bytes data;
   data.reserve(wanted);
@@ -267,7 +267,7 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
     }
     const std::size_t left = wanted - data.size();
     if (part->size() > left || part->size() < std::min(least_block_data, left)) {
-      co_return senseless(
+      co_return protocol_error(
           port_, {ErrorKind::device, fmt::format("TransferData: a block of {} bytes, {} to {} expected", part->size(),
                                                  std::min(least_block_data, left), left)});
     }
