@@ -18,7 +18,8 @@ struct Tolerance {
 
 // Hardly anybody writes an IMU's data so: only where a name says it, or where nothing else is as near.
 bool is_rare(std::string_view unit) {
-  return unit == "cm/s^2" || unit == "rpm" || unit == "arcmin" || unit == "rad/h" || unit == "mdeg/s" || unit == "cm/s";
+  return unit == "cm/s^2" || unit == "rpm" || unit == "arcmin" || unit == "rad/h" || unit == "mdeg/s" ||
+         unit == "cm/s" || unit == "mg*s";
 }
 
 std::string words(const UnitFit& fit) {

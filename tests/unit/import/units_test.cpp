@@ -1,0 +1,61 @@
+// Which unit fits the size of gravity and a turn, and what is ambiguous.
+#include <gmock/gmock.h>
+
+#include "protocol/import/guess_units.hpp"
+
+namespace selfcal::import {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+TEST(Units, GravityTellsTheUnitWhereOneFits) {
+  const auto fit = accelerometer_unit(9.81, 0.01, {});
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->unit, "m/s^2");
+  EXPECT_THAT(fit->rivals, IsEmpty());  // mg*s is 2 % off, and nobody's habit
+  const auto increments = accelerometer_unit(0.0981, 0.01, {});
+  ASSERT_TRUE(increments);
+  EXPECT_EQ(increments->unit, "m/s");
+  EXPECT_TRUE(increments->increments);
+}
+
+// At 10 Hz an increment of gravity is 0.981 m/s: a g of a sensor that is 2 % off.
+TEST(Units, WhatFitsTwiceIsTold) {
+  const auto fit = accelerometer_unit(0.981, 0.1, {});
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->unit, "m/s");
+  EXPECT_THAT(fit->rivals, ElementsAre("g (rates)"));
+  const auto named = accelerometer_unit(0.981, 0.1, {"g", false});
+  ASSERT_TRUE(named);
+  EXPECT_EQ(named->unit, "g");
+  EXPECT_THAT(named->rivals, IsEmpty());
+  // A count of 1.0 mg*s at 100 Hz is nearer to mg*s than to m/s^2.
+  const auto rare = accelerometer_unit(10.0, 0.01, {});
+  ASSERT_TRUE(rare);
+  EXPECT_THAT(rare->rivals, ElementsAre("mg*s (increments)"));
+}
+
+TEST(Units, ANameThatGravityContradictsIsNoUnit) {
+  EXPECT_FALSE(accelerometer_unit(9.81, 0.01, {"g", false}));
+  EXPECT_FALSE(accelerometer_unit(4096.0, 0.01, {}));  // counts
+  EXPECT_FALSE(gyro_unit(0.01, 0.01, {"deg/s", false}));
+}
+
+TEST(Units, TurnsTellRatesFromIncrements) {
+  // 0.01 rad a count and sample at 100 Hz: rad/s. 57 Hz: rad/s and degrees are the same to a per cent.
+  EXPECT_EQ(gyro_unit(0.01, 0.01, {}).value().unit, "rad/s");
+  EXPECT_EQ(gyro_unit(0.0174533, 0.01, {}).value().unit, "deg");
+  EXPECT_THAT(gyro_unit(0.0174533, 1.0 / 57.0, {}).value().rivals, ElementsAre("rad/s (rates)"));
+  EXPECT_EQ(gyro_unit(4.848e-8, 0.01, {}).value().unit, "deg/h");
+}
+
+TEST(Units, TimesThatMakeASampleRate) {
+  EXPECT_THAT(time_units(0.01), ElementsAre("s"));
+  EXPECT_THAT(time_units(10000), ElementsAre("us"));
+  EXPECT_THAT(time_units(0.1), ElementsAre("s", "ms"));  // 10 Hz or 10 kHz
+  EXPECT_THAT(time_units(1e12), IsEmpty());
+}
+
+}  // namespace
+}  // namespace selfcal::import
