@@ -50,10 +50,8 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
 
 std::optional<Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                        const discovery::Progress& progress, const std::stop_token& stop) {
-  const discovery::Increments increments = discovery::without_named(data, diagnosis);
-  ImuData rest = data;
-  rest.delta_theta = increments.delta_theta;
-  rest.delta_v = increments.delta_v;
+  const auto without = discovery::without_named(data, diagnosis);
+  const ImuData& rest = without.data();
   const CalibrationOutcome calibration = diagnosis::calibrate_still(rest, {}, stop);
   if (!calibration.result) {
     return std::nullopt;

@@ -116,11 +116,11 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_ra
   j["undetectable_here"] = ordered_json::array();
   j["expected_z"] = ordered_json::object();
   for (const auto& u : d.undetectable) {
-    j["undetectable_here"].push_back(u.effect);
-    j["expected_z"][u.effect] = u.expected_z;
+    j["undetectable_here"].push_back(u.effect->id);
+    j["expected_z"][u.effect->id] = u.expected_z;
   }
   for (const auto& u : d.detectable) {
-    j["expected_z"][u.effect] = u.expected_z;
+    j["expected_z"][u.effect->id] = u.expected_z;
   }
   j["unexplained"] = d.unexplained;
   if (d.remainder) {

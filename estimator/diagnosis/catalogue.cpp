@@ -1,6 +1,9 @@
 #include "estimator/diagnosis/catalogue.hpp"
 
-#include "estimator/diagnosis/effects/declare.hpp"
+#include <algorithm>
+#include <utility>
+
+#include "estimator/diagnosis/effects/families.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -22,35 +25,31 @@ void add_matrix(Columns columns, const Vector3& v) {
   }
 }
 
+std::vector<std::string> ids_of(const std::vector<const Effect*>& effects) {
+  std::vector<std::string> ids;
+  ids.reserve(effects.size());
+  for (const Effect* effect : effects) {
+    ids.push_back(effect->id);
+  }
+  return ids;
+}
+
+EffectConstant time_constant(std::span<const double> grid) {
+  return {.kind = EffectConstant::Kind::grid, .grid = grid, .name = "tau", .unit = "s", .physics_key = "tau_s"};
+}
+
 const std::vector<Effect>& catalogue() {
-  static const std::vector<Effect> all = {
-      imu_lever_arm(),
-      accel_gyro_time_offset(),
-      accel_relaxation(),
-      accel_bias_ramp(),
-      accel_temperature(),
-      accel_temperature_measured(),
-      accel_scale_temperature(),
-      accel_scale_temperature_measured(),
-      accel_quadratic(),
-      accel_cubic(),
-      gyro_scale_asymmetry(),
-      gyro_scale_nonlinearity(),
-      gyro_drift_ramp(),
-      gyro_temperature(),
-      gyro_temperature_measured(),
-      gyro_scale_temperature(),
-      gyro_scale_temperature_measured(),
-      gyro_dead_zone(),
-      gyro_g_sensitivity(),
-      gyro_magnetic_sensitivity(),
-      accel_size_effect(),
-      triad_flexure(),
-      accel_cross_coupling(),
-      base_settling(),
-      base_sway(),
-      wrong_site(),
-  };
+  static const std::vector<Effect> all = [] {
+    std::vector<Effect> effects;
+    for (auto* family : {thermal_effects, accelerometer_effects, gyro_effects, mounting_effects, base_effects}) {
+      for (Effect& effect : family()) {
+        effects.push_back(std::move(effect));
+      }
+    }
+    std::stable_sort(effects.begin(), effects.end(),
+                     [](const Effect& a, const Effect& b) { return a.place < b.place; });
+    return effects;
+  }();
   return all;
 }
 

@@ -1,4 +1,4 @@
-// The effects that the diagnosis can name. To add one: a file in effects/, its line in `declare` and in the list.
+// The effects that the diagnosis can name. To add one: a row and an equation in its family, effects/.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace selfcal::diagnosis {
 
-// All, the ones with fewer parameters before those that contain them.
+// All, in the order of their `place`. An effect is known by its address here.
 const std::vector<Effect>& catalogue();
 
 }  // namespace selfcal::diagnosis

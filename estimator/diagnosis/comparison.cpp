@@ -13,8 +13,6 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double largest_shift_s = 2.0;  // between the same turns of both
-// Of the false-alarm rate. Map, whiteness and size have a tenth each by themselves (judgement.hpp).
-constexpr double share_names = 0.5, share_structure = 0.1, share_parameters = 0.1;
 constexpr double rejection_rate = 0.01;  // of right names, by what they leave
 
 std::string schedules_differ(const ImuData& a, const ImuData& b) {
@@ -38,17 +36,17 @@ std::string schedules_differ(const ImuData& a, const ImuData& b) {
 
 // A recording, with effects taken out of its increments.
 struct Side {
-  explicit Side(const ImuData& original) : data(original) {}
+  explicit Side(const ImuData& original) : recording(original) {}
+  const ImuData& data() const { return recording.data(); }
   std::string calibrate(const DiagnosisOptions& options);
   std::string take_out(const Correction& correction, const DiagnosisOptions& options);
 
-  ImuData data;
-  AngleVelocity theta, velocity;  // behind `data`, once something was taken out
+  CorrectedRecording recording;
   CalibrationResult calibration;
 };
 
 std::string Side::calibrate(const DiagnosisOptions& options) {
-  CalibrationOutcome outcome = calibrate_still(data, options.calibration, options.stop);
+  CalibrationOutcome outcome = calibrate_still(data(), options.calibration, options.stop);
   if (outcome.result) {
     calibration = std::move(*outcome.result);
   }
@@ -56,27 +54,19 @@ std::string Side::calibrate(const DiagnosisOptions& options) {
 }
 
 std::string Side::take_out(const Correction& correction, const DiagnosisOptions& options) {
-  const ImuData original = data;
-  theta.assign(original.delta_theta.begin(), original.delta_theta.end());
-  velocity.assign(original.delta_v.begin(), original.delta_v.end());
-  subtract_effects(RecordingContext(original), forward_pass(original, calibration), correction, theta, velocity);
-  data.delta_theta = theta;
-  data.delta_v = velocity;
+  const ImuData original = data();
+  recording = CorrectedRecording(RecordingContext(original), forward_pass(original, calibration), correction);
   return calibrate(options);
 }
 
 // Equations that can be taken out of increments, and of a recording with or without a temperature channel.
 Correction carried(const std::vector<Chosen>& chosen, bool temperature) {
   Correction correction;
-  std::vector<double> sizes;
   for (const Chosen& c : chosen) {
-    const Effect& effect = *c.candidate.effect;
-    if (effect.sensor != nullptr && (temperature || !effect.needs_temperature)) {
-      correction.effects.push_back({&effect, c.candidate.constant, static_cast<int>(sizes.size()), c.candidate.count});
-      sizes.insert(sizes.end(), c.size.begin(), c.size.end());
+    if (temperature || c.candidate.effect->temperature != TemperatureUse::measured) {
+      correction.add(*c.candidate.effect, c.candidate.constant, c.size);
     }
   }
-  correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
   return correction;
 }
 
@@ -88,7 +78,7 @@ class Comparer {
         simulation_(simulation),
         options_(options),
         progress_(progress),
-        log_names_(std::log(share_names * options.false_alarm_rate)) {}
+        log_names_(std::log(budget_of_two.names * options.false_alarm_rate)) {}
 
   ComparisonOutcome run();
 
@@ -116,10 +106,10 @@ class Comparer {
 };
 
 std::string Comparer::take_out_common() {
-  const RecordingContext context(simulation_.data);
-  Naming naming(context, forward_pass(simulation_.data, simulation_.calibration), log_names_);
+  const RecordingContext context(simulation_.data());
+  Naming naming(context, forward_pass(simulation_.data(), simulation_.calibration), log_names_);
   naming.run({}, options_.stop);
-  const Correction common = carried(naming.chosen(), !recording_.data.temperature.empty());
+  const Correction common = carried(naming.chosen(), !recording_.data().temperature.empty());
   if (common.effects.empty()) {
     return {};
   }
@@ -153,8 +143,8 @@ const Eigen::VectorXd& Comparer::simulated_residual(const NoiseModel& asked) {
                      noise.accel_vrw == simulated_noise_.accel_vrw &&
                      noise.observation.sigma == simulated_noise_.observation.sigma;
   if (!known) {
-    const RecordingContext context(simulation_.data);
-    PassInput input = forward_pass(simulation_.data, simulation_.calibration);
+    const RecordingContext context(simulation_.data());
+    PassInput input = forward_pass(simulation_.data(), simulation_.calibration);
     input.noise = noise;
     simulated_residual_ = SignaturePass(context, {}, false).run(input).residual;
     simulated_noise_ = noise;
@@ -169,16 +159,17 @@ void Comparer::judge(const Naming& naming) {
   d.log_p_limit = naming.log_p_limit();
   d.located = naming.map_before().places;
   d.remaining = after.places;
-  d.before = adequacy(naming.square_before(), naming.rows(), naming.log_p_white_before(), naming.map_before(), alpha,
-                      moored());
-  d.after = adequacy(naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
+  d.before = adequacy(budget_of_two, naming.square_before(), naming.rows(), naming.log_p_white_before(),
+                      naming.map_before(), alpha, moored());
+  d.after =
+      adequacy(budget_of_two, naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
   for (const Chosen& c : naming.chosen()) {
     d.findings.push_back(describe(c, naming.rows()));
     d.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
   }
   bool jumps = false;
   for (const WalkTest& w : naming.walks()) {
-    const bool real = walks_inside_dwells(recording_.data, recording_.calibration.noise, w);
+    const bool real = walks_inside_dwells(recording_.data(), recording_.calibration.noise, w);
     jumps = jumps || !real;
     (real ? d.findings : d.rejected).push_back(describe(w, naming.rows()));
   }
@@ -186,8 +177,9 @@ void Comparer::judge(const Naming& naming) {
                    [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
   if (!moored()) {
     d.after.log_p_structure = naming.log_p_structure();
-    d.after.accepted = d.after.accepted && d.after.log_p_structure >
-                                               std::log(d.findings.empty() ? share_structure * alpha : rejection_rate);
+    d.after.accepted =
+        d.after.accepted &&
+        d.after.log_p_structure > std::log(d.findings.empty() ? budget_of_two.structure * alpha : rejection_rate);
   }
   const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
   d.after.accepted = d.after.accepted && !jumps && itself && !naming.entangled();
@@ -213,7 +205,7 @@ void Comparer::compare_parameters(const Naming& naming) {
 }
 
 double Comparer::attitude_difference() const {
-  const std::vector<Segment> first = find_segments(recording_.data), second = find_segments(simulation_.data);
+  const std::vector<Segment> first = find_segments(recording_.data()), second = find_segments(simulation_.data());
   const auto apart = [](double a, double b) { return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi)); };
   const Eigen::AngleAxisd start(recording_.calibration.C_nb_start.transpose() * simulation_.calibration.C_nb_start);
   double largest = std::abs(start.angle());
@@ -240,9 +232,10 @@ ComparisonOutcome Comparer::run() {
     return {std::nullopt, std::move(failure)};
   }
   say("difference");
-  const RecordingContext context(
-      recording_.data, [this](const NoiseModel& noise) -> const Eigen::VectorXd& { return simulated_residual(noise); });
-  PassInput input = forward_pass(recording_.data, recording_.calibration);
+  const RecordingContext context(recording_.data(), [this](const NoiseModel& noise) -> const Eigen::VectorXd& {
+    return simulated_residual(noise);
+  });
+  PassInput input = forward_pass(recording_.data(), recording_.calibration);
   input.noise = common_noise();
   Naming naming(context, input, log_names_);
   naming.run(progress_, options_.stop);
@@ -254,7 +247,7 @@ ComparisonOutcome Comparer::run() {
   Diagnosis& d = result_.diagnosis;
   const double z = result_.difference.cwiseAbs().cwiseQuotient(result_.sigma).maxCoeff();
   const bool same_parameters = log_corrected(log_chi_squared_tail(z * z, 1.0), sensor_parameter_count) >
-                               std::log(share_parameters * options_.false_alarm_rate);
+                               std::log(budget_of_two.parameters * options_.false_alarm_rate);
   d.mismatch = !d.findings.empty() || d.unexplained || !same_parameters;
   d.verdict = !d.findings.empty() ? DiagnosisVerdict::named
               : d.unexplained     ? DiagnosisVerdict::none_of_the_above

@@ -31,14 +31,18 @@ struct DiagnosisOptions {
 struct FindingParameter {
   std::string name, unit;
   double value = 0.0, sigma = 0.0;  // in the unit
+  std::string physics_key = {};     // its name in a physics file; empty: name and value are the file's too
+  double physics_value = 0.0;       // in that file's unit
 };
 
 struct Finding {
-  std::string effect;
+  std::string effect;              // its id, or that of a noise
+  const Effect* source = nullptr;  // of the catalogue; null: noise
   std::string equation, excited;
   std::vector<FindingParameter> parameters;
-  std::vector<std::string> equivalent;        // effects that explain the recording as well
-  std::map<std::string, double> probability;  // of every effect in this one's place, all equally likely before
+  std::vector<std::string> equivalent;        // ids of effects that explain the recording as well
+  std::vector<const Effect*> rivals;          // the same effects
+  std::map<std::string, double> probability;  // by id, of every effect in this one's place, all equally likely before
   std::string experiment;                     // what would tell them apart
   double significance = 0.0;                  // sigma, after correction for all that was tested
   double log_p = 0.0;                         // the same, natural logarithm
@@ -72,7 +76,7 @@ struct ModelEffect {
 };
 
 struct Undetectable {
-  std::string effect;
+  const Effect* effect = nullptr;
   double expected_z = 0.0;  // of its best coefficient at typical size
 };
 

@@ -27,7 +27,7 @@ void Evidence::restore(const std::vector<int>& at, const Eigen::VectorXd& size) 
 }
 
 // Woodbury: (I + Z C Z^T)^-1 = I - Z (C^-1 + Z^T Z)^-1 Z^T = I - Z C (I + J C)^-1 Z^T.
-void Evidence::absorb(const std::vector<int>& at, const Eigen::MatrixXd& covariance) {
+void Evidence::marginalise(const std::vector<int>& at, const Eigen::MatrixXd& covariance) {
   const Eigen::MatrixXd J = information(at, at);
   const auto n = J.rows();
   const Eigen::MatrixXd middle = covariance * (Eigen::MatrixXd::Identity(n, n) + J * covariance).inverse();
@@ -46,12 +46,9 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   Eigen::MatrixXd G = e.information(group, group);
   Eigen::VectorXd b = e.score(group);
   if (!others.empty()) {
-    const Eigen::MatrixXd A = e.information(others, others);
     const Eigen::MatrixXd X = e.information(others, group);
     const Eigen::VectorXd s = e.score(others);
-    Eigen::MatrixXd inverse = A;
-    inverse.diagonal().array() += 1e-6;  // sizes up to 1000 times the typical one
-    const Eigen::LDLT<Eigen::MatrixXd> solver(inverse);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(others, others));
     G -= X.transpose() * solver.solve(X);
     b -= X.transpose() * solver.solve(s);
   }
@@ -85,20 +82,20 @@ WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int
   WalkTest test;
   test.axis = axis;
   std::vector<double> time_h;
+  std::vector<int> columns;
   for (std::size_t k = 0; k < map.size(); ++k) {
     const bool segment = map[k].kind == LocatedColumn::Kind::dwell || map[k].kind == LocatedColumn::Kind::rotation;
     if (map[k].axis == axis && segment) {
-      test.columns.push_back(first_map_column + static_cast<int>(k));
+      test.places.push_back(static_cast<int>(k));
+      columns.push_back(first_map_column + static_cast<int>(k));
       time_h.push_back(0.5 * (map[k].start_s + map[k].end_s) / 3600.0);
     }
   }
-  Eigen::MatrixXd J = e.information(test.columns, test.columns);
-  Eigen::VectorXd b = e.score(test.columns);
+  Eigen::MatrixXd J = e.information(columns, columns);
+  Eigen::VectorXd b = e.score(columns);
   if (!others.empty()) {
-    Eigen::MatrixXd A = e.information(others, others);
-    A.diagonal().array() += 1e-6;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(A);
-    const Eigen::MatrixXd X = e.information(others, test.columns);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(others, others));
+    const Eigen::MatrixXd X = e.information(others, columns);
     J -= X.transpose() * solver.solve(X);
     b -= X.transpose() * solver.solve(Eigen::VectorXd(e.score(others)));
   }

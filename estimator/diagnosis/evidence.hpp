@@ -5,8 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/diagnosis/regression.hpp"
 #include "estimator/diagnosis/signature_pass.hpp"
-#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -17,11 +18,12 @@ struct Evidence {
   double square = 0.0;  // of the residuals
   double rows = 0.0;
 
+  Evidence() = default;
   explicit Evidence(const SignatureRows& rows);
   // Adds back what a correction had already taken out: columns `at`, sizes in typical sizes.
   void restore(const std::vector<int>& at, const Eigen::VectorXd& size);
   // Columns `at` become random, ~ N(0, covariance), and are integrated out.
-  void absorb(const std::vector<int>& at, const Eigen::MatrixXd& covariance);
+  void marginalise(const std::vector<int>& at, const Eigen::MatrixXd& covariance);
 
   Fit fit(const std::vector<int>& columns) const;
 };
@@ -41,12 +43,12 @@ GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, co
 
 // Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
 struct WalkTest {
-  int axis = 0;        // 0..2 gyro, 3..5 accelerometer
-  double gain = 0.0;   // twice the log-likelihood gained
-  double rate = 0.0;   // map units per sqrt(h)
-  double sigma = 0.0;  // of the rate, from the curvature
-  std::vector<int> columns;
-  Eigen::MatrixXd covariance;  // of the columns at that rate
+  int axis = 0;                // 0..2 gyro, 3..5 accelerometer
+  double gain = 0.0;           // twice the log-likelihood gained
+  double rate = 0.0;           // map units per sqrt(h)
+  double sigma = 0.0;          // of the rate, from the curvature
+  std::vector<int> places;     // of the map: the axis' dwells and rotations
+  Eigen::MatrixXd covariance;  // of their columns at that rate
 };
 WalkTest test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
                    const std::vector<int>& others);
@@ -60,7 +62,8 @@ double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& resi
 inline double searched_frequencies(double rows) { return std::max(1.0, rows / 6.0); }
 // So many constants of an effect were looked at: those of its grid, or the frequencies of a spectrum. At least 1.
 inline double variants(const Effect& effect, double rows) {
-  return effect.constants.empty() ? searched_frequencies(rows) : static_cast<double>(effect.constants.size());
+  return effect.constant.kind == EffectConstant::Kind::spectrum ? searched_frequencies(rows)
+                                                                : static_cast<double>(effect.constant.tried().size());
 }
 
 }  // namespace selfcal::diagnosis

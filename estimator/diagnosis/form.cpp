@@ -41,15 +41,15 @@ double rate(const EffectContext& c) {
   return c.rate.norm() / usual;
 }
 
-bool creeps(const Effect& e) { return e.id == "accel_relaxation"; }
-bool slow_curve(const Effect& e) { return e.id.ends_with("_temperature") || e.id.ends_with("_ramp"); }
+// What leaves other slow curves is one.
+bool slow_curve(const Effect& e) { return e.lack_of_fit != nullptr && !e.lack_of_fit->needs_gimbal; }
 
 }  // namespace
 
 std::vector<FormCandidate> forms_of(const Candidate& named) {
   std::vector<FormCandidate> all;
   const Effect& effect = *named.effect;
-  if (effect.sensor == nullptr || effect.id == "wrong_site") {
+  if (effect.sensor == nullptr || effect.data_fault != nullptr) {
     return all;
   }
   const auto modulated = [&](FormKind kind, double most, Modulation by) {
@@ -62,7 +62,7 @@ std::vector<FormCandidate> forms_of(const Candidate& named) {
                      {named.effect, named.constant * ratio, 0, 0}});
     }
   }
-  modulated(FormKind::in_turns, creeps(effect) ? held_by_turns : some_per_cent, in_turns);
+  modulated(FormKind::in_turns, effect.since_turns ? held_by_turns : some_per_cent, in_turns);
   modulated(FormKind::time, some_per_cent, time);
   for (const Modulation by : {force<0>, force<1>, force<2>, force_square<0>, force_square<1>, force_square<2>,
                               sine_outer, cosine_outer, sine_inner, cosine_inner}) {
@@ -87,9 +87,7 @@ struct Normal {
 Normal project(const Evidence& e, const std::vector<int>& columns, const std::vector<int>& named) {
   Normal n{e.information(columns, columns), e.score(columns)};
   if (!named.empty()) {
-    Eigen::MatrixXd A = e.information(named, named);
-    A.diagonal().array() += 1e-6;  // sizes up to 1000 times the typical one
-    const Eigen::LDLT<Eigen::MatrixXd> solver(A);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(named, named));
     const Eigen::MatrixXd X = e.information(named, columns);
     n.J -= X.transpose() * solver.solve(X);
     n.b -= X.transpose() * solver.solve(Eigen::VectorXd(e.score(named)));

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/corrected_recording.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -11,22 +12,17 @@ namespace {
 // The findings' equations as columns; what cannot be carried over is named.
 Correction carried(const Diagnosis& d, std::vector<std::string>& not_carried) {
   Correction correction;
-  std::vector<double> sizes;
   for (const ModelEffect& m : d.model) {
+    correction.add(*m.effect, m.constant, m.size);
     if (m.effect->sensor == nullptr) {
       not_carried.push_back(m.effect->id);
-      continue;
     }
-    correction.effects.push_back(
-        {m.effect, m.constant, static_cast<int>(sizes.size()), static_cast<int>(m.size.size())});
-    sizes.insert(sizes.end(), m.size.begin(), m.size.end());
   }
   for (const Finding& f : d.findings) {
     if (f.stochastic) {
       not_carried.push_back(f.effect);
     }
   }
-  correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
   return correction;
 }
 
@@ -39,7 +35,7 @@ HeldOutState state_of(const Diagnosis& d, const ImuData& data, const Calibration
   HeldOutState state;
   state.log_likelihood = rows.pass.log_likelihood;
   state.nis = rows.residual.squaredNorm() / static_cast<double>(rows.residual.size());
-  state.log_p_white = log_p_white(rows.residual);
+  state.log_p_white = test_whiteness(rows.residual).log_p;
   // Half of the first's own prior is shared by both where a parameter is not seen; those do not count.
   int seen = 0;
   for (int k = 0; k < sensor_parameter_count; ++k) {
@@ -63,7 +59,7 @@ HoldoutOutcome hold_out(const Diagnosis& d, const ImuData& second, const Diagnos
   Holdout result;
   const Correction correction = carried(d, result.not_carried);
   for (const Candidate& c : correction.effects) {
-    if (c.effect->needs_temperature && second.temperature.empty()) {
+    if (c.effect->temperature == TemperatureUse::measured && second.temperature.empty()) {
       return {std::nullopt, c.effect->id + " was found with a temperature channel, and the second recording has none"};
     }
   }
@@ -72,21 +68,14 @@ HoldoutOutcome hold_out(const Diagnosis& d, const ImuData& second, const Diagnos
     return {std::nullopt, "the second recording: " + without.failure.message};
   }
   const RecordingContext context(second);
-  AngleVelocity theta(second.delta_theta.begin(), second.delta_theta.end());
-  AngleVelocity velocity(second.delta_v.begin(), second.delta_v.end());
-  if (correction.size.size() > 0) {
-    subtract_effects(context, forward_pass(second, *without.result), correction, theta, velocity);
-  }
-  ImuData corrected = second;
-  corrected.delta_theta = theta;
-  corrected.delta_v = velocity;
-  const CalibrationOutcome with = calibrate_still(corrected, options.calibration);
+  const CorrectedRecording corrected(context, forward_pass(second, *without.result), correction);
+  const CalibrationOutcome with = calibrate_still(corrected.data(), options.calibration);
   if (!with.result) {
     return {std::nullopt, "the second recording, corrected: " + with.failure.message};
   }
   const NoiseModel& noise = with.result->noise;
   result.before = state_of(d, second, *without.result, noise, d.calibration.value, d.calibration.sigma);
-  result.after = state_of(d, corrected, *with.result, noise, d.value, d.sigma);
+  result.after = state_of(d, corrected.data(), *with.result, noise, d.value, d.sigma);
   result.gain = result.after.log_likelihood - result.before.log_likelihood;
   return {std::move(result), {}};
 }

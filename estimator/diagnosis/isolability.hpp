@@ -17,18 +17,28 @@ struct Experiment {
   std::string id;  // longer, slow_turns, dwells_45, tilted_base, second_heading
   std::string words;
   Schedule schedule;
-  double separation = 0.0;  // sigma, from the closest rival, with the present recording and this one
-  std::string closest;      // that rival
+  double separation = 0.0;          // sigma, from the closest rival, with the present recording and this one
+  const Effect* closest = nullptr;  // that rival
 };
 
 struct Split {
-  std::string effect;
-  std::vector<std::string> rivals;
+  const Effect* effect = nullptr;
+  std::vector<const Effect*> rivals;
   double separation_now = 0.0;
   std::vector<Experiment> experiments;  // best first
   // Rivals that hold the effect as a special case: nothing splits them, the fewer parameters are preferred.
-  std::vector<std::string> contain;
+  std::vector<const Effect*> contain;
 };
+
+// How far a rival, at its best constant, stays from the effect.
+struct Separation {
+  double square = 0.0;  // sigma^2
+  double share = 0.0;   // of the effect's own square
+  const Effect* closest = nullptr;
+};
+// `columns`: the effect, which has `size`, and every variant of its rivals, with their columns in G = Z^T Z.
+std::vector<Separation> separations(const Eigen::MatrixXd& G, const std::vector<Candidate>& columns,
+                                    const Eigen::VectorXd& size);
 
 // One entry per finding that has equivalents. `done`: the schedule of the recording, which the experiments vary.
 std::vector<Split> plan_splits(const Diagnosis& diagnosis, const ImuData& data, const Schedule& done);

@@ -34,9 +34,7 @@ std::string describe(const Located& l) {
 
 SingleTest::SingleTest(const Evidence& e, const std::vector<int>& fitted) : evidence_(e), fitted_(fitted) {
   if (!fitted.empty()) {
-    Eigen::MatrixXd A = e.information(fitted, fitted);
-    A.diagonal().array() += 1e-6;
-    solver_.compute(A);
+    solver_ = solver_beside(e.information(fitted, fitted));
     fitted_score_ = solver_.solve(Eigen::VectorXd(e.score(fitted)));
   }
 }
@@ -153,28 +151,6 @@ std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double i
                      log_corrected(-best, static_cast<double>(bins))});
   }
   return lines;
-}
-
-double log_p_white(const Eigen::VectorXd& residual) {
-  constexpr int lags = 20;
-  const Eigen::Index epochs = residual.size() / 3;
-  double sum = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    double square = 0.0;
-    for (Eigen::Index k = 0; k < epochs; ++k) {
-      square += residual(3 * k + axis) * residual(3 * k + axis);
-    }
-    for (int lag = 1; lag <= lags; ++lag) {
-      double product = 0.0;
-      for (Eigen::Index k = lag; k < epochs; ++k) {
-        product += residual(3 * k + axis) * residual(3 * (k - lag) + axis);
-      }
-      const auto n = static_cast<double>(epochs);
-      const double r = product / square;
-      sum += n * (n + 2.0) * r * r / (n - lag);  // Ljung and Box
-    }
-  }
-  return log_chi_squared_tail(sum, 3.0 * lags);
 }
 
 }  // namespace selfcal::diagnosis

@@ -65,7 +65,4 @@ struct InnovationLine {
 };
 std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double interval_s);
 
-// Portmanteau test on the normalised innovations, lags 1 to 20 of the three axes: log p.
-double log_p_white(const Eigen::VectorXd& residual);
-
 }  // namespace selfcal::diagnosis

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/multiplicity.hpp"
 #include "estimator/diagnosis/velocity_noise.hpp"
 #include "estimator/diagnosis/walk_check.hpp"
+#include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -17,22 +19,20 @@ constexpr int walk_axes = 6;
 constexpr int most_relinearisations = 4;
 constexpr double converged_sigma = 0.1;
 constexpr int steps = 3;  // of a constant to either side
-// Effects whose odds against the best are better than 1:100 stay in its class.
-const double class_log_odds = std::log(100.0);
 const double line_log_p = std::log(1e-4);
+
+bool of_spectrum(const Effect& effect) { return effect.constant.kind == EffectConstant::Kind::spectrum; }
 
 std::vector<Candidate> candidates_for(const RecordingContext& context, const std::vector<InnovationLine>& lines) {
   std::vector<Candidate> all;
   for (const Effect& effect : catalogue()) {
-    // With a channel, temperature is what it says; without, a warm-up.
-    const bool thermal = effect.id.ends_with("_temperature");
-    if (context.has_temperature() ? thermal && !effect.needs_temperature : effect.needs_temperature) {
+    if (!applies(effect, context.has_temperature())) {
       continue;
     }
-    for (const double constant : effect.constants) {
+    for (const double constant : effect.constant.tried()) {
       all.push_back({&effect, constant, 0, 0});
     }
-    if (effect.id == "base_sway") {
+    if (of_spectrum(effect)) {
       std::vector<double> known;
       for (const InnovationLine& line : lines) {
         const bool near =
@@ -51,64 +51,57 @@ std::vector<Candidate> candidates_for(const RecordingContext& context, const std
 
 Naming::Naming(const RecordingContext& context, PassInput input, double log_threshold)
     : context_(context),
-      input_(std::move(input)),
       log_threshold_(log_threshold),
-      pass_(context, candidates_for(context, {}), true),
-      rows_(pass_.run(input_)),
-      evidence_(rows_),
-      given_forms_(evidence_) {
-  lines_before_ = innovation_lines(rows_, input_.interval_s);
+      point_{std::move(input), CorrectedRecording(context.data())},
+      candidates_(candidates_for(context, {})) {
+  linearise();
+  lines_before_ = innovation_lines(model_.rows(), point_.input.interval_s);
   const bool lines = std::any_of(lines_before_.begin(), lines_before_.end(),
                                  [](const InnovationLine& l) { return l.log_p < line_log_p; });
   if (lines) {
-    pass_ = SignaturePass(context, candidates_for(context, lines_before_), true);
-    rows_ = pass_.run(input_);
-    evidence_ = Evidence(rows_);
+    candidates_ = candidates_for(context, lines_before_);
+    linearise();
   }
-  effective_tests_ = diagnosis::effective_tests(evidence_, pass_.candidates(), std::exp(log_threshold_));
-  map_before_ = locate(evidence_, pass_.map(), pass_.first_map_column(), {});
-  square_before_ = evidence_.square;
-  white_before_ = diagnosis::log_p_white(rows_.residual);
+  effective_tests_ = diagnosis::effective_tests(evidence(), candidates_, std::exp(log_threshold_));
+  map_before_ = locate(evidence(), model_.map(), model_.first_map_column(), {});
+  square_before_ = evidence().square;
+  white_before_ = test_whiteness(model_.rows().residual).log_p;
   for (const Effect& effect : catalogue()) {
-    Suspect prospect{effect.id, 0.0, 0.0};
-    for (const Candidate& c : pass_.candidates()) {
+    if (!applies(effect, context.has_temperature())) {
+      continue;
+    }
+    Suspect prospect{&effect, 0.0, 0.0};
+    for (const Candidate& c : model_.candidates()) {
       if (c.effect == &effect) {
-        const GroupTest test = test_group(evidence_, columns_of(c), {});
+        const GroupTest test = test_group(evidence(), columns_of(c), {});
         prospect.expected_z = std::max(prospect.expected_z, test.expected_z);
       }
     }
-    const auto same =
-        std::find_if(prospects_.begin(), prospects_.end(), [&](const Suspect& s) { return s.effect == effect.id; });
-    if (same == prospects_.end()) {
-      prospects_.push_back(prospect);
-    } else {
-      same->expected_z = std::max(same->expected_z, prospect.expected_z);
-    }
+    prospects_.push_back(prospect);
   }
 }
 
-std::vector<int> Naming::chosen_columns(std::size_t without) const {
-  std::vector<int> columns;
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    if (i != without) {
-      const std::vector<int> own = columns_of(chosen_[i].candidate);
-      columns.insert(columns.end(), own.begin(), own.end());
-    }
+std::vector<Candidate> Naming::terms() const {
+  std::vector<Candidate> all;
+  for (const Chosen& c : chosen_) {
+    all.push_back(c.candidate);
   }
-  return columns;
+  return all;
 }
+
+std::vector<int> Naming::chosen_columns(std::size_t without) const { return columns_of(terms(), without); }
 
 // The catalogue's on this recording (multiplicity.hpp) and the walks of six axes, each at the edge of its range.
 double Naming::independent_tests() const { return effective_tests_ + 0.5 * walk_axes; }
 
-// The frequency of a sway was looked for in a spectrum.
-double Naming::corrected(double log_p, const std::string& effect) const {
-  const double spectrum = effect == "base_sway" ? searched_frequencies(evidence_.rows) : 1.0;
-  return log_corrected(log_p, independent_tests() * spectrum);
+bool Naming::names(const Effect& effect) const {
+  return std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.effect == &effect; });
 }
 
+Significance Naming::significance() const { return {log_threshold_, independent_tests(), evidence().rows}; }
+
 void Naming::refit() {
-  const Fit fit = evidence_.fit(chosen_columns());
+  const Fit fit = evidence().fit(chosen_columns());
   Eigen::Index at = 0;
   for (Chosen& c : chosen_) {
     c.size = fit.value.segment(at, c.candidate.count);
@@ -117,59 +110,27 @@ void Naming::refit() {
   }
 }
 
+// What is chosen and lies in the increments, as fitted.
+Correction Naming::correction() const {
+  Correction correction;
+  for (const Chosen& c : chosen_) {
+    correction.add(*c.candidate.effect, c.candidate.constant, c.size);
+  }
+  return correction;
+}
+
+void Naming::linearise() {
+  model_ = LinearModel::about(context_, point_, candidates_, walks_, true);
+  candidates_ = model_.candidates();
+}
+
 // Takes the fitted effects out of the increments, lets the 24 settle again, and carries the signatures about the
 // new trajectory; until the sizes stand still.
 void Naming::relinearise() {
   refit();
   for (int round = 0; round < most_relinearisations; ++round) {
-    Correction correction;
-    std::vector<double> sizes;
-    applied_columns_.clear();
-    int first = 0;
-    for (const Chosen& c : chosen_) {
-      if (c.candidate.effect->sensor != nullptr) {
-        Candidate own = c.candidate;
-        own.first = first;
-        first += own.count;
-        correction.effects.push_back(own);
-        sizes.insert(sizes.end(), c.size.begin(), c.size.end());
-        const std::vector<int> columns = columns_of(c.candidate);
-        applied_columns_.insert(applied_columns_.end(), columns.begin(), columns.end());
-      }
-    }
-    correction.size = Eigen::Map<const Eigen::VectorXd>(sizes.data(), static_cast<Eigen::Index>(sizes.size()));
-    applied_ = correction.size;
-    correction_ = correction;
-    const ImuData& original = context_.data();
-    if (!sizes.empty()) {
-      theta_.assign(original.delta_theta.begin(), original.delta_theta.end());
-      velocity_.assign(original.delta_v.begin(), original.delta_v.end());
-      PassInput geometry = input_;
-      geometry.data = &original;
-      subtract_effects(context_, geometry, correction, theta_, velocity_);
-      corrected_view_ = original;
-      corrected_view_.delta_theta = theta_;
-      corrected_view_.delta_v = velocity_;
-      input_.data = &corrected_view_;
-    } else {
-      input_.data = &original;
-    }
-    for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
-      input_.sign = sign;
-      if (input_.held) {
-        break;
-      }
-      const PassOutput out = run_pass(input_);
-      input_.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
-      input_.C_nb = out.C_nb;
-    }
-    input_.sign = 1.0;
-    rows_ = pass_.run(input_);
-    evidence_ = Evidence(rows_);
-    evidence_.restore(applied_columns_, applied_);
-    for (const WalkTest& walk : walks_) {
-      evidence_.absorb(walk.columns, walk.covariance);
-    }
+    point_ = settle(context_, point_, correction());
+    linearise();
     const std::vector<Chosen> before = chosen_;
     refit();
     double move = 0.0;
@@ -177,7 +138,7 @@ void Naming::relinearise() {
       const Eigen::VectorXd sigma = chosen_[i].covariance.diagonal().cwiseSqrt();
       move = std::max(move, (chosen_[i].size - before[i].size).cwiseAbs().cwiseQuotient(sigma).maxCoeff());
     }
-    if (sizes.empty() || move < converged_sigma) {
+    if (point_.recording.taken_out().effects.empty() || move < converged_sigma) {
       break;
     }
   }
@@ -196,26 +157,15 @@ std::vector<double> Naming::gains_around(const Chosen& chosen, double step) {
       grid.push_back(c.candidate);
     }
   }
-  const std::size_t applied = grid.size();  // what the recording's correction took out comes back first
-  grid.insert(grid.end(), correction_.effects.begin(), correction_.effects.end());
-  SignaturePass pass(context_, grid, false);
-  const SignatureRows rows = pass.run(input_);
-  Evidence evidence(rows);
-  const auto columns_between = [&](std::size_t from, std::size_t to) {
-    std::vector<int> all;
-    for (std::size_t i = from; i < to; ++i) {
-      const std::vector<int> columns = columns_of(pass.candidates()[i]);
-      all.insert(all.end(), columns.begin(), columns.end());
-    }
-    return all;
-  };
-  const std::vector<int> others = columns_between(own, applied);
-  if (applied < grid.size()) {
-    evidence.restore(columns_between(applied, grid.size()), correction_.size);
+  const LinearModel model = LinearModel::about(context_, point_, grid, walks_, false);
+  std::vector<int> others;
+  for (std::size_t i = own; i < grid.size(); ++i) {
+    const std::vector<int> columns = columns_of(model.candidates()[i]);
+    others.insert(others.end(), columns.begin(), columns.end());
   }
   std::vector<double> gain;
   for (std::size_t i = 0; i < own; ++i) {
-    gain.push_back(test_group(evidence, columns_of(pass.candidates()[i]), others).gain);
+    gain.push_back(test_group(model.evidence(), columns_of(model.candidates()[i]), others).gain);
   }
   return gain;
 }
@@ -227,12 +177,12 @@ void Naming::refine_constant(Chosen& chosen) {
     return;
   }
   // The catalogue's grid may be wide: the top is followed along it, and by a factor of 2 beyond. A frequency has none.
-  const std::vector<double>& all = chosen.candidate.effect->constants;
+  const std::span<const double> all = chosen.candidate.effect->constant.grid;
   const double least = all.empty() ? HUGE_VAL : 0.5 * *std::min_element(all.begin(), all.end());
   const double most = all.empty() ? 0.0 : 2.0 * *std::max_element(all.begin(), all.end());
   // A frequency comes from a spectrum: it lies within half a bin.
-  const double bin = 1.0 / (chosen.candidate.constant * rows_.time_s.back());
-  const double coarse = chosen.candidate.effect->id == "base_sway" ? 0.25 * bin : 0.2;
+  const double bin = 1.0 / (chosen.candidate.constant * model_.rows().time_s.back());
+  const double coarse = of_spectrum(*chosen.candidate.effect) ? 0.25 * bin : 0.2;
   constexpr int most_moves = 8;
   for (const double step : {coarse, 0.2 * coarse}) {
     for (int move = 0; move < most_moves; ++move) {
@@ -251,172 +201,99 @@ void Naming::refine_constant(Chosen& chosen) {
       }
     }
   }
-  pass_.set_constant(chosen.candidate.first, chosen.candidate.constant);
+  for (Candidate& c : candidates_) {
+    c.constant = c.first == chosen.candidate.first ? chosen.candidate.constant : c.constant;
+  }
 }
 
 bool Naming::add_best() {
-  const std::vector<int> others = chosen_columns();
-  double best = 0.0, detected = 0.0;  // name by the one, presence by the other
-  const Candidate* winner = nullptr;
-  for (const Candidate& c : pass_.candidates()) {
-    const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
-      return x.candidate.effect->id == c.effect->id && c.effect->id != "base_sway";
-    });
-    const bool same =
-        std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.first == c.first; });
-    if (taken || same || fell(c)) {
-      continue;
-    }
-    const GroupTest test = test_group(given_forms(), columns_of(c), others);
-    const double log_p = corrected(test.log_detection, c.effect->id);
-    if (log_p < log_threshold_ && immaterial(c, test)) {
-      continue;
-    }
-    detected = std::min(detected, log_p);
-    if (test.log_p < best) {
-      best = test.log_p;
-      winner = &c;
-    }
-  }
-  const double best_equation = best;
-  // A walk has one coefficient, at the edge of its range (half a chi-squared), on one of six axes.
-  const WalkTest* walker = nullptr;
-  std::vector<WalkTest> tests;
-  tests.reserve(walk_axes);
+  const std::vector<int> fitted = chosen_columns();
+  std::vector<Candidate> alternatives;
+  std::copy_if(model_.candidates().begin(), model_.candidates().end(), std::back_inserter(alternatives),
+               [&](const Candidate& c) { return open(c); });
+  std::vector<WalkTest> walks;
   for (int axis = 0; axis < walk_axes; ++axis) {
-    tests.push_back(test_walk(given_forms(), pass_.map(), pass_.first_map_column(), axis, others));
-  }
-  for (const WalkTest& test : tests) {
-    const double log_p = log_chi_squared_tail(test.gain, 1.0);
-    const bool taken = within_form(test) || std::any_of(walks_.begin(), walks_.end(),
-                                                        [&](const WalkTest& w) { return w.axis == test.axis; });
-    if (!taken) {
-      detected = std::min(detected, corrected(log_p, test.axis < 3 ? "gyro_random_walk" : "accel_random_walk"));
-    }
-    if (!taken && log_p < best) {
-      best = log_p;
-      walker = &test;
+    if (std::none_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis == axis; })) {
+      walks.push_back(test_walk(given_forms(), model_.map(), model_.first_map_column(), axis, fitted));
     }
   }
-  if (detected > log_threshold_) {
+  std::erase_if(walks, [&](const WalkTest& w) { return within_form(w); });
+  const auto goes_on = [&](const WalkTest& walk) {
+    return walks_inside_dwells(context_.data(), point_.input.noise, walk);
+  };
+  const auto found = best_addition(given_forms(), fitted, alternatives, walks, significance(), goes_on,
+                                   [&](const Candidate& c, const GroupTest& test) { return immaterial(c, test); });
+  if (!found) {
     return false;
   }
-  // A walk can follow any slow curve. It is taken where it beats every equation by far; an equation whose constant is
-  // still on its grid gets the benefit.
-  constexpr double equation_share = 0.85;
-  constexpr double jump_share = 0.6;  // what jumps is no walk: an equation that comes near it is tried first
-  if (walker != nullptr && winner != nullptr) {
-    const bool real = walks_inside_dwells(context_.data(), input_.noise, *walker);
-    walker = best_equation < (real ? equation_share : jump_share) * best ? nullptr : walker;
-  }
-  if (walker != nullptr) {
-    walks_.push_back(*walker);
-    evidence_.absorb(walker->columns, walker->covariance);
+  if (found->walk) {
+    walks_.push_back(*found->walk);
+    model_.marginalise(*found->walk);
     refit();
     size_forms();
-  } else {
-    chosen_.emplace_back();
-    chosen_.back().candidate = *winner;
-    refine_constant(chosen_.back());
-    for (std::size_t i = 0; i + 1 < chosen_.size(); ++i) {  // they were found while this one was left out
-      refine_constant(chosen_[i]);
-    }
-    rows_ = pass_.run(input_);
-    evidence_ = Evidence(rows_);
-    if (!applied_columns_.empty()) {
-      evidence_.restore(applied_columns_, applied_);
-    }
-    relinearise();
+    return true;
   }
+  chosen_.emplace_back();
+  chosen_.back().candidate = *found->term;
+  refine_constant(chosen_.back());
+  for (std::size_t i = 0; i + 1 < chosen_.size(); ++i) {  // they were found while this one was left out
+    refine_constant(chosen_[i]);
+  }
+  linearise();
+  relinearise();
   return true;
 }
 
 // What fell once is not taken again: what was seen may be another's, and it would fall and be taken for ever.
 bool Naming::fell(const Candidate& candidate) const {
   return std::any_of(fallen_.begin(), fallen_.end(), [&](const Candidate& f) {
-    const bool line = f.effect->constants.empty();  // of a sway, one of several
-    return f.effect == candidate.effect && (!line || f.first == candidate.first);
+    return f.effect == candidate.effect && (!of_spectrum(*f.effect) || f.first == candidate.first);
   });
 }
 
-bool Naming::drop_weak() {
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const GroupTest test = test_group(given_forms(), columns_of(chosen_[i].candidate), chosen_columns(i));
-    if (corrected(test.log_detection, chosen_[i].candidate.effect->id) > log_threshold_) {
-      fallen_.push_back(chosen_[i].candidate);
-      chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(i));
-      relinearise();
-      return true;
-    }
-  }
-  return false;
+// Whether it may be taken: of the lines of a spectrum each once, of other effects one.
+bool Naming::open(const Candidate& candidate) const {
+  const bool same = std::any_of(chosen_.begin(), chosen_.end(),
+                                [&](const Chosen& x) { return x.candidate.first == candidate.first; });
+  return !same && !fell(candidate) && (of_spectrum(*candidate.effect) || !names(*candidate.effect));
 }
 
-// An early choice may have been the least bad name: each is held against every other candidate in its place.
-bool Naming::exchange() {
-  for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const std::vector<int> others = chosen_columns(i);
-    const Candidate own = chosen_[i].candidate;
-    double best = test_group(evidence_, columns_of(own), others).log_p - 1.0;
-    const Candidate* winner = nullptr;
-    for (const Candidate& c : pass_.candidates()) {
-      const bool taken = std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) {
-        return x.candidate.effect->id == c.effect->id;  // its own constant is refined already
-      });
-      if (taken || c.first == own.first) {
-        continue;
-      }
-      const double log_p = test_group(evidence_, columns_of(c), others).log_p;
-      if (log_p < best) {
-        best = log_p;
-        winner = &c;
-      }
-    }
-    if (winner != nullptr) {
-      chosen_[i].candidate = *winner;
-      refine_constant(chosen_[i]);
-      relinearise();
-      return true;
-    }
+bool Naming::drop_weak() {
+  const auto weak = weak_term(given_forms(), terms(), significance());
+  if (weak) {
+    fallen_.push_back(chosen_[*weak].candidate);
+    chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(*weak));
+    relinearise();
   }
-  return false;
+  return weak.has_value();
+}
+
+bool Naming::exchange() {
+  const auto found = better_exchange(evidence(), terms(), model_.candidates());
+  if (found) {
+    chosen_[found->term].candidate = found->by;
+    refine_constant(chosen_[found->term]);
+    relinearise();
+  }
+  return found.has_value();
 }
 
 void Naming::judge() {
   std::vector<int> fold;
-  for (const double t : rows_.time_s) {
+  for (const double t : model_.rows().time_s) {
     fold.push_back(static_cast<int>(context_.segment_at(t)));
   }
-  Eigen::VectorXd residual = rows_.residual;
-  if (!applied_columns_.empty()) {
-    residual += rows_.columns(Eigen::all, applied_columns_) * applied_;
-  }
+  const Eigen::VectorXd residual = model_.residual();
   const std::vector<int> all = chosen_columns();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     Chosen& c = chosen_[i];
     const std::vector<int> others = chosen_columns(i);
-    const GroupTest own = test_group(evidence_, columns_of(c.candidate), others);
     const GroupTest marginal = test_group(given_forms(), columns_of(c.candidate), others);
     c.gain = marginal.gain;
     c.rank = marginal.rank;
-    c.log_p = corrected(marginal.log_detection, c.candidate.effect->id);
-    c.held_out = held_out_gain(rows_.columns, residual, fold, all, others);
-    c.equivalent.clear();
-    for (const Candidate& rival : pass_.candidates()) {
-      const std::string& id = rival.effect->id;
-      const bool listed =
-          id == c.candidate.effect->id || std::find(c.equivalent.begin(), c.equivalent.end(), id) != c.equivalent.end();
-      const bool chosen =
-          std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.effect->id == id; });
-      if (listed || chosen) {
-        continue;
-      }
-      const GroupTest test = test_group(evidence_, columns_of(rival), others);
-      // As good a likelihood, or one that only its further coefficients cost: an effect that contains the other.
-      if (test.log_p < own.log_p + class_log_odds || (test.gain > own.gain - 2.0 && test.log_p < 0.8 * own.log_p)) {
-        c.equivalent.push_back(id);
-      }
-    }
+    c.log_p = significance().corrected(marginal.log_detection, *c.candidate.effect);
+    c.held_out = held_out_gain(model_.rows().columns, residual, fold, all, others);
+    c.equivalent = equivalents(evidence(), terms(), i, model_.candidates());
   }
   std::stable_sort(chosen_.begin(), chosen_.end(), [](const Chosen& a, const Chosen& b) { return a.log_p < b.log_p; });
 }
@@ -447,7 +324,7 @@ void Naming::run(const std::function<void(const std::string&)>& progress, const 
 void Naming::refit_noise() {
   const auto log_likelihood = [&](const PassInput& trial) { return log_likelihood_as_named(trial); };
   bool fallen = !chosen_.empty() || !walks_.empty();
-  while (fallen && refit_velocity_noise(input_, log_likelihood)) {
+  while (fallen && refit_velocity_noise(point_.input, log_likelihood)) {
     relinearise();
     fallen = drop_weak();
   }
@@ -456,17 +333,15 @@ void Naming::refit_noise() {
 std::vector<Suspect> Naming::suspects() const {
   std::vector<Suspect> all;
   const std::vector<int> others = chosen_columns();
-  for (const Candidate& c : pass_.candidates()) {
-    const bool chosen = std::any_of(chosen_.begin(), chosen_.end(),
-                                    [&](const Chosen& x) { return x.candidate.effect->id == c.effect->id; });
-    if (chosen) {
+  for (const Candidate& c : model_.candidates()) {
+    if (names(*c.effect)) {
       continue;
     }
     const GroupTest test = test_group(given_forms(), columns_of(c), others);
-    const double log_p = corrected(test.log_detection, c.effect->id);
-    const auto same = std::find_if(all.begin(), all.end(), [&](const Suspect& s) { return s.effect == c.effect->id; });
+    const double log_p = significance().corrected(test.log_detection, *c.effect);
+    const auto same = std::find_if(all.begin(), all.end(), [&](const Suspect& s) { return s.effect == c.effect; });
     if (same == all.end()) {
-      all.push_back({c.effect->id, log_p, test.expected_z});
+      all.push_back({c.effect, log_p, test.expected_z});
     } else {
       same->log_p = std::min(same->log_p, log_p);
       same->expected_z = std::max(same->expected_z, test.expected_z);

@@ -8,33 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/chosen.hpp"
 #include "estimator/diagnosis/form.hpp"
+#include "estimator/diagnosis/linear_model.hpp"
 #include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/selection.hpp"
 
 namespace selfcal::diagnosis {
-
-struct Chosen {
-  Candidate candidate;          // columns as in the naming's candidates
-  double constant_sigma = 0.0;  // of the candidate's constant, from the curvature of the likelihood
-  int derivative = -1;          // first column of its derivative by the constant's logarithm, once averaged
-  std::vector<Candidate>
-      constants;         // the same effect with constants about its own, columns of their own, once averaged
-  Eigen::VectorXd size;  // fitted, in typical sizes
-  Eigen::MatrixXd covariance;
-  double log_p = 0.0;  // given the others, corrected for variants and effects
-  double gain = 0.0;
-  int rank = 0;
-  double held_out = 0.0;
-  std::vector<std::string> equivalent;
-  std::map<std::string, double> probability;  // of every effect in this one's place, all equally likely before
-};
-
-struct Suspect {
-  std::string effect;
-  double log_p = 0.0;
-  double expected_z = 0.0;
-};
 
 class Naming {
  public:
@@ -60,9 +40,9 @@ class Naming {
   const std::vector<InnovationLine>& lines_before() const { return lines_before_; }
   double square_before() const { return square_before_; }
   double square_after() const;
-  double rows() const { return evidence_.rows; }
+  double rows() const { return model_.evidence().rows; }
   // As filtered, beside what is named.
-  const NoiseModel& noise() const { return input_.noise; }
+  const NoiseModel& noise() const { return point_.input.noise; }
   // Of one test's p, not corrected: as many independent ones as the catalogue and the walks count for share the rate.
   double log_p_limit() const { return log_threshold_ - std::log(independent_tests()); }
   double log_p_white_before() const { return white_before_; }
@@ -85,31 +65,35 @@ class Naming {
   // What the named effects differ from their equations by; the tests of what remains are made given it.
   const OpenForms& forms() const { return forms_; }
   // Share of the misfit, with the effects as named taken out of nothing, that a square is.
-  double share_of_misfit(double square) const { return square / std::max(1.0, evidence_.square - evidence_.rows); }
+  double share_of_misfit(double square) const { return square / std::max(1.0, evidence().square - evidence().rows); }
   // Where the forms show: the map with the effects as equations alone.
-  Map map_without_forms() const { return locate(evidence_, pass_.map(), pass_.first_map_column(), chosen_columns()); }
+  Map map_without_forms() const {
+    return locate(evidence(), model_.map(), model_.first_map_column(), chosen_columns());
+  }
   // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value() const;
   ParameterVector value_as_named() const;
   ParameterMatrix covariance() const;
 
  private:
+  const Evidence& evidence() const { return model_.evidence(); }
   std::vector<int> chosen_columns(std::size_t without = static_cast<std::size_t>(-1)) const;
   void refit();
+  Correction correction() const;
+  void linearise();
   void relinearise();
   std::vector<double> gains_around(const Chosen& chosen, double step);
   void refine_constant(Chosen& chosen);
   bool add_best();
   bool drop_weak();
   bool fell(const Candidate& candidate) const;
+  bool open(const Candidate& candidate) const;
   bool exchange();
   void sharpen_observation();
   void refit_noise();
   double log_likelihood_as_named(const PassInput& input) const;
-  int append_columns(const std::vector<Candidate>& more, const Eigen::MatrixXd& combine);
   void append_constants();
   void append_forms();
-  void rebuild_evidence();
   bool drop_weak_walk();
   double largest_square(int triad) const;
   bool within_form(const WalkTest& walk) const;
@@ -117,25 +101,23 @@ class Naming {
   ParameterMatrix covariance_of_closed_forms() const;
   void size_forms();
   // Normal equations with the forms marginalised.
-  const Evidence& given_forms() const { return forms_.empty() ? evidence_ : given_forms_; }
+  const Evidence& given_forms() const { return forms_.empty() ? evidence() : given_forms_; }
   void test_likenesses();
   double test_leftover(const Chosen& chosen, const std::vector<Candidate>& beside);
   void average();
   void judge();
   double independent_tests() const;
-  double corrected(double log_p, const std::string& effect) const;
-  Eigen::VectorXd final_residual() const;
+  bool names(const Effect& effect) const;
+  Significance significance() const;
+  std::vector<Candidate> terms() const;
 
   const RecordingContext& context_;
-  PassInput input_;
-  ImuData corrected_view_;
-  AngleVelocity theta_, velocity_;
   double log_threshold_;
   double effective_tests_ = 1.0;  // of the catalogue on this recording
-  SignaturePass pass_;
-  SignatureRows rows_;
-  Evidence evidence_;                 // with what the correction took out added back, walks integrated out
-  std::vector<FormFamily> families_;  // columns of rows_, for the effects as chosen
+  OperatingPoint point_;
+  std::vector<Candidate> candidates_;  // those of the catalogue, chosen ones with their constants
+  LinearModel model_;                  // of the candidates and the map
+  std::vector<FormFamily> families_;   // columns of the model, for the effects as chosen
   OpenForms forms_;
   Evidence given_forms_;
   std::vector<Chosen> chosen_;
@@ -145,12 +127,9 @@ class Naming {
   Map map_before_;
   std::vector<InnovationLine> lines_before_;
   double square_before_ = 0.0, white_before_ = 0.0;
-  Eigen::VectorXd applied_;  // sizes of chosen_ that the correction holds
-  std::vector<int> applied_columns_;
   ParameterVector averaged_ = ParameterVector::Zero();  // what the effects shift the 24 by, mean of all explanations
   ParameterMatrix spread_ = ParameterMatrix::Zero();    // its covariance
   double log_p_likeness_ = 0.0;
-  Correction correction_;  // the same with the constants it was made with
 };
 
 }  // namespace selfcal::diagnosis

@@ -1,65 +1,25 @@
 // What is settled once the names stand: the noise of the base, whether they are an explanation, and what they leave.
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
-#include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/naming.hpp"
 #include "estimator/diagnosis/quantities.hpp"
-#include "estimator/geometry/units.hpp"
+#include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::diagnosis {
-namespace {
-
-// Warm-ups on the axes of an effect that is a drift in time or follows temperature; null for others.
-const Effect* slow_curves_of(const Effect& effect) {
-  const std::string id = effect.id == "gyro_drift_ramp"   ? "gyro_temperature"
-                         : effect.id == "accel_bias_ramp" ? "accel_temperature"
-                                                          : effect.id;
-  const std::vector<Effect>& all = catalogue();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Effect& e) {
-    return e.id == id && id.ends_with("_temperature") && !e.needs_temperature;
-  });
-  return found == all.end() ? nullptr : &*found;
-}
-
-// Gyro drift with sine and cosine of either gimbal angle: no member of the catalogue, for it is no physics.
-void gimbal_columns(const EffectContext& c, double /*constant*/, Columns /*velocity*/, Columns angle) {
-  const std::array<double, 4> functions = {std::sin(c.outer), std::cos(c.outer), std::sin(c.inner), std::cos(c.inner)};
-  for (std::size_t k = 0; k < functions.size(); ++k) {
-    add_axes(angle.middleCols<3>(static_cast<Eigen::Index>(3 * k)), Vector3::Constant(functions[k] * c.dt));
-  }
-}
-
-const Effect& gimbal_functions() {
-  static const Effect effect = [] {
-    Effect e;
-    for (int k = 0; k < 4; ++k) {
-      const std::vector<EffectParameter> axes = axis_parameters("deg/h", units::degree_per_hour, 0.01);
-      e.parameters.insert(e.parameters.end(), axes.begin(), axes.end());
-    }
-    e.sensor = gimbal_columns;
-    return e;
-  }();
-  return effect;
-}
-
-}  // namespace
-
 // The calibration took part of what was left out for motion of the base. With the effects fitted its white noise is
 // the one of the greatest likelihood, down to a micrometre, by factors of 3.
 void Naming::sharpen_observation() {
   constexpr double factor = 1.0 / 3.0, least = 0.9e-6;  // m
-  if ((chosen_.empty() && walks_.empty()) || input_.noise.observation.state_count() > 0) {
+  if ((chosen_.empty() && walks_.empty()) || point_.input.noise.observation.state_count() > 0) {
     return;
   }
-  double best = log_likelihood_as_named(input_);
+  double best = log_likelihood_as_named(point_.input);
   bool better = false;
-  double sigma = input_.noise.observation.sigma;
+  double sigma = point_.input.noise.observation.sigma;
   while ((sigma *= factor) > least) {
-    PassInput trial = input_;
+    PassInput trial = point_.input;
     trial.noise.observation.sigma = sigma;
     const double found = log_likelihood_as_named(trial);
     if (found < best) {
@@ -67,7 +27,7 @@ void Naming::sharpen_observation() {
     }
     best = found;
     better = true;
-    input_.noise.observation.sigma = sigma;
+    point_.input.noise.observation.sigma = sigma;
   }
   if (better) {
     relinearise();
@@ -76,31 +36,21 @@ void Naming::sharpen_observation() {
 
 // Of the recording, corrected as it is, with the sizes of what is named fitted under the noise of `input`.
 double Naming::log_likelihood_as_named(const PassInput& input) const {
+  const OperatingPoint point{input, point_.recording};
   if (chosen_.empty() && walks_.empty()) {
-    return run_pass(input).log_likelihood;
+    return run_pass(point.pass()).log_likelihood;
   }
-  std::vector<Candidate> named = correction_.effects;
+  std::vector<Candidate> named;
   for (const Chosen& c : chosen_) {
     named.push_back(c.candidate);
   }
-  SignaturePass pass(context_, named, !walks_.empty());
-  const SignatureRows rows = pass.run(input);
-  Evidence evidence(rows);
-  const double raw = evidence.square;
-  const auto corrected = static_cast<int>(correction_.size.size());
-  std::vector<int> columns(static_cast<std::size_t>(pass.first_map_column()));
-  std::iota(columns.begin(), columns.end(), 0);
-  const std::vector<int> applied(columns.begin(), columns.begin() + corrected);
-  evidence.restore(applied, correction_.size);
-  for (const WalkTest& walk : walks_) {
-    std::vector<int> own = walk.columns;
-    for (int& column : own) {
-      column += pass.first_map_column() - pass_.first_map_column();
-    }
-    evidence.absorb(own, walk.covariance);
+  const LinearModel model = LinearModel::about(context_, point, named, walks_, false);
+  std::vector<int> columns;
+  for (const Candidate& c : model.candidates()) {
+    const std::vector<int> own = columns_of(c);
+    columns.insert(columns.end(), own.begin(), own.end());
   }
-  columns.erase(columns.begin(), columns.begin() + corrected);
-  return rows.pass.log_likelihood + 0.5 * (raw - evidence.square + evidence.fit(columns).gain);
+  return model.log_likelihood(columns);
 }
 
 bool Naming::entangled() const {
@@ -112,11 +62,11 @@ bool Naming::entangled() const {
   // What one axis's walk does not take up another's does.
   for (const WalkTest& w : walks_) {
     groups.emplace_back();
-    for (std::size_t k = 0; k < pass_.map().size(); ++k) {
-      const LocatedColumn& m = pass_.map()[k];
+    for (std::size_t k = 0; k < model_.map().size(); ++k) {
+      const LocatedColumn& m = model_.map()[k];
       const bool segment = m.kind == LocatedColumn::Kind::dwell || m.kind == LocatedColumn::Kind::rotation;
       if (segment && m.axis / 3 == w.axis / 3) {
-        groups.back().push_back(pass_.first_map_column() + static_cast<int>(k));
+        groups.back().push_back(model_.first_map_column() + static_cast<int>(k));
       }
     }
   }
@@ -127,10 +77,10 @@ bool Naming::entangled() const {
       if (j == i || (j < chosen_.size() && chosen_[j].candidate.effect == chosen_[i].candidate.effect)) {
         continue;  // lines of a sway are several of one kind
       }
-      const Eigen::MatrixXd other = rows_.columns(Eigen::all, groups[j]);
+      const Eigen::MatrixXd other = model_.rows().columns(Eigen::all, groups[j]);
       const Eigen::MatrixXd G = other.transpose() * other;
       for (Eigen::Index k = 0; k < z.size(); ++k) {
-        const Eigen::VectorXd own = rows_.columns.col(groups[i][static_cast<std::size_t>(k)]);
+        const Eigen::VectorXd own = model_.rows().columns.col(groups[i][static_cast<std::size_t>(k)]);
         const double share = fit_columns(G, other.transpose() * own).gain / own.squaredNorm();
         if (z(k) >= least && share > half_of_it) {
           return true;
@@ -148,7 +98,7 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   constexpr double tests_per_axis = 3.0;  // four functions of the gimbal angles; warm-ups are alike: two
   // An equation that is right to 3 % of its amplitude leaves as much: its own form, not another effect's.
   constexpr double form_square = 1e-3;
-  const double own = test_group(evidence_, columns_of(chosen.candidate), {}).gain;
+  const double own = test_group(evidence(), columns_of(chosen.candidate), {}).gain;
   std::vector<int> others = chosen_columns();
   for (const Chosen& c : chosen_) {
     for (int k = 0; c.derivative >= 0 && k < c.candidate.count; ++k) {
@@ -165,7 +115,8 @@ double Naming::test_leftover(const Chosen& chosen, const std::vector<Candidate>&
   for (const Candidate& c : beside) {
     all += static_cast<Eigen::Index>(c.effect->parameters.size());
   }
-  const int first = append_columns(beside, Eigen::MatrixXd::Identity(all, all));
+  const int first = model_.append(context_, point_, beside, Eigen::MatrixXd::Identity(all, all));
+  size_forms();
   double smallest = 0.0;
   for (int column = 0; column < static_cast<int>(all); ++column) {  // axis by axis in threes
     if (concerned[static_cast<std::size_t>(column % 3)]) {
@@ -185,40 +136,37 @@ void Naming::test_likenesses() {
   const bool gimbal = !context_.data().gimbal_outer.empty() && !context_.data().gimbal_inner.empty();
   const std::vector<Chosen> named = chosen_;
   for (const Chosen& c : named) {
-    const std::string& id = c.candidate.effect->id;
+    const Effect* left = c.candidate.effect->lack_of_fit.get();
+    if (left == nullptr || (left->needs_gimbal && !gimbal)) {
+      continue;
+    }
     std::vector<Candidate> beside;
-    if (const Effect* warm_up = slow_curves_of(*c.candidate.effect)) {
-      for (const double constant : warm_up->constants) {
-        beside.push_back({warm_up, constant, 0, 0});
-      }
-    } else if (gimbal && (id == "gyro_g_sensitivity" || id == "gyro_magnetic_sensitivity" || id == "gyro_dead_zone")) {
-      beside.push_back({&gimbal_functions(), NAN, 0, 0});
+    for (const double constant : left->constant.tried()) {
+      beside.push_back({left, constant, 0, 0});
     }
-    if (!beside.empty()) {
-      log_p_likeness_ = std::min(log_p_likeness_, test_leftover(c, beside));
-    }
+    log_p_likeness_ = std::min(log_p_likeness_, test_leftover(c, beside));
   }
 }
 
 Naming::Structure Naming::structure() const {
   using Kind = LocatedColumn::Kind;
   const std::vector<int> others = chosen_columns();
-  const Evidence& evidence = given_forms();
-  const Eigen::VectorXd size = evidence.fit(others).value;
+  const Evidence& given = given_forms();
+  const Eigen::VectorXd size = given.fit(others).value;
   Structure found;
   int tests = 0;
   for (const Kind kind : {Kind::dwell, Kind::rotation, Kind::after_turn, Kind::time}) {
     for (int axis = 0; axis < 6; ++axis) {
       std::vector<int> group;
-      for (std::size_t k = 0; k < pass_.map().size(); ++k) {
-        if (pass_.map()[k].kind == kind && pass_.map()[k].axis == axis) {
-          group.push_back(pass_.first_map_column() + static_cast<int>(k));
+      for (std::size_t k = 0; k < model_.map().size(); ++k) {
+        if (model_.map()[k].kind == kind && model_.map()[k].axis == axis) {
+          group.push_back(model_.first_map_column() + static_cast<int>(k));
         }
       }
-      const GroupTest left = test_group(evidence, group, others);
+      const GroupTest left = test_group(given, group, others);
       const bool walks =
           std::any_of(walks_.begin(), walks_.end(), [&](const WalkTest& w) { return w.axis / 3 == axis / 3; });
-      const bool named = walks || (!others.empty() && square_within(evidence, group, others, size) >= left.gain);
+      const bool named = walks || (!others.empty() && square_within(given, group, others, size) >= left.gain);
       double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
       smallest = std::min(smallest, left.log_p);
       ++tests;
@@ -229,97 +177,63 @@ Naming::Structure Naming::structure() const {
   return found;
 }
 
-Map Naming::map_after() const { return locate(given_forms(), pass_.map(), pass_.first_map_column(), chosen_columns()); }
+Map Naming::map_after() const {
+  return locate(given_forms(), model_.map(), model_.first_map_column(), chosen_columns());
+}
 
 Naming::ByQuantity Naming::locate_by_quantities() const {
   std::vector<Candidate> all = quantity_bins(context_);
-  const std::size_t bins = all.size(), applied = bins + chosen_.size();
+  const auto bins = static_cast<std::ptrdiff_t>(all.size());
   for (const Chosen& c : chosen_) {
     all.push_back(c.candidate);
   }
-  all.insert(all.end(), correction_.effects.begin(), correction_.effects.end());
-  SignaturePass pass(context_, all, !walks_.empty());
-  Evidence evidence(pass.run(input_));
-  all = pass.candidates();
-  std::vector<int> fitted, restored;
-  for (std::size_t i = bins; i < all.size(); ++i) {
-    const std::vector<int> columns = columns_of(all[i]);
-    std::vector<int>& to = i < applied ? fitted : restored;
-    to.insert(to.end(), columns.begin(), columns.end());
+  const LinearModel model = LinearModel::about(context_, point_, all, walks_, false);
+  const std::vector<Candidate> quantities(model.candidates().begin(), model.candidates().begin() + bins);
+  std::vector<int> fitted;
+  for (auto c = model.candidates().begin() + bins; c != model.candidates().end(); ++c) {
+    const std::vector<int> columns = columns_of(*c);
+    fitted.insert(fitted.end(), columns.begin(), columns.end());
   }
-  if (!restored.empty()) {
-    evidence.restore(restored, correction_.size);
-  }
-  all.resize(bins);
-  ByQuantity located;
-  located.before = locate_by_quantity(evidence, all, {}, context_.mean_temperature());
-  for (const WalkTest& walk : walks_) {
-    std::vector<int> columns = walk.columns;
-    for (int& column : columns) {
-      column += pass.first_map_column() - pass_.first_map_column();
-    }
-    evidence.absorb(columns, walk.covariance);
-  }
-  located.after = locate_by_quantity(evidence, all, fitted, context_.mean_temperature());
-  return located;
+  const double mean_c = context_.mean_temperature();
+  return {locate_by_quantity(model.evidence_without_walks(), quantities, {}, mean_c),
+          locate_by_quantity(model.evidence(), quantities, fitted, mean_c)};
 }
 
 double Naming::square_after() const { return given_forms().square - given_forms().fit(chosen_columns()).gain; }
 
-Eigen::VectorXd Naming::final_residual() const {
-  Eigen::VectorXd residual = rows_.residual;
-  if (!applied_columns_.empty()) {
-    residual += rows_.columns(Eigen::all, applied_columns_) * applied_;
-  }
-  const std::vector<int> columns = chosen_columns();
-  if (!columns.empty()) {
-    residual -= rows_.columns(Eigen::all, columns) * evidence_.fit(columns).value;
-  }
-  if (!forms_.empty()) {
-    residual -= rows_.columns(Eigen::all, forms_.columns) * forms_.mean;
-  }
-  for (const WalkTest& walk : walks_) {  // the walk's own estimate
-    const Eigen::MatrixXd Z = rows_.columns(Eigen::all, walk.columns);
-    const Eigen::MatrixXd J = Z.transpose() * Z;
-    const auto n = J.rows();
-    residual -= Z * (walk.covariance * (Eigen::MatrixXd::Identity(n, n) + J * walk.covariance).inverse() *
-                     (Z.transpose() * residual));
-  }
-  return residual;
+double Naming::log_p_white_after() const {
+  return test_whiteness(model_.residual_after(chosen_columns(), forms_.columns, forms_.mean)).log_p;
 }
 
-double Naming::log_p_white_after() const { return diagnosis::log_p_white(final_residual()); }
-
-// Truth = estimate + shift * (size - what the correction already took out).
 ParameterVector Naming::value_as_named() const {
-  const PassOutput& pass = rows_.pass;
-  ParameterVector value = input_.parameters + pass.mean.segment<sensor_parameter_count>(pass.layout.parameters());
+  const std::vector<int> columns = chosen_columns();
+  Eigen::VectorXd size(static_cast<Eigen::Index>(columns.size()));
+  Eigen::Index at = 0;
   for (const Chosen& c : chosen_) {
-    value += rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+    size.segment(at, c.size.size()) = c.size;
+    at += c.size.size();
   }
-  if (!applied_columns_.empty()) {
-    value -= rows_.shift(Eigen::all, applied_columns_) * applied_;
-  }
-  return value;
+  return model_.parameters(columns, size);
 }
 
 ParameterVector Naming::value() const {
+  const Eigen::MatrixXd& shift = model_.rows().shift;
   ParameterVector value = value_as_named() + averaged_;
   for (const Chosen& c : chosen_) {
-    value -= rows_.shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
+    value -= shift.middleCols(c.candidate.first, c.candidate.count) * c.size;
   }
   if (!forms_.empty()) {
-    value += rows_.shift(Eigen::all, forms_.columns) * forms_.mean;
+    value += shift(Eigen::all, forms_.columns) * forms_.mean;
   }
   return value;
 }
 
 ParameterMatrix Naming::covariance() const {
-  const int at = rows_.pass.layout.parameters();
-  ParameterMatrix covariance =
-      rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
+  const PassOutput& pass = model_.rows().pass;
+  const int at = pass.layout.parameters();
+  ParameterMatrix covariance = pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at) + spread_;
   if (!forms_.empty()) {
-    const Eigen::MatrixXd S = rows_.shift(Eigen::all, forms_.columns);
+    const Eigen::MatrixXd S = model_.rows().shift(Eigen::all, forms_.columns);
     covariance += S * forms_.covariance * S.transpose();
   }
   return covariance + covariance_of_closed_forms();

@@ -1,5 +1,4 @@
 // What the named effects differ from their equations by (form.hpp): columns about the corrected recording, and their sizes.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -14,11 +13,6 @@ constexpr double collinear = 1e-3;  // of a form's length, left beside the named
 // from one (form.cpp). A drift that is a slow curve in time or follows the attitude resembles what is in no catalogue: 7 %.
 constexpr double form_share = 0.25, resembling_share = 0.005;
 
-bool resembles_others(const Effect& e) {
-  return e.id == "gyro_g_sensitivity" || e.id == "gyro_magnetic_sensitivity" || e.id == "gyro_dead_zone" ||
-         e.id.ends_with("_temperature") || e.id.ends_with("_ramp");
-}
-
 // Square of what an equation leaves that is right to 3 % of its amplitude, over its own.
 constexpr double form_square = 1e-3;
 
@@ -28,9 +22,9 @@ constexpr double form_square = 1e-3;
 double Naming::largest_square(int triad) const {
   double largest = 0.0;
   for (const Chosen& c : chosen_) {
-    const bool gyro = c.candidate.effect->id.starts_with("gyro_");
+    const bool gyro = c.candidate.effect->triad == Triad::gyro;
     if (triad < 0 || (triad == 0) == gyro) {
-      largest = std::max(largest, test_group(evidence_, columns_of(c.candidate), {}).gain);
+      largest = std::max(largest, test_group(evidence(), columns_of(c.candidate), {}).gain);
     }
   }
   return largest;
@@ -55,10 +49,12 @@ bool Naming::immaterial(const Candidate& candidate, const GroupTest& test) const
   if (size.cwiseAbs().maxCoeff() > typical_share) {
     return false;
   }
-  const int at = rows_.pass.layout.parameters();
-  const ParameterVector sigma =
-      rows_.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at).diagonal().cwiseSqrt();
-  const ParameterVector shift = rows_.shift.middleCols(candidate.first, candidate.count) * size;
+  const int at = model_.rows().pass.layout.parameters();
+  const ParameterVector sigma = model_.rows()
+                                    .pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(at, at)
+                                    .diagonal()
+                                    .cwiseSqrt();
+  const ParameterVector shift = model_.rows().shift.middleCols(candidate.first, candidate.count) * size;
   return shift.cwiseAbs().cwiseQuotient(sigma).maxCoeff() < noticed_sigma;
 }
 
@@ -70,7 +66,7 @@ void Naming::append_forms() {
     const Candidate& own = chosen_[i].candidate;
     bool shows = false;
     for (int k = 0; k < own.count; ++k) {
-      shows |= std::abs(chosen_[i].size(k)) * std::sqrt(evidence_.information(own.first + k, own.first + k)) > strong;
+      shows |= std::abs(chosen_[i].size(k)) * std::sqrt(evidence().information(own.first + k, own.first + k)) > strong;
     }
     for (const FormCandidate& form : shows ? forms_of(own) : std::vector<FormCandidate>{}) {
       more.push_back(form.candidate);
@@ -79,15 +75,13 @@ void Naming::append_forms() {
   }
   if (!more.empty()) {
     SignaturePass pass(context_, more, false);
-    const SignatureRows beside = pass.run(input_);
+    const SignatureRows beside = pass.run(point_.pass());
     const std::vector<int> named = chosen_columns();
-    const Eigen::MatrixXd Z = rows_.columns(Eigen::all, named);
-    Eigen::MatrixXd G = Z.transpose() * Z;
-    G.diagonal().array() += 1e-6;  // sizes up to 1000 times the typical one
-    const Eigen::LDLT<Eigen::MatrixXd> solver(G);
-    const Eigen::MatrixXd named_shift = rows_.shift(Eigen::all, named);
+    const Eigen::MatrixXd Z = model_.rows().columns(Eigen::all, named);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(Z.transpose() * Z);
+    const Eigen::MatrixXd named_shift = model_.rows().shift(Eigen::all, named);
     std::vector<Eigen::VectorXd> columns, shifts;
-    const auto at = static_cast<int>(rows_.columns.cols());
+    const auto at = static_cast<int>(model_.rows().columns.cols());
     for (std::size_t f = 0; f < more.size(); ++f) {
       const Candidate& form = pass.candidates()[f];
       FormFamily& family = of_candidate[f];
@@ -112,13 +106,12 @@ void Naming::append_forms() {
       }
     }
     const auto count = static_cast<Eigen::Index>(columns.size());
-    rows_.columns.conservativeResize(Eigen::NoChange, at + count);
-    rows_.shift.conservativeResize(Eigen::NoChange, at + count);
+    Eigen::MatrixXd appended(model_.rows().columns.rows(), count), shift(model_.rows().shift.rows(), count);
     for (Eigen::Index k = 0; k < count; ++k) {
-      rows_.columns.col(at + k) = columns[static_cast<std::size_t>(k)];
-      rows_.shift.col(at + k) = shifts[static_cast<std::size_t>(k)];
+      appended.col(k) = columns[static_cast<std::size_t>(k)];
+      shift.col(k) = shifts[static_cast<std::size_t>(k)];
     }
-    rebuild_evidence();
+    model_.append(appended, shift);
   }
   size_forms();
 }
@@ -128,17 +121,17 @@ void Naming::size_forms() {
   const std::vector<int> named = chosen_columns();
   std::vector<FormFamily> families = families_;
   for (bool settled = false; !settled;) {
-    forms_ = diagnosis::open_forms(evidence_, families, named);
+    forms_ = diagnosis::open_forms(evidence(), families, named);
     settled = true;
     Eigen::Index at = 0;
     for (FormFamily& f : forms_.families) {
       const auto size = static_cast<Eigen::Index>(f.columns.size());
       const Eigen::VectorXd mean = forms_.mean.segment(at, size);
       at += size;
-      f.square = mean.dot(evidence_.information(f.columns, f.columns) * mean);
+      f.square = mean.dot(evidence().information(f.columns, f.columns) * mean);
       const Chosen& c = chosen_[f.chosen];
-      const double own = test_group(evidence_, columns_of(c.candidate), chosen_columns(f.chosen)).gain;
-      if (f.square > (resembles_others(*c.candidate.effect) ? resembling_share : form_share) * own) {
+      const double own = test_group(evidence(), columns_of(c.candidate), chosen_columns(f.chosen)).gain;
+      if (f.square > (c.candidate.effect->lack_of_fit ? resembling_share : form_share) * own) {
         std::erase_if(families, [&](const FormFamily& x) { return x.kind == f.kind && x.chosen == f.chosen; });
         settled = false;
         break;
@@ -146,8 +139,8 @@ void Naming::size_forms() {
     }
   }
   if (!forms_.empty()) {
-    given_forms_ = evidence_;
-    given_forms_.absorb(forms_.columns, forms_.sigma.cwiseAbs2().asDiagonal());
+    given_forms_ = evidence();
+    given_forms_.marginalise(forms_.columns, forms_.sigma.cwiseAbs2().asDiagonal());
   }
 }
 
@@ -158,7 +151,7 @@ ParameterMatrix Naming::covariance_of_closed_forms() const {
     return std::any_of(forms_.families.begin(), forms_.families.end(),
                        [&](const FormFamily& f) { return f.kind == x.kind && f.chosen == x.chosen; });
   });
-  return closed_forms(given_forms(), closed, chosen_columns(), rows_.shift);
+  return closed_forms(given_forms(), closed, chosen_columns(), model_.rows().shift);
 }
 
 // A walk follows any slow curve, and may have been taken for what a form is: each is tried without.
@@ -166,38 +159,26 @@ bool Naming::drop_weak_walk() {
   for (std::size_t i = 0; i < walks_.size(); ++i) {
     const WalkTest walk = walks_[i];
     walks_.erase(walks_.begin() + static_cast<std::ptrdiff_t>(i));
-    rebuild_evidence();
+    model_.marginalise(walks_);
     refit();
     append_forms();
     const WalkTest without =
-        test_walk(given_forms(), pass_.map(), pass_.first_map_column(), walk.axis, chosen_columns());
+        test_walk(given_forms(), model_.map(), model_.first_map_column(), walk.axis, chosen_columns());
     const double log_p = log_chi_squared_tail(without.gain, 1.0);
-    if (corrected(log_p, walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk") > log_threshold_) {
+    if (!significance().holds(significance().corrected(log_p))) {
       for (Chosen& c : chosen_) {  // their constants were found beside the walk
         refine_constant(c);
       }
-      rows_ = pass_.run(input_);
-      rebuild_evidence();
+      linearise();
       relinearise();
       return true;
     }
     walks_.insert(walks_.begin() + static_cast<std::ptrdiff_t>(i), walk);
-    rebuild_evidence();
+    model_.marginalise(walks_);
     refit();
     append_forms();
   }
   return false;
-}
-
-// From rows_, with what the correction took out added back and the walks integrated out.
-void Naming::rebuild_evidence() {
-  evidence_ = Evidence(rows_);
-  if (!applied_columns_.empty()) {
-    evidence_.restore(applied_columns_, applied_);
-  }
-  for (const WalkTest& walk : walks_) {
-    evidence_.absorb(walk.columns, walk.covariance);
-  }
 }
 
 }  // namespace selfcal::diagnosis

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
-#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

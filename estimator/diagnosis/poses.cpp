@@ -8,7 +8,7 @@
 
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/pose_data.hpp"
-#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -97,8 +97,8 @@ double log_p_of(const Regression& without, const Regression& with, Eigen::Index 
 }
 
 bool acts_on(const Effect& effect, bool gyro) {
-  return effect.sensor != nullptr && !effect.needs_temperature && effect.id.starts_with(gyro ? "gyro" : "accel") &&
-         effect.id != "gyro_magnetic_sensitivity";  // needs a heading
+  return effect.sensor != nullptr && applies(effect, false) && !effect.needs_heading &&
+         effect.triad == (gyro ? Triad::gyro : Triad::accelerometer);
 }
 
 class Gyros {
@@ -136,7 +136,7 @@ class Gyros {
 
 PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   PoseEffect result;
-  result.effect = effect.id;
+  result.effect = &effect;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
@@ -158,12 +158,12 @@ std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) con
   int tried = 0;
   for (const Effect& effect : catalogue()) {
     const bool known =
-        std::any_of(named.begin(), named.end(), [&](const PoseEffect& p) { return p.effect == effect.id; });
+        std::any_of(named.begin(), named.end(), [&](const PoseEffect& p) { return p.effect == &effect; });
     if (known || !acts_on(effect, true)) {
       continue;
     }
     PoseEffect best;
-    for (const double constant : effect.constants) {
+    for (const double constant : effect.constant.tried()) {
       PoseEffect one = attempt(effect, constant);
       if (best.parameters.empty() || one.log_p < best.log_p) {
         best = std::move(one);
@@ -182,22 +182,19 @@ std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) con
 }
 
 void Gyros::keep(const PoseEffect& chosen) {
-  for (const Effect& effect : catalogue()) {
-    if (effect.id != chosen.effect || !acts_on(effect, true)) {
-      continue;
+  const Effect& effect = *chosen.effect;
+  const std::vector<double> constants = effect.constant.tried();
+  double best = 0.0, constant = constants.front();
+  for (const double trial : constants) {
+    const double log_p = attempt(effect, trial).log_p;
+    if (log_p < best) {
+      best = log_p;
+      constant = trial;
     }
-    double best = 0.0, constant = effect.constants.front();
-    for (const double trial : effect.constants) {
-      const double log_p = attempt(effect, trial).log_p;
-      if (log_p < best) {
-        best = log_p;
-        constant = trial;
-      }
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-      Eigen::MatrixXd& known = known_[static_cast<std::size_t>(axis)];
-      known = joined(known, trial_of(effect, constant, poses_, duration_s_, axis).columns);
-    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::MatrixXd& known = known_[static_cast<std::size_t>(axis)];
+    known = joined(known, trial_of(effect, constant, poses_, duration_s_, axis).columns);
   }
 }
 
@@ -212,14 +209,14 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
     if (!acts_on(effect, false)) {
       continue;
     }
-    for (const double constant : effect.constants) {
+    for (const double constant : effect.constant.tried()) {
       const Trial trial = trial_of(effect, constant, poses, duration_s, 3);
       if (trial.columns.cols() == 0) {
         continue;
       }
       const Regression with = regress(joined(model.jacobian, trial.columns), model.residual);
       PoseEffect p;
-      p.effect = effect.id;
+      p.effect = &effect;
       p.log_p = log_p_of(plain, with, n);
       p.held_out_rms.fill(with.held_out_rms);
       d.accel_tried.push_back(p);
@@ -278,44 +275,7 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool li
   held_out = std::sqrt(held_out_square / turns);
 }
 
-// log of the incomplete beta function ratio I_x(a, b) by Lentz's continued fraction, for x below (a+1)/(a+b+2).
-double log_beta_ratio(double x, double a, double b) {
-  const double front =
-      std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) + a * std::log(x) + b * std::log1p(-x) - std::log(a);
-  constexpr double tiny = 1e-300;
-  double c = 1.0, d = 1.0 - (a + b) * x / (a + 1.0);
-  d = 1.0 / (std::abs(d) < tiny ? tiny : d);
-  double h = d;
-  for (int m = 1; m < 500; ++m) {
-    const double even = m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m));
-    const double odd = -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1));
-    for (const double term : {even, odd}) {
-      d = 1.0 + term * d;
-      c = 1.0 + term / c;
-      d = 1.0 / (std::abs(d) < tiny ? tiny : d);
-      c = std::abs(c) < tiny ? tiny : c;
-      h *= d * c;
-    }
-    if (std::abs(d * c - 1.0) < 1e-14) {
-      break;
-    }
-  }
-  return front + std::log(h);
-}
-
 }  // namespace
-
-double log_f_tail(double f, double numerator, double denominator) {
-  if (f <= 0.0) {
-    return 0.0;
-  }
-  const double x = denominator / (denominator + numerator * f);  // P(F > f) = I_x(denominator/2, numerator/2)
-  const double a = 0.5 * denominator, b = 0.5 * numerator;
-  if (x < (a + 1.0) / (a + b + 2.0)) {
-    return log_beta_ratio(x, a, b);
-  }
-  return std::log1p(-std::exp(log_beta_ratio(1.0 - x, b, a)));
-}
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   PoseDiagnosis d;
@@ -353,7 +313,7 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   }
   judge_turns(input, poses, false, d.direction_before, d.direction_before_held_out);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
-                                  [](const PoseEffect& p) { return p.effect == "gyro_g_sensitivity"; });
+                                  [](const PoseEffect& p) { return p.effect->linear_in_force; });
   judge_turns(input, poses, linear, d.direction_after, d.direction_after_held_out);
   d.invisible = {
       "isotropic part of gyro_g_sensitivity: it turns about gravity, which no direction of gravity shows, and in "

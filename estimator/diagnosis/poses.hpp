@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/diagnosis/effect.hpp"
 #include "estimator/geometry/rotation.hpp"
 
 namespace selfcal::diagnosis {
@@ -21,7 +22,7 @@ struct PoseInput {
 };
 
 struct PoseEffect {
-  std::string effect;
+  const Effect* effect = nullptr;
   std::vector<std::string> parameters;   // names
   std::vector<double> value, sigma;      // raw gyro or accelerometer units (per g, ...)
   double log_p = 0.0;                    // F test, corrected for axes, effects and constants tried
@@ -48,8 +49,5 @@ struct PoseDiagnosis {
 };
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double false_alarm_rate);
-
-// log of P(F > f) with the given degrees of freedom (Abramowitz and Stegun 26.6.2, 26.5.8).
-double log_f_tail(double f, double numerator, double denominator);
 
 }  // namespace selfcal::diagnosis

@@ -62,10 +62,19 @@ Effect quantity(std::string_view id, void (*columns)(const EffectContext&, doubl
   return effect;
 }
 
-const std::array<Effect, 4>& attitudes() {
-  static const std::array<Effect, 4> all = {
-      quantity("outer_angle", outer_columns), quantity("inner_angle", inner_columns),
-      quantity("gravity", gravity_columns), quantity("earth_rate", earth_rate_columns)};
+// An angle in bins of 45 deg, or a direction by the axis of b that is nearest to it.
+struct AttitudeBins {
+  bool angle;
+  const char* words;  // of the angle, or of the direction
+  Effect effect;
+};
+
+const std::array<AttitudeBins, 4>& attitudes() {
+  static const std::array<AttitudeBins, 4> all = {
+      {{true, "outer", quantity("outer_angle", outer_columns)},
+       {true, "inner", quantity("inner_angle", inner_columns)},
+       {false, "up", quantity("gravity", gravity_columns)},
+       {false, "the Earth's axis", quantity("earth_rate", earth_rate_columns)}}};
   return all;
 }
 
@@ -82,25 +91,22 @@ const std::array<TemperatureBins, 4>& temperatures() {
   return all;
 }
 
-int width_of(const Effect& effect) {
-  const auto& all = temperatures();
-  return std::find_if(all.begin(), all.end(), [&](const TemperatureBins& t) { return &t.effect == &effect; })->width_c;
+template <typename Bins>
+const Bins* bins_of(const std::array<Bins, 4>& all, const Effect& effect) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Bins& b) { return &b.effect == &effect; });
+  return found == all.end() ? nullptr : &*found;
 }
 
 std::string words_of(const Candidate& bin, std::size_t axis, double mean_temperature_c) {
   const int k = static_cast<int>(std::lround(bin.constant));
-  const std::string& id = bin.effect->id;
   std::array<char, 80> text{};
-  if (id == "temperature") {
-    const int width = width_of(*bin.effect);
-    std::snprintf(text.data(), text.size(), "between %.1f and %.1f degC", mean_temperature_c + k * width,
-                  mean_temperature_c + (k + 1) * width);
-  } else if (id == "gravity" || id == "earth_rate") {
-    std::snprintf(text.data(), text.size(), "while %c%c is nearest to %s", "+-"[k % 2], "xyz"[k / 2],
-                  id == "gravity" ? "up" : "the Earth's axis");
+  if (const TemperatureBins* t = bins_of(temperatures(), *bin.effect)) {
+    std::snprintf(text.data(), text.size(), "between %.1f and %.1f degC", mean_temperature_c + k * t->width_c,
+                  mean_temperature_c + (k + 1) * t->width_c);
+  } else if (const AttitudeBins* a = bins_of(attitudes(), *bin.effect); !a->angle) {
+    std::snprintf(text.data(), text.size(), "while %c%c is nearest to %s", "+-"[k % 2], "xyz"[k / 2], a -> words);
   } else {
-    std::snprintf(text.data(), text.size(), "%s angle %d deg +- 22.5", id == "outer_angle" ? "outer" : "inner",
-                  k * 360 / angle_bins);
+    std::snprintf(text.data(), text.size(), "%s angle %d deg +- 22.5", a->words, k * 360 / angle_bins);
   }
   return std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3] + ", " + text.data();
 }
@@ -111,10 +117,9 @@ std::vector<Candidate> quantity_bins(const RecordingContext& context) {
   std::vector<Candidate> bins;
   const ImuData& data = context.data();
   const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
-  for (const Effect& effect : attitudes()) {
-    const bool angle = effect.id.ends_with("_angle");
-    for (int k = 0; (gimbal || !angle) && k < (angle ? angle_bins : axis_bins); ++k) {
-      bins.push_back({&effect, static_cast<double>(k), 0, 0});
+  for (const AttitudeBins& a : attitudes()) {
+    for (int k = 0; (gimbal || !a.angle) && k < (a.angle ? angle_bins : axis_bins); ++k) {
+      bins.push_back({&a.effect, static_cast<double>(k), 0, 0});
     }
   }
   if (context.has_temperature()) {

@@ -245,6 +245,15 @@ void SignaturePass::set_constant(int first, double constant) {
   }
 }
 
+void Correction::add(const Effect& effect, double constant, const Eigen::VectorXd& own) {
+  if (effect.sensor != nullptr) {
+    const Eigen::Index first = size.size();
+    effects.push_back({&effect, constant, static_cast<int>(first), static_cast<int>(own.size())});
+    size.conservativeResize(first + own.size());
+    size.tail(own.size()) = own;
+  }
+}
+
 std::vector<int> columns_of(const Candidate& candidate) {
   std::vector<int> columns(static_cast<std::size_t>(candidate.count));
   std::iota(columns.begin(), columns.end(), candidate.first);

@@ -51,6 +51,9 @@ using AngleVelocity = std::vector<std::array<double, 3>>;
 struct Correction {
   std::vector<Candidate> effects;
   Eigen::VectorXd size;  // [sum of counts], in typical sizes
+
+  // `own`: one size a coefficient. An effect that is no sensor's is not in the increments.
+  void add(const Effect& effect, double constant, const Eigen::VectorXd& own);
 };
 
 class SignaturePass {

@@ -6,9 +6,9 @@
 #include <memory>
 #include <type_traits>
 
-#include "estimator/diagnosis/statistics.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/shortlist.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
 namespace {
@@ -26,7 +26,7 @@ constexpr double process_count = 2.0 * axis_count;
 
 double log_p_of_law(const Candidate& c) {
   const double degrees = 1.0 + static_cast<double>(c.term.constants.size() > 1 ? 1 : 0);
-  return diagnosis::log_chi_squared_tail(c.gain, degrees) + c.cost + std::log(shares);
+  return log_chi_squared_tail(c.gain, degrees) + c.cost + std::log(shares);
 }
 
 class Search {
@@ -103,12 +103,10 @@ class Search {
     if (state_.terms.empty()) {
       return;
     }
-    const Increments increments = without_laws(motion_, sums_, input_, state_.terms, state_.fit.coefficient);
-    ImuData data = *input_.data;
-    data.delta_theta = increments.delta_theta;
-    data.delta_v = increments.delta_v;
+    const diagnosis::CorrectedRecording rest =
+        without_laws(motion_, sums_, input_, state_.terms, state_.fit.coefficient);
     PassInput input = input_;
-    input.data = &data;
+    input.data = &rest.data();
     const PieceSums settled =
         said("what the laws leave", [&] { return sum_over_pieces(motion_, input, options_.stop); });
     raw_score_ = sums_.sums.score;
@@ -148,7 +146,7 @@ class Search {
   }
 
   bool significant(const ProcessFit& process) const {
-    return diagnosis::log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
+    return log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
            std::log(options_.false_alarm_rate);
   }
 
@@ -373,8 +371,8 @@ class Search {
         ++at;
       }
       const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
-      law.significance = diagnosis::sigma_from_log_p(
-          std::min(0.0, diagnosis::log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
+      law.significance =
+          sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
       law.ambiguous = ambiguity_class(k);
       result_.laws.push_back(std::move(law));
     }

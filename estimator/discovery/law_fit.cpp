@@ -187,8 +187,9 @@ namespace {
 
 class Subtraction : public ExtraSignatures {
  public:
-  Subtraction(LawColumns& columns, const Eigen::VectorXd& coefficient, Increments& increments)
-      : columns_(columns), coefficient_(coefficient), increments_(increments) {}
+  Subtraction(LawColumns& columns, const Eigen::VectorXd& coefficient, diagnosis::AngleVelocity& delta_theta,
+              diagnosis::AngleVelocity& delta_v)
+      : columns_(columns), coefficient_(coefficient), delta_theta_(delta_theta), delta_v_(delta_v) {}
   int count() const override { return columns_.count(); }
   bool block_ends_before(std::size_t sample) const override { return columns_.block_ends_before(sample); }
   void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
@@ -198,8 +199,8 @@ class Subtraction : public ExtraSignatures {
     const Vector3 dv = velocity * coefficient_ / samples, dtheta = angle * coefficient_ / samples;
     for (std::size_t i = block.first; i < block.last; ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        increments_.delta_v[i][axis] -= dv(static_cast<Eigen::Index>(axis));
-        increments_.delta_theta[i][axis] -= dtheta(static_cast<Eigen::Index>(axis));
+        delta_v_[i][axis] -= dv(static_cast<Eigen::Index>(axis));
+        delta_theta_[i][axis] -= dtheta(static_cast<Eigen::Index>(axis));
       }
     }
   }
@@ -207,22 +208,22 @@ class Subtraction : public ExtraSignatures {
  private:
   LawColumns& columns_;
   const Eigen::VectorXd& coefficient_;
-  Increments& increments_;
+  diagnosis::AngleVelocity &delta_theta_, &delta_v_;
 };
 
 }  // namespace
 
-Increments without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                        const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
-  Increments increments{{input.data->delta_theta.begin(), input.data->delta_theta.end()},
-                        {input.data->delta_v.begin(), input.data->delta_v.end()}};
+diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
+  diagnosis::AngleVelocity delta_theta(input.data->delta_theta.begin(), input.data->delta_theta.end());
+  diagnosis::AngleVelocity delta_v(input.data->delta_v.begin(), input.data->delta_v.end());
   LawColumns columns(motion, table, terms, false);
-  Subtraction subtraction(columns, coefficient, increments);
+  Subtraction subtraction(columns, coefficient, delta_theta, delta_v);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &subtraction);
   Interval interval;
   while (navigator.next(interval)) {
   }
-  return increments;
+  return {*input.data, std::move(delta_theta), std::move(delta_v)};
 }
 
 }  // namespace selfcal::discovery

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/diagnosis/corrected_recording.hpp"
 #include "estimator/discovery/column_pass.hpp"
 #include "estimator/discovery/law_motion.hpp"
 #include "estimator/laws/expression.hpp"
@@ -61,11 +62,8 @@ std::vector<double> exact_gains(const LawMotion& motion, const NodeTable& table,
                                 const std::vector<LawTerm>& given, const std::vector<LawTerm>& alternatives,
                                 const std::stop_token& stop = {});
 
-// Increments less the laws, stretch by stretch, each spread evenly over its samples.
-struct Increments {
-  std::vector<std::array<double, 3>> delta_theta, delta_v;
-};
-Increments without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                        const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
+// The recording less the laws, stretch by stretch, each spread evenly over its samples.
+diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
 
 }  // namespace selfcal::discovery

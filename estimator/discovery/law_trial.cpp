@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/diagnosis/statistics.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
 namespace {
@@ -60,7 +60,7 @@ tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(const ImuData& dat
     law.gain = fit.gain[k];
     law.held_out_gain = fit.held_out_gain[k];
     const double degrees = 1.0 + static_cast<double>(law.constants.size());
-    law.significance = diagnosis::sigma_from_log_p(std::min(0.0, diagnosis::log_chi_squared_tail(law.gain, degrees)));
+    law.significance = sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees)));
     law.share = std::clamp(law.gain / std::max(1.0, fit.square_before - fit.rows), 0.0, 1.0);
     law.stated = stated[k];
     law.collinear = fit.collinear[k];

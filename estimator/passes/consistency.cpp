@@ -4,19 +4,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
+
+#include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal {
 namespace {
 
-constexpr int whiteness_lags = 20;
 constexpr double normal_999 = 3.29;  // two-sided 99.9 % of the normal distribution
 
-// P(chi-squared with `degrees` > value), by Wilson and Hilferty's cube root; good to 1e-3 for degrees >= 20.
-double chi_squared_tail(double value, double degrees) {
-  const double t = 2.0 / (9.0 * degrees);
-  const double z = (std::cbrt(value / degrees) - (1.0 - t)) / std::sqrt(t);
-  return 0.5 * std::erfc(z / std::sqrt(2.0));
+Eigen::VectorXd normalised_innovations(const std::vector<Epoch>& epochs) {
+  Eigen::VectorXd all(3 * std::ssize(epochs));
+  for (std::size_t k = 0; k < epochs.size(); ++k) {
+    all.segment<3>(3 * static_cast<Eigen::Index>(k)) =
+        epochs[k].innovation.cwiseQuotient(epochs[k].variance.cwiseSqrt());
+  }
+  return all;
 }
 
 std::string format(const char* pattern, auto... values) {
@@ -37,21 +39,9 @@ Consistency judge_innovations(const PassOutput& pass, bool converged, double par
   c.nis_low = 1.0 - spread;
   c.nis_high = 1.0 + spread;
 
-  // Ljung and Box 1978, the three axes together.
-  double statistic = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> w;
-    for (const Epoch& e : pass.epochs) {
-      w.push_back(e.innovation(axis) / std::sqrt(e.variance(axis)));
-    }
-    const double power = std::inner_product(w.begin(), w.end(), w.begin(), 0.0);
-    for (std::ptrdiff_t lag = 1; lag <= whiteness_lags && lag < std::ssize(w); ++lag) {
-      const double r = std::inner_product(w.begin() + lag, w.end(), w.begin(), 0.0) / power;
-      statistic += n * (n + 2.0) * r * r / (n - static_cast<double>(lag));
-      c.autocorrelation += lag == 1 ? r / 3.0 : 0.0;
-    }
-  }
-  c.whiteness_p_value = chi_squared_tail(statistic, 3.0 * whiteness_lags);
+  const Whiteness white = test_whiteness(normalised_innovations(pass.epochs));
+  c.whiteness_p_value = std::exp(white.log_p);
+  c.autocorrelation = white.autocorrelation;
 
   // The noise densities are estimates, good to some per cent, so a few per cent of NIS say nothing about the model.
   constexpr double density_margin = 0.15;

@@ -79,7 +79,7 @@ ordered_json to_json(const Diagnosis& d) {
     j["suspected"].push_back(f.effect);
   }
   for (const auto& u : d.undetectable) {
-    j["undetectable"].push_back(u.effect);
+    j["undetectable"].push_back(u.effect->id);
   }
   for (const auto& f : d.faults) {
     j["data_faults"].push_back(f.id);

@@ -7,6 +7,7 @@
 #include "estimator/diagnosis/catalogue.hpp"
 #include "estimator/diagnosis/evidence.hpp"
 #include "estimator/diagnosis/locate.hpp"
+#include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::blind {
 namespace {
@@ -18,13 +19,16 @@ using diagnosis::Effect;
 std::vector<Candidate> candidates(const diagnosis::RecordingContext& context, bool middle_only) {
   std::vector<Candidate> list;
   for (const Effect& effect : diagnosis::catalogue()) {
-    if (effect.constants.empty() || (effect.needs_temperature && !context.has_temperature())) {
+    const bool channel_missing =
+        effect.temperature == diagnosis::TemperatureUse::measured && !context.has_temperature();
+    const std::vector<double> constants = effect.constant.tried();
+    if (constants.empty() || channel_missing) {
       continue;
     }
     if (middle_only) {
-      list.push_back({&effect, effect.constants[effect.constants.size() / 2], 0, 0});
+      list.push_back({&effect, constants[constants.size() / 2], 0, 0});
     } else {
-      for (const double constant : effect.constants) {
+      for (const double constant : constants) {
         list.push_back({&effect, constant, 0, 0});
       }
     }
@@ -108,8 +112,8 @@ RivalAnswers ask_rivals(const ImuData& data, const diagnosis::Diagnosis& d, doub
   const diagnosis::Evidence evidence(rows);
   answers.bic_names = by_bic(variants, evidence);
 
-  const double size_tail = diagnosis::log_chi_squared_tail(evidence.square, evidence.rows);
-  const double white = diagnosis::log_p_white(rows.residual);
+  const double size_tail = log_chi_squared_tail(evidence.square, evidence.rows);
+  const double white = test_whiteness(rows.residual).log_p;
   answers.whiteness_alarms = std::min(size_tail, white) < std::log(0.5 * false_alarm_rate);
   return answers;
 }

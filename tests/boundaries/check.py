@@ -18,7 +18,9 @@ MAY_INCLUDE = {
     "estimator/models": ["estimator/geometry"],
     "estimator/filter": ["estimator/geometry", "estimator/models"],
     "estimator/navigation": ["estimator/geometry", "estimator/models", "estimator/filter"],
-    "estimator/passes": ["estimator/geometry", "estimator/models", "estimator/filter", "estimator/navigation"],
+    "estimator/statistics": [],
+    "estimator/passes": ["estimator/geometry", "estimator/models", "estimator/filter", "estimator/navigation",
+                         "estimator/statistics"],
     "estimator": ["estimator"],  # planning, diagnosis: on top of all the others
     "protocol": ["protocol", "estimator/geometry"],
     "protocol/flash": [*BYTES],
@@ -45,6 +47,10 @@ IMPURE = re.compile(
     r"hdf5.*|sqlite3\.h|sdbus-c\+\+/.*|lcm/.*|toml\+\+/.*|CLI/.*|linux/.*|net/.*)$")
 # <cstdio> has snprintf, which is a function of its arguments, and these, which are not.
 OUTPUT = re.compile(r"\b(printf|fprintf|puts|putchar|fopen|fwrite|fread|fmt::print|std::cout|std::cerr)\b")
+# An effect is known by its address; its id is for files and people. Two variants of one effect share an id.
+DIAGNOSING = ("estimator/diagnosis/", "estimator/discovery/")
+ID_COMPARED = re.compile(
+    r'\bid\b\s*[!=]=|[!=]=\s*[\w.()>\[\]-]*\bid\b|\bid\.(starts|ends)_with\b|\beffect\s*[!=]=\s*"')
 # Codecs are bytes in, bytes out: the standard library, tl::expected for errors, fmt for their words, and AES-CMAC.
 CODECS = ("protocol/isotp", "protocol/uds", "protocol/flash", "protocol/ins_interface")
 CODEC_THIRD_PARTY = re.compile(r"^(tl/expected\.hpp|fmt/.*|openssl/.*)$")
@@ -87,6 +93,8 @@ def include_complaints(root, path):
         if not match:
             if source.startswith("estimator/") and OUTPUT.search(line.partition("//")[0]):
                 yield f"{where}: the estimator prints nothing and opens no file"
+            if source.startswith(DIAGNOSING) and ID_COMPARED.search(line.partition("//")[0]):
+                yield f"{where}: an effect is known by its address, not by its id"
             continue
         quoted, name = match[1] == '"', match[2]
         if quoted:

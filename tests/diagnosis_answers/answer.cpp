@@ -58,7 +58,7 @@ ordered_json to_json(const diagnosis::Located& l) {
   return {l.where, l.position, l.axis, number(l.significance), number(l.size), l.words};
 }
 
-ordered_json to_json(const diagnosis::Undetectable& u) { return {u.effect, number(u.expected_z)}; }
+ordered_json to_json(const diagnosis::Undetectable& u) { return {u.effect->id, number(u.expected_z)}; }
 
 ordered_json to_json(const diagnosis::ModelEffect& m) {
   return {m.effect->id, number(m.constant), listed(m.size), listed(m.covariance.reshaped())};
@@ -80,10 +80,12 @@ ordered_json to_json(const diagnosis::HeldOutState& s) {
 }
 
 ordered_json to_json(const diagnosis::Split& s) {
-  ordered_json j = {
-      {"effect", s.effect}, {"rivals", s.rivals}, {"now", number(s.separation_now)}, {"contain", s.contain}};
+  ordered_json j = {{"effect", s.effect->id},
+                    {"rivals", diagnosis::ids_of(s.rivals)},
+                    {"now", number(s.separation_now)},
+                    {"contain", diagnosis::ids_of(s.contain)}};
   for (const diagnosis::Experiment& e : s.experiments) {
-    j["experiments"].push_back({e.id, number(e.separation), e.closest});
+    j["experiments"].push_back({e.id, number(e.separation), e.closest->id});
   }
   return j;
 }

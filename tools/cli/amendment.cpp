@@ -85,27 +85,17 @@ std::string quantum_text(const Finding& f) {
 }
 
 std::string equation_text(const Finding& f, double mean_temperature_c, double latitude) {
-  const bool thermal = f.effect.ends_with("_temperature");
   std::string text = effect_head(f.effect);
-  bool measured = false;
   for (const FindingParameter& p : f.parameters) {
-    std::string key = p.name;
-    double value = p.value;
-    measured = measured || p.unit.ends_with("/degC");
-    if (p.name == "tau" && p.unit == "s") {
-      key = "tau_s";
-    } else if (p.name == "w0") {
-      key = "width";
-      value /= units::degree_per_hour;
-    } else if (thermal && !p.unit.ends_with("/degC")) {
-      key = "warm_up_" + p.name;
-    }
-    text += key_value(key, value);
+    text += p.physics_key.empty() ? key_value(p.name, p.value) : key_value(p.physics_key, p.physics_value);
   }
-  if (thermal && measured) {
+  if (f.source == nullptr) {
+    return text;
+  }
+  if (f.source->temperature == diagnosis::TemperatureUse::measured) {
     text += key_value("reference_c", mean_temperature_c);
   }
-  if (f.effect == "gyro_magnetic_sensitivity") {  // the field that the coefficients were found with
+  if (f.source->needs_heading) {  // the field that the coefficients were found with
     const Vector3 field = diagnosis::dipole_field(latitude);
     text += key_value("field_north", field(0)) + key_value("field_up", field(1)) + key_value("field_east", field(2));
   }
@@ -118,14 +108,15 @@ std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assu
   std::string text = "# Physics that a diagnosis found left out; sim_ins and selfcal simulate load it.\n";
   const double heading = d.calibration.initial_attitude.heading;
   for (const Finding& f : d.findings) {
-    if (f.effect == "base_settling") {
-      text += settling_text(f, heading);
-    } else if (f.effect == "base_sway") {
+    const bool moves = f.source != nullptr && f.source->displacement != nullptr;
+    if (moves && f.source->constant.kind == diagnosis::EffectConstant::Kind::spectrum) {
       text += sway_text(f, heading);
-    } else if (f.effect == "gyro_noise_level" || f.effect == "accel_noise_level") {
-      text += noise_text(f, assumed);
+    } else if (moves) {
+      text += settling_text(f, heading);
     } else if (f.effect == "quantisation") {
       text += quantum_text(f);
+    } else if (f.effect == "gyro_noise_level" || f.effect == "accel_noise_level") {
+      text += noise_text(f, assumed);
     } else {
       text += equation_text(f, d.mean_temperature_c, latitude);
     }

@@ -183,7 +183,7 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
   }
   if (hardest == nullptr && !splits.empty()) {
     fmt::print(stderr, "selfcal diagnose: {} is not written: nothing splits {} from what it is a special case of\n",
-               arguments.split_schedule, splits.front().effect);
+               arguments.split_schedule, splits.front().effect->id);
     return splits;
   }
   if (hardest == nullptr) {
@@ -191,9 +191,9 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
         .map([&] { return splits; });
   }
   const diagnosis::Experiment& best = hardest->experiments.front();
-  const std::string text =
-      fmt::format("# Splits {} from {}: {}; {:.1f} sigma predicted.\n{}", hardest->effect,
-                  fmt::join(hardest->rivals, ", "), best.words, best.separation, format_schedule(best.schedule));
+  const std::string text = fmt::format("# Splits {} from {}: {}; {:.1f} sigma predicted.\n{}", hardest->effect->id,
+                                       fmt::join(ids_of(hardest->rivals), ", "), best.words, best.separation,
+                                       format_schedule(best.schedule));
   return write_file_atomically(arguments.split_schedule, text).map([&] { return splits; });
 }
 

@@ -102,14 +102,16 @@ std::string empirical_text(const diagnosis::EmpiricalDescription& d) {
 ordered_json splits_json(const std::vector<diagnosis::Split>& splits) {
   ordered_json all = ordered_json::array();
   for (const diagnosis::Split& s : splits) {
-    ordered_json j = {
-        {"effect", s.effect}, {"rivals", s.rivals}, {"contained_in", s.contain}, {"separation_now", s.separation_now}};
+    ordered_json j = {{"effect", s.effect->id},
+                      {"rivals", ids_of(s.rivals)},
+                      {"contained_in", ids_of(s.contain)},
+                      {"separation_now", s.separation_now}};
     j["experiments"] = ordered_json::array();
     for (const diagnosis::Experiment& e : s.experiments) {
       j["experiments"].push_back({{"id", e.id},
                                   {"words", e.words},
                                   {"separation", e.separation},
-                                  {"closest_rival", e.closest},
+                                  {"closest_rival", e.closest->id},
                                   {"duration_s", e.schedule.duration_s()}});
     }
     all.push_back(std::move(j));
@@ -120,16 +122,16 @@ ordered_json splits_json(const std::vector<diagnosis::Split>& splits) {
 std::string splits_text(const std::vector<diagnosis::Split>& splits) {
   std::string text;
   for (const diagnosis::Split& s : splits) {
-    text +=
-        fmt::format("{} against {}: {:.1f} sigma apart now\n", s.effect, fmt::join(s.rivals, ", "), s.separation_now);
+    text += fmt::format("{} against {}: {:.1f} sigma apart now\n", s.effect->id, fmt::join(ids_of(s.rivals), ", "),
+                        s.separation_now);
     if (!s.contain.empty()) {
       text += fmt::format(
           "  nothing splits it from {}, of which it is a special case: the fewer parameters are preferred\n",
-          fmt::join(s.contain, ", "));
+          fmt::join(ids_of(s.contain), ", "));
     }
     for (const diagnosis::Experiment& e : s.experiments) {
       text += fmt::format("  {:6.1f} sigma with this recording and one more, {:.0f} min: {} (closest rival {})\n",
-                          e.separation, e.schedule.duration_s() / 60.0, e.words, e.closest);
+                          e.separation, e.schedule.duration_s() / 60.0, e.words, e.closest->id);
     }
   }
   return text;

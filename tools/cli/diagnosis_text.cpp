@@ -138,7 +138,7 @@ std::string undetectable_text(const Diagnosis& d) {
                    [](const auto& a, const auto& b) { return a.expected_z > b.expected_z; });
   std::string text = "\nnot visible in this recording at its typical size (sigma to be expected):\n";
   for (const diagnosis::Undetectable& u : order) {
-    text += fmt::format("  {:>5}  {}\n", number_text(u.expected_z), u.effect);
+    text += fmt::format("  {:>5}  {}\n", number_text(u.expected_z), u.effect->id);
   }
   return text;
 }

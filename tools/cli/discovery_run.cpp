@@ -111,10 +111,8 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const
   if (!discover && arguments.laws.empty()) {
     return result;
   }
-  const discovery::Increments increments = discovery::without_named(data, diagnosis);
-  ImuData rest = data;
-  rest.delta_theta = increments.delta_theta;
-  rest.delta_v = increments.delta_v;
+  const auto without = discovery::without_named(data, diagnosis);
+  const ImuData& rest = without.data();
   const CalibrationOutcome calibration = selfcal::diagnosis::calibrate_still(rest, {});
   if (!calibration.result) {
     return fail(ErrorKind::bad_input, calibration.failure.message);

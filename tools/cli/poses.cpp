@@ -91,7 +91,7 @@ nlohmann::ordered_json to_json(const std::vector<diagnosis::PoseEffect>& effects
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const diagnosis::PoseEffect& e : effects) {
     nlohmann::ordered_json j = {
-        {"effect", e.effect}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
+        {"effect", e.effect->id}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
     j["parameters"] = nlohmann::ordered_json::array();
     for (std::size_t k = 0; k < e.value.size(); ++k) {
       j["parameters"].push_back({{"name", e.parameters[k]}, {"value", e.value[k]}, {"sigma", e.sigma[k]}});
@@ -128,18 +128,19 @@ std::string answer_text(const diagnosis::PoseDiagnosis& d) {
   text += fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms, held out {:.3f} mg",
                       d.accel_adequate ? "adequate" : "misfit", 1e3 * d.accel_rms_g, 1e3 * d.accel_held_out_rms_g);
   if (!d.accel_tried.empty()) {
-    text += fmt::format("; nearest to an effect: {} (log10 p {:.1f})", d.accel_tried.front().effect,
+    text += fmt::format("; nearest to an effect: {} (log10 p {:.1f})", d.accel_tried.front().effect->id,
                         d.accel_tried.front().log_p / std::log(10.0));
   }
   const auto rms = [](const std::array<double, 3>& v) { return fmt::format("{:.2f}/{:.2f}/{:.2f}", v[0], v[1], v[2]); };
   text += fmt::format("\ngyros in the poses, raw units rms, poses left out in turn: bias alone {} (white noise {})\n",
                       rms(d.gyro_held_out_rms), rms(d.gyro_white_rms));
   for (const diagnosis::PoseEffect& e : d.gyro_tried) {
-    text += fmt::format("  with {:28} {}  log10 p {:.1f}\n", e.effect, rms(e.held_out_rms), e.log_p / std::log(10.0));
+    text +=
+        fmt::format("  with {:28} {}  log10 p {:.1f}\n", e.effect->id, rms(e.held_out_rms), e.log_p / std::log(10.0));
   }
   text += d.gyro_named.empty() ? "nothing named\n" : "named:\n";
   for (const diagnosis::PoseEffect& e : d.gyro_named) {
-    text += fmt::format("  {} leaves {}\n", e.effect, rms(e.held_out_rms));
+    text += fmt::format("  {} leaves {}\n", e.effect->id, rms(e.held_out_rms));
     for (std::size_t k = 0; k < e.value.size(); ++k) {
       text += fmt::format("    {:4} {:8.2f} +- {:.2f}\n", e.parameters[k], e.value[k], e.sigma[k]);
     }

@@ -61,12 +61,11 @@ with which significance it would see that size (`expected_z` in its JSON).
 
 )";
   for (const diagnosis::Effect& e : diagnosis::catalogue()) {
-    text += fmt::format("### {}{}\n\n", e.id, e.needs_temperature ? " (with a temperature channel)" : "");
+    text += fmt::format("### {}{}\n\n", e.id,
+                        e.temperature == diagnosis::TemperatureUse::measured ? " (with a temperature channel)" : "");
     text += fmt::format("    {}\n\n- coefficients and typical size: {}\n", e.equation, words(e));
-    if (e.constants.empty() || !std::isnan(e.constants.front())) {
-      text += fmt::format("- constant: {}, fitted\n",
-                          e.constant_name.empty() ? std::string("periods found in the recording")
-                                                  : fmt::format("`{}` in {}", e.constant_name, e.constant_unit));
+    if (e.constant.kind != diagnosis::EffectConstant::Kind::none) {
+      text += fmt::format("- constant: `{}` in {}, fitted\n", e.constant.name, e.constant.unit);
     }
     text += fmt::format("- where it shows: {}\n- what tells it from its rivals: {}\n\n", e.excited, e.experiment);
   }

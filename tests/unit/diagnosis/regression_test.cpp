@@ -1,4 +1,4 @@
-#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/diagnosis/regression.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,21 +9,6 @@
 
 namespace selfcal::diagnosis {
 namespace {
-
-// Two degrees of freedom: the tail is exp(-x/2) exactly. The routine promises 1e-10.
-TEST(ChiSquaredTail, IsExponentialForTwoDegrees) {
-  for (const double x : {0.1, 1.0, 3.9, 4.1, 50.0, 5000.0}) {
-    EXPECT_NEAR(log_chi_squared_tail(x, 2.0), -0.5 * x, 1e-10 * x + 1e-12);
-  }
-}
-
-// One degree: erfc, good to rounding where it does not underflow.
-TEST(ChiSquaredTail, IsNormalForOneDegree) {
-  for (const double z : {0.5, 2.0, 5.0, 10.0}) {
-    EXPECT_NEAR(log_chi_squared_tail(z * z, 1.0), std::log(std::erfc(z / std::sqrt(2.0))), 1e-9);
-    EXPECT_NEAR(sigma_from_log_p(log_chi_squared_tail(z * z, 1.0)), z, 1e-6);
-  }
-}
 
 // A direction that even 300 typical sizes would not show (information below 1/300^2) takes no degree of freedom.
 TEST(FitColumns, LeavesOutWhatCannotBeSeen) {

@@ -1,18 +1,11 @@
-// Tails of distributions, in logarithms: strong effects have p-values that no double can hold.
+// Regression on columns from its normal equations, and sigmas of mixtures.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
 namespace selfcal::diagnosis {
-
-// Natural logarithm of P(chi-squared with `degrees` > value). Series and continued fraction of the incomplete gamma
-// function (Abramowitz and Stegun 6.5.29, 6.5.31); relative error below 1e-10.
-double log_chi_squared_tail(double value, double degrees);
-// log of min(1, count * p), given log p.
-double log_corrected(double log_p, double count);
-// The |z| whose two-sided normal tail has this log p; for words.
-double sigma_from_log_p(double log_p);
 
 // One of the normal distributions that make up a mixture; sigma 0: a point.
 struct Share {
@@ -30,6 +23,9 @@ struct Fit {
   double gain = 0.0;           // fall of the residual's square
   int rank = 0;
 };
+// Solves the normal equations of columns that are fitted beside those in question, with a prior of 1000 typical sizes (no sensor
+// is that bad), so that a direction that nothing shows is left alone instead of divided by zero.
+Eigen::LDLT<Eigen::MatrixXd> solver_beside(Eigen::MatrixXd information);
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most = 300.0);
 // Rows r_k of the visible directions with gain = sum (r_k score)^2, as fit_columns takes them.
 Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most = 300.0);

@@ -1,4 +1,4 @@
-#include "estimator/diagnosis/statistics.hpp"
+#include "estimator/diagnosis/regression.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -7,51 +7,6 @@
 #include <numbers>
 
 namespace selfcal::diagnosis {
-
-double log_chi_squared_tail(double value, double degrees) {
-  const double a = 0.5 * degrees;
-  const double x = 0.5 * value;
-  if (x <= 0.0 || degrees <= 0.0) {
-    return 0.0;
-  }
-  const double front = -x + a * std::log(x) - std::lgamma(a);
-  if (x < a + 1.0) {  // 1 - P by the series
-    double term = 1.0 / a, sum = term;
-    for (int n = 1; n < 1000 && term > 1e-14 * sum; ++n) {
-      term *= x / (a + n);
-      sum += term;
-    }
-    return std::log1p(-std::min(std::exp(front) * sum, 1.0 - 1e-15));
-  }
-  constexpr double tiny = 1e-300;  // Lentz's method
-  double b = x + 1.0 - a, c = 1.0 / tiny, d = 1.0 / b, h = d;
-  for (int n = 1; n < 1000; ++n) {
-    const double an = -n * (n - a);
-    b += 2.0;
-    d = an * d + b;
-    d = std::abs(d) < tiny ? tiny : d;
-    c = b + an / c;
-    c = std::abs(c) < tiny ? tiny : c;
-    d = 1.0 / d;
-    const double change = d * c;
-    h *= change;
-    if (std::abs(change - 1.0) < 1e-13) {
-      break;
-    }
-  }
-  return front + std::log(h);
-}
-
-double log_corrected(double log_p, double count) { return std::min(0.0, log_p + std::log(count)); }
-
-double sigma_from_log_p(double log_p) {
-  double low = 0.0, high = std::sqrt(std::max(1.0, -2.0 * log_p)) + 1.0;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (log_chi_squared_tail(middle * middle, 1.0) > log_p ? low : high) = middle;
-  }
-  return low;
-}
 
 namespace {
 
@@ -103,6 +58,12 @@ double sigma_about(double centre, const std::vector<Share>& shares) {
     (held(middle) < 0.95 ? low : high) = middle;
   }
   return high / of_95_percent;
+}
+
+Eigen::LDLT<Eigen::MatrixXd> solver_beside(Eigen::MatrixXd information) {
+  constexpr double widest = 1000.0;
+  information.diagonal().array() += 1.0 / (widest * widest);
+  return Eigen::LDLT<Eigen::MatrixXd>(information);
 }
 
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most) {

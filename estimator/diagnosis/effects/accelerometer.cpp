@@ -1,0 +1,100 @@
+// What an accelerometer does to the specific force that acts on it.
+#include <array>
+
+#include "estimator/diagnosis/effects/families.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr std::array creep_tau_s = {10.0, 20.0, 35.0, 60.0, 100.0, 170.0};
+
+// Creep after each turn.
+void relaxation(const EffectContext& c, double tau, Columns velocity, Columns /*angle*/) {
+  add_axes(velocity, Vector3::Constant(decay_integral(c, tau)));
+}
+
+// Bias linear in time.
+void ramp(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
+  add_axes(velocity, Vector3::Constant(0.5 * (c.start_s + c.end_s) * c.dt));
+}
+
+// Nonlinearity in the input axis. In dwells with |u| 0 or 1 the scale factors stand for the second order.
+void quadratic(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
+  add_axes(velocity, c.u.cwiseAbs2() * c.dt);
+}
+void cubic(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
+  add_axes(velocity, c.u.cwiseAbs2().cwiseProduct(c.u) * c.dt);
+}
+
+// Products of two axes in one accelerometer.
+std::vector<EffectParameter> product_parameters() {
+  std::vector<EffectParameter> all;
+  for (const char* name : {"x_xy", "x_xz", "x_yz", "x_yy", "x_zz", "y_xy", "y_yz", "y_xz", "y_xx", "y_zz", "z_xz",
+                           "z_yz", "z_xy", "z_xx", "z_yy"}) {
+    all.push_back({name, "ug/g^2", units::micro_g, 20.0});
+  }
+  return all;
+}
+void cross_coupling(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
+  constexpr int products[3][5][2] = {{{0, 1}, {0, 2}, {1, 2}, {1, 1}, {2, 2}},
+                                     {{0, 1}, {1, 2}, {0, 2}, {0, 0}, {2, 2}},
+                                     {{0, 2}, {1, 2}, {0, 1}, {0, 0}, {1, 1}}};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int k = 0; k < 5; ++k) {
+      velocity(axis, 5 * axis + k) += c.u(products[axis][k][0]) * c.u(products[axis][k][1]) * c.dt;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Effect> accelerometer_effects() {
+  std::vector<Effect> all;
+  all.push_back({.id = "accel_relaxation",
+                 .place = 30,
+                 .equation = "df_i = r_i exp(-s/tau), s since the turn",
+                 .excited = "first minutes of the dwells after a turn",
+                 .experiment = "a longer dwell after fewer turns",
+                 .parameters = axis_parameters("ug", units::micro_g, 50.0),
+                 .constant = time_constant(creep_tau_s),
+                 .triad = Triad::accelerometer,
+                 .sensor = relaxation,
+                 .since_turns = true});
+  all.push_back({.id = "accel_bias_ramp",
+                 .place = 40,
+                 .equation = "df_i = c_i t",
+                 .excited = "whole recording",
+                 .experiment = "a longer recording, a temperature channel",
+                 .parameters = axis_parameters("ug/h", units::micro_g / units::hour, 20.0),
+                 .triad = Triad::accelerometer,
+                 .sensor = ramp,
+                 .lack_of_fit = std::make_shared<const Effect>(accel_warm_up())});
+  all.push_back({.id = "accel_quadratic",
+                 .place = 90,
+                 .equation = "df_i = k_i u_i^2",
+                 .excited = "rotations",
+                 .experiment = "dwells at 45 deg",
+                 .parameters = axis_parameters("ug/g^2", units::micro_g, 20.0),
+                 .triad = Triad::accelerometer,
+                 .sensor = quadratic});
+  all.push_back({.id = "accel_cubic",
+                 .place = 100,
+                 .equation = "df_i = k_i u_i^3",
+                 .excited = "rotations",
+                 .experiment = "dwells at 45 deg",
+                 .parameters = axis_parameters("ug/g^3", units::micro_g, 10.0),
+                 .triad = Triad::accelerometer,
+                 .sensor = cubic});
+  all.push_back({.id = "accel_cross_coupling",
+                 .place = 230,
+                 .equation = "df_i = k u_j u_k, j != i or k != i",
+                 .excited = "rotations, tilted dwells",
+                 .experiment = "dwells at 45 deg, a tilted base",
+                 .parameters = product_parameters(),
+                 .triad = Triad::accelerometer,
+                 .sensor = cross_coupling});
+  return all;
+}
+
+}  // namespace selfcal::diagnosis

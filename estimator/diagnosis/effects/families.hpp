@@ -1,0 +1,20 @@
+// The five families of effects. An effect stands in one of them: a row and an equation.
+#pragma once
+
+#include <vector>
+
+#include "estimator/diagnosis/effect.hpp"
+
+namespace selfcal::diagnosis {
+
+std::vector<Effect> thermal_effects();
+std::vector<Effect> accelerometer_effects();
+std::vector<Effect> gyro_effects();
+std::vector<Effect> mounting_effects();
+std::vector<Effect> base_effects();
+
+// A bias that warms up, temperature not measured: effects of their own, and what a drift in time leaves some of.
+Effect accel_warm_up();
+Effect gyro_warm_up();
+
+}  // namespace selfcal::diagnosis

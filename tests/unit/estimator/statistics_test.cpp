@@ -1,0 +1,90 @@
+// Distributions and the test for whiteness, against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "estimator/statistics/distributions.hpp"
+#include "estimator/statistics/whiteness.hpp"
+
+namespace selfcal {
+namespace {
+
+// Two degrees of freedom: the tail is exp(-x/2) exactly. The routine promises 1e-10.
+TEST(ChiSquaredTail, IsExponentialForTwoDegrees) {
+  for (const double x : {0.1, 1.0, 3.9, 4.1, 50.0, 5000.0}) {
+    EXPECT_NEAR(log_chi_squared_tail(x, 2.0), -0.5 * x, 1e-10 * x + 1e-12);
+  }
+}
+
+// One degree: erfc, good to rounding where it does not underflow.
+TEST(ChiSquaredTail, IsNormalForOneDegree) {
+  for (const double z : {0.5, 2.0, 5.0, 10.0}) {
+    EXPECT_NEAR(log_chi_squared_tail(z * z, 1.0), std::log(std::erfc(z / std::sqrt(2.0))), 1e-9);
+    EXPECT_NEAR(sigma_from_log_p(log_chi_squared_tail(z * z, 1.0)), z, 1e-6);
+  }
+}
+
+// Even degrees: exp(-x/2) times the first terms of the series of exp(x/2) (Abramowitz and Stegun 26.4.5). 60 are those of
+// the test for whiteness.
+TEST(ChiSquaredTail, IsASumForEvenDegrees) {
+  for (const double x : {20.0, 61.9, 62.1, 99.6, 200.0}) {
+    double term = 1.0, sum = 1.0;
+    for (int k = 1; k < 30; ++k) {
+      term *= 0.5 * x / k;
+      sum += term;
+    }
+    EXPECT_NEAR(log_chi_squared_tail(x, 60.0), -0.5 * x + std::log(sum), 1e-10);
+  }
+}
+
+// Two degrees in the numerator: P(F > f) = (1 + 2 f/n)^(-n/2).
+TEST(FTail, IsAPowerForTwoDegrees) {
+  for (const double n : {5.0, 30.0, 200.0}) {
+    for (const double f : {0.01, 1.0, 7.0, 400.0}) {
+      EXPECT_NEAR(log_f_tail(f, 2.0, n), -0.5 * n * std::log1p(2.0 * f / n), 1e-9 * (1.0 + n * f));
+    }
+  }
+}
+
+// One and one: F is the square of a Cauchy variable, P = 1 - 2/pi atan(sqrt(f)).
+TEST(FTail, IsCauchyForOneAndOne) {
+  for (const double f : {0.1, 1.0, 50.0}) {
+    EXPECT_NEAR(std::exp(log_f_tail(f, 1.0, 1.0)), 1.0 - 2.0 / M_PI * std::atan(std::sqrt(f)), 1e-12);
+  }
+}
+
+// +1, -1, +1 ... on each axis: the product at a lag is (n - lag)/n of the square, with its sign, so that Ljung and Box's sum is
+// 3 (n+2)/n sum over lags of (n - lag).
+TEST(Whiteness, OfAlternatingSignsIsKnown) {
+  for (const int n : {100, 6}) {
+    Eigen::VectorXd x(3 * n);
+    for (int k = 0; k < n; ++k) {
+      x.segment<3>(3 * k).setConstant(k % 2 == 0 ? 1.0 : -1.0);
+    }
+    const int lags = std::min(20, n - 1);
+    const double statistic = 3.0 * (n + 2.0) / n * (n * lags - 0.5 * lags * (lags + 1));
+    const Whiteness white = test_whiteness(x);
+    EXPECT_NEAR(white.log_p, log_chi_squared_tail(statistic, 3.0 * lags), 1e-9 * statistic);
+    EXPECT_NEAR(white.autocorrelation, -(n - 1.0) / n, 1e-12);
+  }
+}
+
+// p of white noise is uniform: of 400 draws 5 % +- 1.1 % lie below 0.05; 4 sigma.
+TEST(Whiteness, OfWhiteNoiseIsUniform) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  int below = 0;
+  constexpr int draws = 400;
+  for (int draw = 0; draw < draws; ++draw) {
+    Eigen::VectorXd x(3 * 500);
+    for (double& value : x) {
+      value = normal(random);
+    }
+    below += test_whiteness(x).log_p < std::log(0.05) ? 1 : 0;
+  }
+  EXPECT_NEAR(below, 0.05 * draws, 4.0 * std::sqrt(0.05 * 0.95 * draws)) << "seed 7";
+}
+
+}  // namespace
+}  // namespace selfcal
