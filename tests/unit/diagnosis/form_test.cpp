@@ -67,7 +67,7 @@ TEST(Forms, TakeNothingFromWhatIsNoForm) {
 
 TEST(Forms, EveryEffectOfTheSensorsHasSome) {
   for (const Effect& e : catalogue()) {
-    const Candidate named{&e, e.constants.empty() ? 1.0 : e.constants.front(), 0,
+    const Candidate named{&e, e.constant.tried().empty() ? 1.0 : e.constant.tried().front(), 0,
                           static_cast<int>(e.parameters.size())};
     if (e.sensor == nullptr) {
       EXPECT_TRUE(forms_of(named).empty()) << e.id;

@@ -1,0 +1,127 @@
+// A recording without noise in which an accelerometer creeps: linearised, corrected, linearised again.
+#include "estimator/diagnosis/linear_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/ideal_recording.hpp"
+#include "estimator/geometry/units.hpp"
+#include "estimator/passes/calibration.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+const Effect& creep() {
+  for (const Effect& e : catalogue()) {
+    if (e.id == "accel_relaxation") {
+      return e;
+    }
+  }
+  ADD_FAILURE() << "no creep in the catalogue";
+  return catalogue().front();
+}
+
+constexpr double tau_s = 35.0;
+
+// Perfect sensors but for a creep of 1.5 typical sizes, 75 ug, on z.
+class CreepingRecording : public testing::Test {
+ protected:
+  CreepingRecording() : ideal_(*named_schedule("horizontal", 60.0, 5.0), {0.02, -0.03, 0.6}, {0.7, 0.2, 0.0}, 50.0) {
+    input_.C_nb = ideal_.C_nb_start();
+    input_.noise.gyro_arw = 0.001 * units::degree_per_sqrt_hour;
+    input_.noise.accel_vrw = 5.0 * units::micro_g_per_sqrt_hz;
+    input_.noise.observation.sigma = 3e-6;
+    input_.prior.parameter_sigma = 2.0 * plausible_limit();
+    Correction added;
+    added.add(creep(), tau_s, -size_);
+    creeping_ = CorrectedRecording(RecordingContext(ideal_.data()), input_, added);
+  }
+
+  LinearModel about(const RecordingContext& context, const OperatingPoint& point,
+                    const std::vector<WalkTest>& walks = {}) const {
+    return LinearModel::about(context, point, {{&creep(), tau_s, 0, 0}}, walks, true);
+  }
+
+  IdealRecording ideal_;
+  PassInput input_;
+  Eigen::VectorXd size_ = Eigen::Vector3d(0.0, 0.0, 1.5);
+  CorrectedRecording creeping_;
+};
+
+// The signature is linear in the size to the second order of the creep, 75 ug against 1 g, and of what it turns the attitude by:
+// parts in a thousand.
+constexpr double linear_to = 5e-3;
+
+TEST_F(CreepingRecording, HasTheSizeThatWasPutIn) {
+  const RecordingContext context(creeping_.data());
+  const LinearModel model = about(context, {input_, CorrectedRecording(creeping_.data())});
+  const Eigen::VectorXd found = model.evidence().fit({0, 1, 2}).value;
+  EXPECT_NEAR(found(2), 1.5, 1.5 * linear_to);
+  EXPECT_NEAR(found(0), 0.0, 1.5 * linear_to);
+}
+
+// What was taken out counts as still in: half of the creep out of the increments, and the whole of it in the equations. What
+// explains the rest is the other half.
+TEST_F(CreepingRecording, TakenOutOfTheIncrementsStaysInTheEquations) {
+  const RecordingContext context(creeping_.data());
+  Correction half;
+  half.add(creep(), tau_s, 0.5 * size_);
+  const OperatingPoint whole{input_, CorrectedRecording(creeping_.data())};
+  const OperatingPoint settled = settle(context, whole, half);
+  const LinearModel model = about(context, settled);
+  EXPECT_NEAR(model.evidence().fit({0, 1, 2}).value(2), 1.5, 1.5 * linear_to);
+  // Beside what the recording made here leaves by itself (its velocity increments are those of each sample's middle).
+  const RecordingContext perfect(ideal_.data());
+  const Eigen::VectorXd own = about(perfect, {input_, CorrectedRecording(ideal_.data())}).rows().residual;
+  const Eigen::VectorXd all = about(context, whole).rows().residual - own;
+  EXPECT_NEAR((model.rows().residual - own).norm() / all.norm(), 0.5, linear_to);
+  EXPECT_NEAR((model.residual() - own).norm() / all.norm(), 1.0, linear_to);
+  // Another constant's column is another column: what was taken out keeps its own.
+  const LinearModel beside = LinearModel::about(context, settled, {{&creep(), 2.0 * tau_s, 0, 0}}, {}, true);
+  EXPECT_EQ(beside.candidates().size(), 1U);
+  EXPECT_NEAR(beside.residual().norm(), model.residual().norm(), linear_to * model.residual().norm());
+}
+
+// Marginalised in the model as by hand.
+TEST_F(CreepingRecording, WalksAreMarginalised) {
+  const RecordingContext context(creeping_.data());
+  const OperatingPoint point{input_, CorrectedRecording(creeping_.data())};
+  const LinearModel without = about(context, point);
+  const WalkTest walk = test_walk(without.evidence(), without.map(), without.first_map_column(), 5, {});
+  ASSERT_GT(walk.gain, 0.0);
+  Evidence by_hand = without.evidence();
+  std::vector<int> columns = walk.places;
+  for (int& column : columns) {
+    column += without.first_map_column();
+  }
+  by_hand.marginalise(columns, walk.covariance);
+  const LinearModel with = about(context, point, {walk});
+  EXPECT_NEAR(with.evidence().square, by_hand.square, 1e-9 * without.evidence().square);
+  EXPECT_LT(with.evidence().information(2, 2), without.evidence().information(2, 2));
+  EXPECT_NEAR(with.evidence_without_walks().square, without.evidence().square, 1e-9 * without.evidence().square);
+}
+
+// A value: a copy outlives what it was made from.
+TEST_F(CreepingRecording, OwnsItsIncrements) {
+  CorrectedRecording copy;
+  std::array<double, 3> last{};
+  {
+    const RecordingContext context(ideal_.data());
+    Correction out;
+    out.add(creep(), tau_s, size_);
+    const CorrectedRecording made(context, input_, out);
+    copy = made;
+    last = made.data().delta_v.back();
+  }
+  EXPECT_EQ(copy.data().delta_v.back(), last);
+  EXPECT_NE(copy.data().delta_v.data(), ideal_.data().delta_v.data());
+  EXPECT_EQ(copy.data().time_s.data(), ideal_.data().time_s.data());
+  EXPECT_EQ(copy.taken_out().effects.size(), 1U);
+  const CorrectedRecording nothing(RecordingContext(ideal_.data()), input_, {});
+  EXPECT_EQ(nothing.data().delta_v.data(), ideal_.data().delta_v.data());
+}
+
+}  // namespace
+}  // namespace selfcal::diagnosis
