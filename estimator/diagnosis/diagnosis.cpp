@@ -218,11 +218,6 @@ void Diagnoser::decide(const Naming& naming) {
   }
   std::vector<Finding> named;
   for (const Chosen& c : naming.chosen()) {
-    if (c.candidate.effect->data_fault != nullptr && d_.after.accepted) {
-      d_.faults.push_back(fault_of(c, data_));
-      leave_unjudged();
-      return;
-    }
     named.push_back(describe(c, naming.rows()));
     named.back().share = naming.share_of_misfit(c.gain);
     d_.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
@@ -252,6 +247,16 @@ void Diagnoser::decide(const Naming& naming) {
   }
   const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
   d_.after.accepted = d_.after.accepted && !jumps && itself && !naming.entangled();
+  // A fault of the data ends the diagnosis only where it explains what is seen: a name that the remainder rejects is none.
+  for (const Chosen& c : naming.chosen()) {
+    if (c.candidate.effect->data_fault != nullptr && d_.after.accepted) {
+      d_.model.clear();
+      d_.rejected.clear();
+      d_.faults.push_back(fault_of(c, data_));
+      leave_unjudged();
+      return;
+    }
+  }
   d_.unexplained = !d_.after.accepted;
   d_.remainder = d_.after.accepted ? remainder_of(naming) : std::nullopt;
   if (d_.unexplained) {
