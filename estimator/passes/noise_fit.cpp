@@ -114,11 +114,6 @@ StillNoiseFit fit_still_noise(DriftSeries series, const StillNoise& start) {
   }
   StillNoiseFit fit;
   fit.noise = noise_of(logs);
-  double sum = 0.0;
-  for (const double square : squares(series, fit.noise)) {
-    sum += square;
-  }
-  fit.nis_mean = series.size() == 0 ? 0.0 : sum / (3.0 * static_cast<double>(series.size()));
   for (std::size_t k = 0; k < series.size(); ++k) {
     if (series.inflation[k] > 1.0) {
       fit.disturbed.push_back({series.start_s[k], series.end_s[k], series.inflation[k]});

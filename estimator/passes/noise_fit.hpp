@@ -21,7 +21,6 @@ struct StillNoise {
 struct StillNoiseFit {
   StillNoise noise;
   std::vector<Disturbance> disturbed;  // seconds that the rest's noise cannot make, chronological
-  double nis_mean = 0.0;               // per degree of freedom, the disturbed seconds at their own noise
 };
 
 // From `start` (all positive) by steps of a factor down to 3 %. A second counts as disturbed where its three innovations would come by
