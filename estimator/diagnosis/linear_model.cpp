@@ -23,12 +23,12 @@ PassInput OperatingPoint::pass() const {
 
 OperatingPoint settle(const RecordingContext& context, const OperatingPoint& from, Correction correction) {
   OperatingPoint point{from.input, CorrectedRecording(context, from.input, std::move(correction))};
+  if (from.input.held) {
+    return point;
+  }
   PassInput about = point.pass();
   for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
     about.sign = sign;
-    if (about.held) {
-      break;
-    }
     const PassOutput out = run_pass(about);
     about.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
     about.C_nb = out.C_nb;
