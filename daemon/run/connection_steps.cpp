@@ -51,16 +51,42 @@ Task<Answer<Done>> ConnectionSteps::take_stock() {
   co_return Done{};
 }
 
-// A restart that nobody noticed as such may be another unit on the same plug: nothing is written to it on trust.
-Answer<Done> ConnectionSteps::check_power_cycles(std::uint32_t found, std::string_view when) {
-  if (!data_.power_cycles || found == *data_.power_cycles) {
-    data_.power_cycles = found;
-    return Done{};
+// A restart that nobody noticed may be another unit on the same plug: nothing is written to it on trust. One power cycle
+// more, with the set that was in force and the rotation that was pulled, is the same INS: it is unlocked again, as after a
+// link that was away. More than one at a time, or too many in a run, is no accident.
+Task<Answer<Done>> ConnectionSteps::check_power_cycles(ins::StateRecord found, std::string when) {
+  constexpr int at_most = 5;
+  if (!data_.power_cycles || found.power_cycles == *data_.power_cycles) {
+    data_.power_cycles = found.power_cycles;
+    co_return Done{};
   }
-  return protocol_error(
-      fmt::format("before {} the power-cycle counter is {}, it was {}: the INS was switched off meanwhile, "
-                  "or it is another one; {}",
-                  when, found, *data_.power_cycles, what_the_ins_holds()));
+  const auto refused = [&](std::string_view why) {
+    return protocol_error(
+        fmt::format("before {} the power-cycle counter is {}, it was {}: the INS was switched off meanwhile, "
+                    "or it is another one ({}); {}",
+                    when, found.power_cycles, *data_.power_cycles, why, what_the_ins_holds()));
+  };
+  if (found.power_cycles != *data_.power_cycles + 1) {
+    co_return refused("one restart counts one");
+  }
+  if (++data_.restarts_taken_up > at_most) {
+    co_return refused(fmt::format("the restart number {} of this run", data_.restarts_taken_up));
+  }
+  const auto in_force = co_await client_.read_record(ins::did::coefficients_in_force);
+  if (!in_force) {
+    co_return tl::unexpected(in_force.error());
+  }
+  if (*in_force != data_.in_force) {
+    co_return refused("its set in force is not the one that was read before");
+  }
+  if (journal_.record.rotation != 0 && found.run_id != journal_.record.rotation) {
+    co_return refused(
+        fmt::format("its FLASH holds rotation {}, this run's is {}", found.run_id, journal_.record.rotation));
+  }
+  co_return tl::unexpected<PortError>(
+      PortError{PortError::Kind::link, 0,
+                fmt::format("{}: the INS restarted before {}: power cycle {}, {} before", data_.config.interface, when,
+                            found.power_cycles, *data_.power_cycles)});
 }
 
 Task<Answer<Done>> ConnectionSteps::confirm_identity(std::string before) {
@@ -77,7 +103,7 @@ Task<Answer<Done>> ConnectionSteps::confirm_identity(std::string before) {
   if (!state) {
     co_return tl::unexpected(state.error());
   }
-  co_return check_power_cycles(state->power_cycles, before);
+  co_return co_await check_power_cycles(*state, before);
 }
 
 Task<Answer<Done>> ConnectionSteps::look_for_data() {

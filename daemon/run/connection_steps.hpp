@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "daemon/run/navigation_steps.hpp"
 #include "daemon/run/run_steps.hpp"
@@ -21,11 +20,11 @@ class ConnectionSteps : public RunSteps {
   Task<Answer<Done>> check_serial();
   // The INS's state and the set in force.
   Task<Answer<Done>> take_stock();
-  // The same INS, not switched off since: before it is changed.
+  // The same INS, before it is changed. One that restarted meanwhile is a lost link: it must be unlocked again.
   Task<Answer<Done>> confirm_identity(std::string before);
 
  private:
-  Answer<Done> check_power_cycles(std::uint32_t found, std::string_view when);
+  Task<Answer<Done>> check_power_cycles(ins::StateRecord found, std::string when);
   Task<Answer<Done>> look_for_data();
 
   NavigationSteps& navigation_;

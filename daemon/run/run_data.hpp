@@ -31,6 +31,7 @@ struct RunData {
   ins::StateRecord state;
   ins::SampleFormatRecord format;
   std::optional<std::uint32_t> power_cycles;
+  int restarts_taken_up = 0;   // that no request noticed, see ConnectionSteps::confirm_identity
   Bytes in_force;              // coefficient records, as on the bus
   bool data_complete = false;  // the FLASH holds all of the last rotation, whatever the INS has done since
   RotationClock rotation_clock;

@@ -104,7 +104,6 @@ void FakeIns::power_cycle() {
   turning_ = unlocked_ = extended_ = false;
   resting_ = ins::State::idle;
   check_started_.reset();
-  inactive_.clear();
   ++power_cycles_;
   in_force_ = slots_[1].version > slots_[0].version ? 1 : 0;
 }

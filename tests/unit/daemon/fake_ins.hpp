@@ -107,7 +107,7 @@ class FakeIns : public InsPort {
   std::uint32_t power_cycles_ = 1;
   std::array<ins::Coefficients, 2> slots_;
   std::size_t in_force_ = 0;
-  Bytes inactive_;  // as written, not committed yet
+  Bytes inactive_;  // as written, not committed yet; in FLASH
   std::optional<SteadyTime> check_started_;
   std::uint32_t upload_page_ = 0;
   Bytes upload_rest_;  // of the page that is being uploaded

@@ -314,6 +314,68 @@ TEST_P(AnotherOne, IsNoticedByItsPowerCycles) {
   EXPECT_TRUE(old_set_in_force());
 }
 
+// Its power failed while nothing was asked: locked again, with all that the run found in it before.
+TEST_P(AnotherOne, IsNotWhatRestartedOnce) {
+  config_.drift_check_s = 0.0;
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  ins_.power_cycle();
+  EXPECT_EQ(end(), State::completed) << reason();
+  EXPECT_FALSE(old_set_in_force());
+  EXPECT_THAT(observer_.warnings, testing::Contains(HasSubstr("the INS restarted before")));
+}
+
+TEST_P(AnotherOne, IsNoticedByItsSetInForceAfterARestart) {
+  config_.drift_check_s = 0.0;
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  ins_.power_cycle();
+  ins_.alter = [](Request request, Answer<Bytes>& answer) {
+    if (answer && begins(request, read_of(ins::did::coefficients_in_force))) {
+      auto set = *ins::decode_coefficients(Request(*answer).subspan(3));
+      set.value[0] += 1e-6;
+      answer = uds::read_response(ins::did::coefficients_in_force, ins::encode(set));
+    }
+  };
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("its set in force is not the one that was read before"));
+  ins_.power_cycle();
+  EXPECT_TRUE(old_set_in_force());
+}
+
+TEST_P(AnotherOne, IsNoticedByItsRotationAfterARestart) {
+  config_.drift_check_s = 0.0;
+  alter_state([](ins::StateRecord& record) { record.run_id += 3; });
+  altering_ = false;
+  begin();
+  ASSERT_TRUE(until(GetParam()));
+  altering_ = true;
+  ins_.power_cycle();
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("its FLASH holds rotation"));
+  ins_.power_cycle();
+  EXPECT_TRUE(old_set_in_force());
+}
+
+// Each time that it is asked, one more.
+TEST_F(HostileInsTest, AnInsThatRestartsForEverEndsTheRun) {
+  config_.drift_check_s = 0.0;
+  begin();
+  ASSERT_TRUE(until(State::erasing));
+  std::uint32_t restarts = 0;
+  ins_.alter = [&](Request request, Answer<Bytes>& answer) {
+    if (answer && begins(request, read_of(ins::did::state))) {
+      auto state = *ins::decode_state(Request(*answer).subspan(3));
+      state.power_cycles += ++restarts;
+      answer = uds::read_response(ins::did::state, ins::encode(state));
+    }
+  };
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("restart number 6 of this run"));
+  ins_.power_cycle();
+  EXPECT_TRUE(old_set_in_force());
+}
+
 INSTANTIATE_TEST_SUITE_P(Run, AnotherOne, testing::Values(State::erasing, State::writing, State::committing),
                          [](const auto& tested) { return std::string(name(tested.param)); });
 
