@@ -101,7 +101,7 @@ def main():
     parser = argparse.ArgumentParser(prog="tools/demo", description=__doc__)
     parser.add_argument("--table2", action="store_true", help="the paper's own schedule instead of the horizontal one")
     parser.add_argument("--seed", type=int, default=1, help="of the sensors' errors and noise (default 1)")
-    parser.add_argument("--speed", type=float, default=100.0, help="the INS's clock, times real time (default 100)")
+    parser.add_argument("--speed", type=float, default=200.0, help="the INS's clock, times real time (default 200)")
     parser.add_argument("--classic", action="store_true",
                         help="classic CAN at 1 Mbit/s instead of CAN FD: nine times the frames, so it takes longer")
     options = parser.parse_args()
