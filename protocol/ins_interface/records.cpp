@@ -42,6 +42,12 @@ std::uint8_t code(E value) {
 bool is_state(std::uint8_t value) { return value <= code(State::checking); }
 bool is_slot(std::uint8_t value) { return value <= code(Slot::b); }
 
+template <typename R>
+Expected<R> checked(const R& record) {
+  const auto well = check(record);
+  return well ? Expected<R>(record) : tl::unexpected(well.error());
+}
+
 struct FieldRange {
   std::string_view field;
   double value, least, most;
@@ -119,14 +125,23 @@ Expected<ScheduleRecord> decode_schedule(ByteView bytes) {
     position.outer_mdeg = in.get<std::int32_t>();
     position.inner_mdeg = in.get<std::int32_t>();
     position.dwell_ms = in.get<std::uint32_t>();
-    for (const std::int32_t angle : {position.outer_mdeg, position.inner_mdeg}) {
+    r.positions.push_back(position);
+  }
+  return checked(r);
+}
+
+Expected<void> check(const ScheduleRecord& r) {
+  if (r.positions.empty() || r.positions.size() > max_positions) {
+    return wrong("schedule", "number of positions", r.positions.size());
+  }
+  for (std::size_t i = 0; i < r.positions.size(); ++i) {
+    for (const std::int32_t angle : {r.positions[i].outer_mdeg, r.positions[i].inner_mdeg}) {
       if (angle < -full_turn_mdeg || angle > full_turn_mdeg) {
         return wrong("schedule", fmt::format("angle of position {} in millidegrees", i + 1), angle);
       }
     }
-    r.positions.push_back(position);
   }
-  return r;
+  return {};
 }
 
 Bytes encode(const SiteRecord& r) { return pack(r.latitude_deg, r.longitude_deg, r.height_m); }
@@ -140,6 +155,10 @@ Expected<SiteRecord> decode_site(ByteView bytes) {
   r.latitude_deg = in.get_double();
   r.longitude_deg = in.get_double();
   r.height_m = in.get_double();
+  return checked(r);
+}
+
+Expected<void> check(const SiteRecord& r) {
   // Written so that NaN fails too.
   if (!(std::abs(r.latitude_deg) <= 90.0)) {
     return wrong("site", "latitude", r.latitude_deg);
@@ -150,7 +169,7 @@ Expected<SiteRecord> decode_site(ByteView bytes) {
   if (!(r.height_m >= -1000.0 && r.height_m <= 20000.0)) {
     return wrong("site", "height in m", r.height_m);
   }
-  return r;
+  return {};
 }
 
 Bytes encode(const DirectoryRecord& r) {
@@ -170,17 +189,21 @@ Expected<DirectoryRecord> decode_directory(ByteView bytes) {
   r.pages_expected = in.get<std::uint32_t>();
   r.samples = in.get<std::uint64_t>();
   const auto complete = in.get<std::uint8_t>();
+  if (complete > 1) {
+    return wrong("directory", "completeness", complete);
+  }
+  r.complete = complete == 1;
+  return checked(r);
+}
+
+Expected<void> check(const DirectoryRecord& r) {
   if (r.first_page > r.pages_written) {
     return wrong("directory", fmt::format("first page beyond the {} written; it", r.pages_written), r.first_page);
   }
   if (r.pages_written == 0 && r.samples != 0) {
     return wrong("directory", "number of samples in no page", r.samples);
   }
-  if (complete > 1) {
-    return wrong("directory", "completeness", complete);
-  }
-  r.complete = complete == 1;
-  return r;
+  return {};
 }
 
 Bytes encode(const SampleFormatRecord& r) {
@@ -200,13 +223,17 @@ Expected<SampleFormatRecord> decode_sample_format(ByteView bytes) {
   r.gimbal_lsb_rad = in.get_double();
   r.page_bytes = in.get<std::uint32_t>();
   r.samples_per_page = in.get<std::uint16_t>();
+  return checked(r);
+}
+
+Expected<void> check(const SampleFormatRecord& r) {
   for (const auto& [field, value, least, most] : sample_format_ranges(r)) {
     if (!(value >= least && value <= most)) {  // written so that NaN fails too
       return fail(ErrorKind::bad_input, fmt::format("sample format record: {} is {:g}, must lie between {:g} and {:g}",
                                                     field, value, least, most));
     }
   }
-  return r;
+  return {};
 }
 
 Bytes encode(const RunRecord& r) { return pack(code(r.state), r.faults, r.position, r.run_id, r.pages_written); }
@@ -261,9 +288,16 @@ Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes) {
     return wrong("navigation check", "completeness", done);
   }
   r.done = done == 1;
+  for (double* value : {&r.elapsed_s, &r.north_m, &r.east_m, &r.max_horizontal_m}) {
+    *value = in.get_double();
+  }
+  return checked(r);
+}
+
+Expected<void> check(const NavigationCheckRecord& r) {
   struct Quantity {
     std::string_view name;
-    double& value;
+    double value;
     double least, most;
   };
   for (const auto& [name, value, least, most] :
@@ -271,13 +305,12 @@ Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes) {
         Quantity{"distance north in m", r.north_m, -half_way_round_m, half_way_round_m},
         Quantity{"distance east in m", r.east_m, -half_way_round_m, half_way_round_m},
         Quantity{"largest distance in m", r.max_horizontal_m, 0.0, half_way_round_m}}) {
-    value = in.get_double();
     if (!(value >= least && value <= most)) {  // written so that NaN fails too
       return fail(ErrorKind::bad_input, fmt::format("navigation check record: {} is {}, must lie between {:g} and {:g}",
                                                     name, value, least, most));
     }
   }
-  return r;
+  return {};
 }
 
 }  // namespace selfcal::ins

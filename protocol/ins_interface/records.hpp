@@ -1,5 +1,7 @@
 // The records behind the data identifiers and routines, and their bytes (big-endian). Every decoder checks length,
 // ranges and finiteness, and fails with kind bad_input, naming the field and its value.
+//
+// check(): the ranges of its values, whatever bytes they came from; bad_input, naming the field and its value.
 #pragma once
 
 #include <cstddef>
@@ -43,6 +45,7 @@ struct ScheduleRecord {
 };
 Bytes encode(const ScheduleRecord& record);
 [[nodiscard]] Expected<ScheduleRecord> decode_schedule(ByteView bytes);
+[[nodiscard]] Expected<void> check(const ScheduleRecord& record);
 
 struct SiteRecord {
   double latitude_deg = 0.0;  // WGS-84
@@ -51,6 +54,7 @@ struct SiteRecord {
 };
 Bytes encode(const SiteRecord& record);
 [[nodiscard]] Expected<SiteRecord> decode_site(ByteView bytes);
+[[nodiscard]] Expected<void> check(const SiteRecord& record);
 
 // The pages of the latest run. Page p of RequestUpload is page p of the run, from 0.
 struct DirectoryRecord {
@@ -65,6 +69,7 @@ struct DirectoryRecord {
 };
 Bytes encode(const DirectoryRecord& record);
 [[nodiscard]] Expected<DirectoryRecord> decode_directory(ByteView bytes);
+[[nodiscard]] Expected<void> check(const DirectoryRecord& record);
 
 struct SampleFormatRecord {
   double sample_rate_hz = 0.0;
@@ -76,6 +81,7 @@ struct SampleFormatRecord {
 };
 Bytes encode(const SampleFormatRecord& record);
 [[nodiscard]] Expected<SampleFormatRecord> decode_sample_format(ByteView bytes);
+[[nodiscard]] Expected<void> check(const SampleFormatRecord& record);
 
 // Result of routine self_calibration.
 struct RunRecord {
@@ -105,5 +111,6 @@ struct NavigationCheckRecord {
 };
 Bytes encode(const NavigationCheckRecord& record);
 [[nodiscard]] Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes);
+[[nodiscard]] Expected<void> check(const NavigationCheckRecord& record);
 
 }  // namespace selfcal::ins

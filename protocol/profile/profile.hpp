@@ -1,0 +1,81 @@
+// What an INS speaks: its addresses, identifiers, records, routines, raw data and axes, as a value. It is read from a file
+// (read_profile.hpp); our own INS's stands in config/profiles/selfcal.toml and is compiled in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "protocol/profile/layout.hpp"
+
+namespace selfcal::profile {
+
+struct Bus {
+  bool extended_ids = false;  // 29-bit identifiers
+  bool fd = false;
+  std::uint32_t request = 0, response = 0, functional = 0;
+  std::optional<std::uint32_t> status;  // of the state frame; the gimbal frame has the next one
+  std::uint8_t padding = 0xCC;
+  std::uint8_t block_size = 0, st_min = 0;  // told to the INS when it sends
+};
+
+struct Timing {
+  double request_timeout_s = 1.0;  // P2 of the client; the INS's own statement lengthens it
+  double p2_star_s = 5.0;
+  double tester_present_s = 2.0;
+};
+
+struct Security {
+  bool needed = true;      // AES-CMAC of the seed
+  std::uint8_t level = 1;  // of requestSeed; sendKey has the next
+};
+
+// A record of a role: which identifier has it, where its fields stand, and which values the INS does not tell because they are
+// always the same.
+struct Record {
+  std::optional<std::uint16_t> did;
+  Layout layout;
+  std::map<std::string, double, std::less<>> given;
+};
+
+struct Routine {
+  std::optional<std::uint16_t> id;
+  Layout start;   // option of the start; without fields: none
+  Layout result;  // of requestRoutineResults
+};
+
+// One of the 24 in the INS's record: which element of which field.
+struct Raw {
+  Layout page;
+  bool by_page = true;  // RequestUpload's address counts pages; else bytes
+  std::size_t address_bytes = 4, size_bytes = 4;
+  // Our axis k is the INS's axis index[k], times sign[k].
+  std::array<std::size_t, 3> axis{0, 1, 2};
+  std::array<int, 3> sign{1, 1, 1};
+  std::array<std::size_t, 2> gimbal{0, 1};  // our outer and inner: which of the INS's
+  std::array<int, 2> gimbal_sign{1, 1};
+};
+
+struct Profile {
+  std::string name;  // "selfcal"
+  std::string file;
+  Bus bus;
+  Timing timing;
+  std::uint8_t session = 3;  // for everything but reading
+  Security security;
+  std::uint16_t serial = 0, software = 0;
+  Record state, schedule, site, directory, sample_format;
+  std::optional<std::uint16_t> set_in_force, set_inactive, set_factory;
+  Layout set;
+  Routine rotate, erase, commit, navigation_check;
+  Raw raw;
+};
+using ProfilePtr = std::shared_ptr<const Profile>;
+
+// Our own INS: config/profiles/selfcal.toml, as compiled in.
+const ProfilePtr& built_in();
+
+}  // namespace selfcal::profile

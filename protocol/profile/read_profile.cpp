@@ -1,0 +1,361 @@
+#include "protocol/profile/read_profile.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/read_layout.hpp"
+
+namespace selfcal::profile {
+namespace {
+
+constexpr std::uint64_t most_did = 0xFFFF;
+constexpr std::uint64_t most_samples = 145;  // of a page, as the service keeps it
+constexpr std::array<std::string_view, 2> orders{"big", "little"};
+constexpr std::array<std::string_view, 3> addressings{"normal", "normal-29", "normal-fixed"};
+constexpr std::array<std::string_view, 2> methods{"aes-cmac", "none"};
+constexpr std::array<std::string_view, 2> address_units{"page", "byte"};
+
+// ISO 15765-2: the identifiers that normal fixed addressing makes of two addresses, with priority 6.
+constexpr std::uint32_t fixed_physical = 0x18DA0000, fixed_functional = 0x18DB0000;
+constexpr std::uint32_t all_nodes = 0x33;
+
+// One number must not mean two things.
+class Numbers {
+ public:
+  explicit Numbers(std::string_view what) : what_(what) {}
+  void take(Section& section, std::string_view key, std::uint64_t number) {
+    const auto [other, fresh] = taken_.emplace(number, section.path_of(key));
+    if (!fresh) {
+      section.fault(key, fmt::format("{} 0x{:04X} is that of {} already", what_, number, other->second));
+    }
+  }
+
+ private:
+  std::string_view what_;
+  std::map<std::uint64_t, std::string> taken_;
+};
+
+class ProfileReader {
+ public:
+  ProfileReader(const toml::table& table, const std::string& file) : faults_(file), root_(faults_, &table, "", 1) {
+    profile_.file = file;
+  }
+
+  Expected<ProfilePtr> read() {
+    profile_.name = root_.text("name", true).value_or("");
+    order_ = root_.word("byte_order", orders).value_or("big") == "little" ? ByteOrder::little : ByteOrder::big;
+    read_bus();
+    read_timing();
+    read_identity();
+    read_records();
+    read_set();
+    read_routines();
+    read_raw();
+    read_axes();
+    root_.only_these();
+    if (!faults_.none()) {
+      return fail(ErrorKind::bad_input, faults_.text());
+    }
+    return std::make_shared<const Profile>(std::move(profile_));
+  }
+
+ private:
+  std::optional<std::uint16_t> did(Section& section, std::string_view key, bool needed) {
+    const auto number = section.whole(key, 1, most_did, needed);
+    if (!number) {
+      return std::nullopt;
+    }
+    dids_.take(section, key, *number);
+    return static_cast<std::uint16_t>(*number);
+  }
+
+  std::uint32_t can_id(Section& bus, Numbers& ids, std::string_view key, bool needed) {
+    const auto id = bus.whole(key, 0, profile_.bus.extended_ids ? 0x1FFFFFFF : 0x7FF, needed);
+    if (id) {
+      ids.take(bus, key, *id);
+    }
+    return static_cast<std::uint32_t>(id.value_or(0));
+  }
+
+  void read_bus() {
+    Section bus = root_.table("bus", true);
+    if (!bus.there()) {
+      return;
+    }
+    Bus& b = profile_.bus;
+    const std::string addressing = bus.word("addressing", addressings, true).value_or("normal");
+    b.extended_ids = addressing != "normal";
+    b.fd = bus.flag("fd").value_or(false);
+    Numbers ids("identifier");
+    if (addressing == "normal-fixed") {
+      const auto ins = static_cast<std::uint32_t>(bus.whole("ins_address", 0, 255, true).value_or(0));
+      const auto tester = static_cast<std::uint32_t>(bus.whole("tester_address", 0, 255, true).value_or(0xF1));
+      if (ins == tester) {
+        bus.fault("tester_address", fmt::format("0x{:02X} is that of the INS already", tester));
+      }
+      b.request = fixed_physical | ins << 8U | tester;
+      b.response = fixed_physical | tester << 8U | ins;
+      b.functional = fixed_functional | all_nodes << 8U | tester;
+    } else {
+      b.request = can_id(bus, ids, "request", true);
+      b.response = can_id(bus, ids, "response", true);
+      b.functional = can_id(bus, ids, "functional", true);
+    }
+    if (bus.has("status")) {
+      b.status = can_id(bus, ids, "status", true);
+    }
+    b.padding = static_cast<std::uint8_t>(bus.whole("padding", 0, 255).value_or(0xCC));
+    b.block_size = static_cast<std::uint8_t>(bus.whole("block_size", 0, 255).value_or(0));
+    b.st_min = static_cast<std::uint8_t>(bus.whole("st_min", 0, 0xF9).value_or(0));
+    if (b.st_min > 0x7F && b.st_min < 0xF1) {
+      bus.fault("st_min", fmt::format("0x{:02X} is reserved: 0 to 0x7F ms, 0xF1 to 0xF9 times 100 us", b.st_min));
+    }
+    bus.only_these();
+  }
+
+  void read_timing() {
+    Section timing = root_.table("timing");
+    profile_.timing.request_timeout_s = timing.number("request_timeout_s", 0.01, 60).value_or(1.0);
+    profile_.timing.p2_star_s = timing.number("p2_star_s", 0.1, 60).value_or(5.0);
+    profile_.timing.tester_present_s = timing.number("tester_present_s", 0.1, 4.5).value_or(2.0);
+    timing.only_these();
+    Section session = root_.table("session");
+    profile_.session = static_cast<std::uint8_t>(session.whole("calibration", 2, 0x7E).value_or(3));
+    session.only_these();
+    Section security = root_.table("security", true);
+    if (security.there()) {
+      profile_.security.needed = security.word("method", methods, true).value_or("none") == "aes-cmac";
+      const auto level = security.whole("level", 1, 0x41);
+      if (level && *level % 2 == 0) {
+        security.fault("level", fmt::format("{} is even: requestSeed is odd, sendKey the next", *level));
+      }
+      profile_.security.level = static_cast<std::uint8_t>(level.value_or(1));
+      security.only_these();
+    }
+  }
+
+  void read_identity() {
+    Section identity = root_.table("identity", true);
+    if (identity.there()) {
+      profile_.serial = did(identity, "serial", true).value_or(0);
+      profile_.software = did(identity, "software", true).value_or(0);
+      identity.only_these();
+    }
+  }
+
+  void read_record(std::string_view name, Record& record, bool did_needed) {
+    const RecordRole& role = record_role(name);
+    Section section = root_.table(name, role.needed);
+    if (!section.there()) {
+      return;
+    }
+    record.did = did(section, "did", did_needed || section.has("fields"));
+    read_layout(section, role, order_, record);
+    section.only_these();
+  }
+
+  void read_records() {
+    read_record("state", profile_.state, true);
+    read_record("schedule", profile_.schedule, true);
+    read_record("site", profile_.site, true);
+    read_record("directory", profile_.directory, true);
+    read_record("sample_format", profile_.sample_format, false);
+  }
+
+  void read_set() {
+    Section section = root_.table("coefficients", true);
+    if (!section.there()) {
+      return;
+    }
+    profile_.set_in_force = did(section, "in_force", true);
+    profile_.set_inactive = did(section, "inactive", true);
+    profile_.set_factory = did(section, "factory", false);
+    Record record;
+    read_layout(section, set_role(), order_, record);
+    section.only_these();
+    if (!record.given.empty()) {
+      section.fault("given", "a set has no such values");
+    }
+    for (const std::string& complaint : coefficient_complaints(record.layout)) {
+      section.fault("fields", complaint);
+    }
+    profile_.set = std::move(record.layout);
+  }
+
+  void read_routine(std::string_view name, Routine& routine, bool needed, bool start_needed, bool result_needed) {
+    Section section = root_.table(name, needed);
+    if (!section.there()) {
+      return;
+    }
+    if (const auto id = section.whole("routine", 1, most_did, true)) {
+      routines_.take(section, "routine", *id);
+      routine.id = static_cast<std::uint16_t>(*id);
+    }
+    for (const auto& [part, layout, part_needed] :
+         {std::tuple("start", &routine.start, start_needed), std::tuple("result", &routine.result, result_needed)}) {
+      const std::string role = fmt::format("{}.{}", name, part);
+      const auto roles = record_roles();
+      if (std::ranges::find(roles, role, &RecordRole::table) == roles.end()) {
+        continue;
+      }
+      Section of_part = section.table(part, part_needed);
+      if (of_part.there()) {
+        Record record;
+        read_layout(of_part, record_role(role), order_, record);
+        of_part.only_these();
+        *layout = std::move(record.layout);
+      }
+    }
+    section.only_these();
+  }
+
+  void read_routines() {
+    read_routine("rotate", profile_.rotate, true, true, true);
+    read_routine("erase", profile_.erase, false, false, false);
+    read_routine("commit", profile_.commit, false, false, false);
+    read_routine("navigation_check", profile_.navigation_check, false, true, true);
+    Section commit(faults_, nullptr, "commit.start", root_.line_of("commit"));
+    if (profile_.commit.start.find("checksum") != nullptr && !profile_.set.checksum) {
+      commit.fault("fields.checksum", "the record of coefficients has none");
+    }
+    for (const auto* routine : {&profile_.state.layout, &profile_.rotate.result}) {
+      const Field* state = routine->find("state");
+      const bool knows = state != nullptr && state->codes.size() == 7;
+      if (profile_.navigation_check.id && state != nullptr && !knows) {
+        faults_.add(state->line, fmt::format("{}.fields.state.codes.checking", routine->record),
+                    "missing, and there is a navigation check");
+      }
+    }
+  }
+
+  void read_raw() {
+    Section upload = root_.table("upload", true);
+    if (upload.there()) {
+      profile_.raw.by_page = upload.word("address", address_units, true).value_or("page") == "page";
+      profile_.raw.address_bytes = upload.whole("address_bytes", 1, 4).value_or(4);
+      profile_.raw.size_bytes = upload.whole("size_bytes", 1, 4).value_or(4);
+      upload.only_these();
+    }
+    Section page = root_.table("page", true);
+    if (!page.there()) {
+      return;
+    }
+    Record record;
+    if (!page.has("bytes")) {
+      page.missing("bytes");
+    }
+    read_layout(page, record_role("page"), order_, record);
+    page.only_these();
+    if (!record.given.empty()) {
+      page.fault("given", "a page has no such values");
+    }
+    check_page(page, record.layout);
+    check_gimbal(record.layout);
+    profile_.raw.page = std::move(record.layout);
+  }
+
+  void check_page(Section& page, const Layout& layout) {
+    if (layout.each && layout.bytes > 0 && layout.most_repetitions() > most_samples) {
+      page.fault("bytes", fmt::format("{} samples fit, {} are the most", layout.most_repetitions(), most_samples));
+    }
+    for (const std::string_view name : {"delta_theta", "delta_v"}) {
+      const Field* field = layout.find(name);
+      if (field != nullptr && (field->type.kind != Kind::signed_integer || field->type.bytes > 4 ||
+                               field->scale != 1.0 || field->offset != 0.0)) {
+        faults_.add(field->line, fmt::format("page.each.fields.{}", name),
+                    "counts are i8 to i32 without scale, offset and unit: sample_format says what they are worth");
+      }
+    }
+    for (const std::string_view name : {"outer", "inner"}) {
+      const Field* field = layout.find(name);
+      if (field != nullptr && field->unit.empty() && field->type.name != "u16") {
+        faults_.add(field->line, fmt::format("page.each.fields.{}", name),
+                    "counts are u16; with a unit it may be any type");
+      }
+    }
+  }
+
+  void check_gimbal(const Layout& page) {
+    const Field* outer = page.find("outer");
+    const Field* inner = page.find("inner");
+    if (outer == nullptr || inner == nullptr) {
+      return;
+    }
+    const Record& format = profile_.sample_format;
+    const bool told = format.layout.find("gimbal_per_count") != nullptr || format.given.contains("gimbal_per_count");
+    if (outer->unit.empty() != inner->unit.empty()) {
+      faults_.add(std::max(outer->line, inner->line), "page.each.fields",
+                  "outer and inner: both in counts or both with a unit");
+    } else if (outer->unit.empty() != told) {
+      faults_.add(root_.line_of("sample_format"), "sample_format.fields.gimbal_per_count",
+                  told ? "told, and the page has angles with a unit" : "missing, and the page has counts");
+    }
+  }
+
+  // "-x": the other way round.
+  template <std::size_t N>
+  void read_turned(Section& axes, std::string_view key, const std::array<std::string_view, N>& names,
+                   std::array<std::size_t, N>& index, std::array<int, N>& sign) {
+    const auto words = axes.texts(key, N);
+    if (!words) {
+      return;
+    }
+    std::array<bool, N> taken{};
+    for (std::size_t k = 0; k < N; ++k) {
+      const std::string& word = (*words)[k];
+      const bool turned = word.starts_with('-');
+      const auto found = std::ranges::find(names, word.substr(turned ? 1 : 0));
+      const auto which = static_cast<std::size_t>(found - names.begin());
+      if (found == names.end() || taken[which]) {
+        return axes.fault(key, fmt::format("{}: each of {} once, with or without -", word, fmt::join(names, ", ")));
+      }
+      taken[which] = true;
+      index[k] = which;
+      sign[k] = turned ? -1 : 1;
+    }
+  }
+
+  void read_axes() {
+    Section axes = root_.table("axes");
+    Raw& raw = profile_.raw;
+    read_turned<3>(axes, "imu", {"x", "y", "z"}, raw.axis, raw.sign);
+    read_turned<2>(axes, "gimbal", {"outer", "inner"}, raw.gimbal, raw.gimbal_sign);
+    const bool even = (raw.axis[1] + 3 - raw.axis[0]) % 3 == 1;
+    if (even != (raw.sign[0] * raw.sign[1] * raw.sign[2] > 0)) {
+      axes.fault("imu", "left-handed: an odd number of signs and swaps");
+    }
+    axes.only_these();
+  }
+
+  Faults faults_;
+  Section root_;
+  ByteOrder order_ = ByteOrder::big;
+  Profile profile_;
+  Numbers dids_{"data identifier"}, routines_{"routine"};
+};
+
+}  // namespace
+
+Expected<ProfilePtr> parse_profile(std::string_view text, const std::string& file) {
+  const Expected<toml::table> table = parse_toml(text, file);
+  if (!table) {
+    return tl::unexpected(table.error());
+  }
+  return ProfileReader(*table, file).read();
+}
+
+Expected<ProfilePtr> load_profile(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: cannot be opened", file));
+  }
+  std::stringstream content;
+  content << in.rdbuf();
+  return parse_profile(content.str(), file);
+}
+
+}  // namespace selfcal::profile
