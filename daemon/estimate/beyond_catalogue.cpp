@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "daemon/estimate/quantity_text.hpp"
-#include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "protocol/law_file/law_file.hpp"
 
@@ -50,15 +49,14 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
 
 std::optional<Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                        const discovery::Progress& progress, const std::stop_token& stop) {
-  const auto without = discovery::without_named(data, diagnosis);
-  const ImuData& rest = without.data();
-  const CalibrationOutcome calibration = diagnosis::calibrate_still(rest, {}, stop);
-  if (!calibration.result) {
+  const discovery::DiagnosedRecording recording{data, diagnosis};
+  const auto rest = discovery::UnexplainedRest::of({&recording, 1}, stop);
+  if (!rest) {
     return std::nullopt;
   }
   discovery::DiscoveryOptions options;
   options.stop = stop;
-  return discovery::discover(rest, *calibration.result, options, progress);
+  return discovery::discover(rest->recordings(), options, progress);
 }
 
 double explained_share(const Discovery& found) {

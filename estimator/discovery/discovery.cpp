@@ -6,7 +6,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/statistics/distributions.hpp"
 
@@ -16,6 +16,8 @@ namespace {
 constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
 constexpr std::size_t class_size = 40;      // looked at exactly for the class
 constexpr int constant_rounds = 4;
+// Time and memory go with the square of the number of pieces: 5,040 columns, 200 MB a matrix.
+constexpr std::size_t most_pieces_of_all = 840;
 // A true law of z sigma gains (z^2 - 1)/2 on what was left out, for each of some forty parts is predicted from the rest; what
 // gains less than half of what it gains in the fit follows the noise.
 constexpr double least_held_out_share = 0.5;
@@ -29,24 +31,29 @@ double log_p_of_law(const Candidate& c) {
   return log_chi_squared_tail(c.gain, degrees) + c.cost + std::log(shares);
 }
 
+// The 24 where no law is.
+FittedRecording without_any_law(const CalibrationResult& calibration) {
+  return {calibration.value, calibration.covariance, calibration.covariance,
+          Eigen::MatrixXd::Zero(sensor_parameter_count, 0)};
+}
+
 class Search {
  public:
-  Search(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
-         const Progress& progress)
+  Search(std::span<const UnitRecording> recordings, const DiscoveryOptions& options, const Progress& progress)
       : options_(options),
         progress_(progress),
-        context_(data),
-        motion_(context_),
-        input_(diagnosis::forward_pass(data, calibration)),
-        sums_(said("pieces of the recording", [&] { return sum_over_pieces(motion_, input_, options.stop); })),
-        dictionary_(said("functions", [&] { return make_dictionary(sums_, motion_.available()); })),
+        scenes_(scenes_of(recordings)),
+        sums_(said("pieces of the recording", [&] { return sum_scenes(); })),
+        dictionary_(said("functions", [&] { return make_dictionary(sums_, available_in_all()); })),
         model_(std::make_unique<PieceModel>(sums_, dictionary_)),
-        shortlist_(motion_, sums_, dictionary_) {
+        shortlist_(sums_, dictionary_) {
+    laws_on_ = laws_on(scenes_);
     result_.misfit_before = sums_.sums.square - sums_.sums.rows;
     result_.rows = sums_.sums.rows;
     result_.functions_tried = dictionary_.functions.size() * axis_count;
-    empty_.fit.parameters = calibration.value;
-    empty_.fit.parameter_covariance = calibration.covariance;
+    for (const UnitRecording& recording : recordings) {
+      empty_.fit.recordings.push_back(without_any_law(recording.calibration));
+    }
     empty_.fit.square_after = sums_.sums.square;
     state_ = empty_;
   }
@@ -92,6 +99,36 @@ class Search {
     return work();
   }
 
+  std::size_t pieces_each() const { return std::min(most_pieces, most_pieces_of_all / scenes_.size()); }
+
+  PieceSums sum_scenes() {
+    std::vector<PieceSums> all;
+    for (const auto& scene : scenes_) {
+      all.push_back(sum_over_pieces(scene->motion, scene->input, options_.stop, pieces_each()));
+      scene->table = all.back();
+    }
+    return all.size() == 1 ? std::move(all.front()) : join(all);
+  }
+
+  PieceSums sum_what_is_left() const {
+    std::vector<PieceSums> all;
+    for (std::size_t r = 0; r < scenes_.size(); ++r) {
+      const diagnosis::CorrectedRecording rest = without_laws(laws_on_[r], state_.terms, state_.fit.coefficient);
+      PassInput input = scenes_[r]->input;
+      input.data = &rest.data();
+      all.push_back(sum_over_pieces(scenes_[r]->motion, input, options_.stop, pieces_each()));
+    }
+    return all.size() == 1 ? std::move(all.front()) : join(all);
+  }
+
+  laws::VariableSet available_in_all() const {
+    laws::VariableSet available = scenes_.front()->motion.available();
+    for (const auto& scene : scenes_) {
+      available &= scene->motion.available();
+    }
+    return available;
+  }
+
   bool room() const {
     return static_cast<int>(state_.terms.size() + state_.processes.size()) < options_.most_terms &&
            !options_.stop.stop_requested();
@@ -103,12 +140,7 @@ class Search {
     if (state_.terms.empty()) {
       return;
     }
-    const diagnosis::CorrectedRecording rest =
-        without_laws(motion_, sums_, input_, state_.terms, state_.fit.coefficient);
-    PassInput input = input_;
-    input.data = &rest.data();
-    const PieceSums settled =
-        said("what the laws leave", [&] { return sum_over_pieces(motion_, input, options_.stop); });
+    const PieceSums settled = said("what the laws leave", [&] { return sum_what_is_left(); });
     raw_score_ = sums_.sums.score;
     raw_square_ = sums_.sums.square;
     raw_model_ = std::move(model_);
@@ -221,7 +253,7 @@ class Search {
         }
       }
     }
-    const std::vector<double> gains = exact_gains(motion_, sums_, input_, given, alternatives, options_.stop);
+    const std::vector<double> gains = exact_gains(laws_on_, given, alternatives, options_.stop);
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       const auto first = gains.begin() + static_cast<std::ptrdiff_t>(factors.size() * k);
       const auto best = std::max_element(first, first + static_cast<std::ptrdiff_t>(factors.size()));
@@ -239,7 +271,7 @@ class Search {
   bool accept(const Candidate& candidate) {
     std::vector<LawTerm> terms = state_.terms;
     terms.push_back(candidate.term);
-    const LawFit fit = fit_laws(motion_, sums_, input_, terms, constant_rounds, options_.stop);
+    const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
     if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1)) {
       return false;
     }
@@ -279,7 +311,7 @@ class Search {
     std::vector<Candidate> candidates = shortlist_.best(model, most);
     project_out(model, state_.terms.size());
     const std::vector<LawTerm> others = all_but(k);
-    own = exact_gains(motion_, sums_, input_, others, {state_.terms[k]}, options_.stop).front();
+    own = exact_gains(laws_on_, others, {state_.terms[k]}, options_.stop).front();
     make_exact(candidates, others);
     return candidates;
   }
@@ -298,7 +330,7 @@ class Search {
       }
       std::vector<LawTerm> terms = state_.terms;
       terms[k] = candidates.front().term;
-      const LawFit fit = fit_laws(motion_, sums_, input_, terms, constant_rounds, options_.stop);
+      const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
       if (fit.square_after < state_.fit.square_after && predicts(fit, k)) {
         state_.costs[k] = candidates.front().cost;
         adopt(fit);
@@ -311,7 +343,7 @@ class Search {
     for (std::size_t k = 0; k < state_.terms.size() && state_.terms.size() > 1; ++k) {
       const Candidate here{state_.terms[k], state_.fit.gain[k], state_.costs[k], false};
       if (log_p_of_law(here) > std::log(options_.false_alarm_rate)) {
-        const LawFit fit = fit_laws(motion_, sums_, input_, all_but(k), constant_rounds, options_.stop);
+        const LawFit fit = fit_laws(laws_on_, all_but(k), constant_rounds, options_.stop);
         state_.costs.erase(state_.costs.begin() + static_cast<std::ptrdiff_t>(k));
         adopt(fit);
         k = static_cast<std::size_t>(-1);  // from the start: the others' gains have changed
@@ -351,8 +383,7 @@ class Search {
     result_.processes = state_.processes;
     result_.log_p_remaining = state_.log_p_remaining;
     result_.refused = state_.refused;
-    result_.parameters = state_.fit.parameters;
-    result_.parameter_covariance = state_.fit.parameter_covariance;
+    result_.fit = state_.fit;
     result_.misfit_after = (state_.processes.empty() ? state_.fit.square_after : model_->square()) - result_.rows;
     auto at = static_cast<Eigen::Index>(state_.terms.size());
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
@@ -382,10 +413,9 @@ class Search {
 
   const DiscoveryOptions& options_;
   const Progress& progress_;
-  diagnosis::RecordingContext context_;
-  LawMotion motion_;
-  PassInput input_;
-  PieceSums sums_;
+  std::vector<std::unique_ptr<Scene>> scenes_;
+  std::vector<LawRecording> laws_on_;  // the same, for fits
+  PieceSums sums_;                     // of all of them
   Dictionary dictionary_;
   std::unique_ptr<PieceModel> model_;
   std::unique_ptr<PieceModel> raw_model_;  // of the recording with its laws, once settle() took them out
@@ -398,9 +428,9 @@ class Search {
 
 }  // namespace
 
-Discovery discover(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
+Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
                    const Progress& progress) {
-  return Search(data, calibration, options, progress).run();
+  return Search(recordings, options, progress).run();
 }
 
 }  // namespace selfcal::discovery

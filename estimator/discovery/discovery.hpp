@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -61,14 +62,21 @@ struct Discovery {
   double log_p_remaining = 0.0;     // of the best function that was not taken, corrected for all that was tried
   std::string refused;              // the best function that did not predict what was left out; empty: none
   std::size_t functions_tried = 0;  // functions times axes
-  ParameterVector parameters;       // the 24 with the laws, SI
-  ParameterMatrix parameter_covariance;
+  LawFit fit;                       // of the laws in the order in which they were found, with the 24 of each recording
+};
+
+// One recording of the unit that is looked at. Both must outlive it.
+struct UnitRecording {
+  const ImuData& data;
+  const CalibrationResult& calibration;  // that of the 24 alone (diagnosis/still_calibration.hpp) of `data`
 };
 
 using Progress = std::function<void(const std::string&)>;
 
-// `calibration` is that of the 24 alone (diagnosis/still_calibration.hpp) of `data`.
-Discovery discover(const ImuData& data, const CalibrationResult& calibration, const DiscoveryOptions& options,
+// Recordings of one unit, one or more: a law has one coefficient and one set of constants in all of them, each recording has
+// its own 24, attitude, site and noise (shared_parameters.hpp asks what of the 24 is common). Only variables that all of them
+// have are looked at.
+Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
                    const Progress& progress = {});
 
 }  // namespace selfcal::discovery

@@ -103,82 +103,154 @@ void LawColumns::block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> ve
   }
 }
 
-LawFit fit_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input, std::vector<LawTerm> terms,
-                int rounds, const std::stop_token& stop) {
+namespace {
+
+// Normal equations and rows of the terms over all recordings, constants' derivatives behind the terms.
+struct JointSums {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  double square = 0.0, rows = 0.0;
+  RowSink sink;
+  std::vector<int> fold;  // [rows] dwell or rotation, of one recording after the other
+  std::vector<ColumnSums> each;
+};
+
+void append(const RowSink& more, RowSink& all) {
+  const Eigen::Index before = all.residual.size(), n = more.residual.size();
+  all.columns.conservativeResize(before + n, more.columns.cols());
+  all.residual.conservativeResize(before + n);
+  all.columns.bottomRows(n) = more.columns;
+  all.residual.tail(n) = more.residual;
+}
+
+JointSums sum_jointly(std::span<const LawRecording> recordings, const std::vector<LawTerm>& terms,
+                      const std::stop_token& stop) {
+  JointSums all;
+  int first_fold = 0;
+  for (const LawRecording& r : recordings) {
+    LawColumns source(r.motion, r.table, terms, true);
+    RowSink sink;
+    ColumnSums sums = run_columns(r.input, source, stop, &sink);
+    if (all.each.empty()) {
+      all.information = Eigen::MatrixXd::Zero(source.count(), source.count());
+      all.score = Eigen::VectorXd::Zero(source.count());
+    }
+    all.information += sums.information;
+    all.score += sums.score;
+    all.square += sums.square;
+    all.rows += sums.rows;
+    append(sink, all.sink);
+    int last_fold = first_fold;
+    for (const double t : sink.time_s) {
+      all.fold.push_back(first_fold + static_cast<int>(r.motion.context().segment_at(t)));
+      last_fold = std::max(last_fold, all.fold.back());
+    }
+    first_fold = last_fold + 1;
+    all.each.push_back(std::move(sums));
+  }
+  return all;
+}
+
+// What turns a constant's derivative into the column of the constant: its term's coefficient. [terms + constants]
+Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(terms.size()) + constants_of(terms));
+  auto at = static_cast<Eigen::Index>(terms.size());
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    for (std::size_t c = 0; c < terms[k].constants.size(); ++c) {
+      scale(at++) = coefficient(static_cast<Eigen::Index>(k));
+    }
+  }
+  return scale;
+}
+
+FittedRecording fitted(const PassInput& input, const ColumnSums& sums, const LawFit& fit,
+                       const Eigen::VectorXd& scale) {
+  const int first = sums.pass.layout.parameters();
+  FittedRecording r;
+  r.shift = sums.shift * scale.asDiagonal();
+  r.parameters = input.parameters + sums.pass.mean.segment<sensor_parameter_count>(first) +
+                 r.shift.leftCols(fit.coefficient.size()) * fit.coefficient;
+  r.covariance_alone = sums.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first);
+  r.covariance = r.covariance_alone + r.shift * fit.covariance * r.shift.transpose();
+  return r;
+}
+
+std::vector<int> first_numbers(std::size_t count) {
+  std::vector<int> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+// Coefficients with the constants unknown, what each term gains, and what it gains on what was left out.
+void describe(const JointSums& sums, const Eigen::VectorXd& scale, LawFit& fit) {
+  const Eigen::MatrixXd G = scale.asDiagonal() * sums.information * scale.asDiagonal();
+  fit.covariance = solve(G, scale.asDiagonal() * sums.score).covariance;
+  fit.gain.clear();
+  fit.collinear.clear();
+  fit.held_out_gain.clear();
+  const std::vector<int> linear = first_numbers(fit.terms.size());
+  for (const int k : linear) {
+    fit.collinear.push_back(1.0 - 1.0 / (fit.covariance(k, k) * G(k, k)));
+    fit.gain.push_back(gain_of(sums.information, sums.score, linear, k));
+    std::vector<int> without = linear;
+    without.erase(without.begin() + k);
+    fit.held_out_gain.push_back(
+        diagnosis::held_out_gain(sums.sink.columns, sums.sink.residual, sums.fold, linear, without));
+  }
+}
+
+}  // namespace
+
+LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> terms, int rounds,
+                const std::stop_token& stop) {
   LawFit fit;
   const int constants = constants_of(terms);
+  const std::vector<int> linear = first_numbers(terms.size());
   double best = -1.0;
-  std::vector<LawTerm> next = terms;
   for (int round = 0; round <= (constants > 0 ? rounds : 0); ++round) {
-    LawColumns source(motion, table, next, true);
-    RowSink sink;
-    const ColumnSums sums = run_columns(input, source, stop, &sink);
-    std::vector<int> linear(next.size());
-    std::iota(linear.begin(), linear.end(), 0);
+    const JointSums sums = sum_jointly(recordings, terms, stop);
     const Solution alone = solve(sums.information(linear, linear), sums.score(linear));
     if (alone.gain <= best * (1.0 + 1e-9)) {
       break;  // no better: the round before stands
     }
     best = alone.gain;
-    fit.terms = next;
+    fit.terms = terms;
     fit.coefficient = alone.value;
     fit.square_before = sums.square;
     fit.square_after = sums.square - alone.gain;
     fit.rows = sums.rows;
-    // Coefficients with the constants unknown: the column of a constant is the coefficient times the derivative.
-    Eigen::VectorXd scale = Eigen::VectorXd::Ones(source.count());
-    auto at = static_cast<Eigen::Index>(next.size());
-    for (std::size_t k = 0; k < next.size(); ++k) {
-      for (std::size_t c = 0; c < next[k].constants.size(); ++c) {
-        scale(at++) = alone.value(static_cast<Eigen::Index>(k));
-      }
-    }
-    const Eigen::MatrixXd G = scale.asDiagonal() * sums.information * scale.asDiagonal();
-    const Eigen::VectorXd b = scale.asDiagonal() * sums.score;
-    fit.covariance = solve(G, b).covariance;
-    const Eigen::MatrixXd shift = sums.shift * scale.asDiagonal();
-    fit.parameters = input.parameters + sums.pass.mean.segment<sensor_parameter_count>(sums.pass.layout.parameters()) +
-                     sums.shift.leftCols(static_cast<Eigen::Index>(next.size())) * alone.value;
-    fit.parameter_covariance = sums.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(
-                                   sums.pass.layout.parameters(), sums.pass.layout.parameters()) +
-                               shift * fit.covariance * shift.transpose();
-    fit.gain.clear();
-    fit.collinear.clear();
-    fit.held_out_gain.clear();
-    std::vector<int> fold;
-    for (const double t : sink.time_s) {
-      fold.push_back(static_cast<int>(motion.context().segment_at(t)));
-    }
-    for (const int k : linear) {
-      fit.collinear.push_back(1.0 - 1.0 / (fit.covariance(k, k) * G(k, k)));
-      fit.gain.push_back(gain_of(sums.information, sums.score, linear, k));
-      std::vector<int> without = linear;
-      without.erase(without.begin() + k);
-      fit.held_out_gain.push_back(diagnosis::held_out_gain(sink.columns, sink.residual, fold, linear, without));
+    const Eigen::VectorXd scale = column_scale(terms, alone.value);
+    describe(sums, scale, fit);
+    fit.recordings.clear();
+    for (std::size_t r = 0; r < recordings.size(); ++r) {
+      fit.recordings.push_back(fitted(recordings[r].input, sums.each[r], fit, scale));
     }
     if (constants > 0) {
-      const Solution full = solve(sums.information, sums.score);
-      refine_constants(next, full.value);
+      refine_constants(terms, solve(sums.information, sums.score).value);
     }
   }
   return fit;
 }
 
-std::vector<double> exact_gains(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                                const std::vector<LawTerm>& given, const std::vector<LawTerm>& alternatives,
-                                const std::stop_token& stop) {
+std::vector<double> exact_gains(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
+                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop) {
   std::vector<LawTerm> all = given;
   all.insert(all.end(), alternatives.begin(), alternatives.end());
-  LawColumns source(motion, table, all, false);
-  const ColumnSums sums = run_columns(input, source, stop);
-  std::vector<int> base(given.size());
-  std::iota(base.begin(), base.end(), 0);
-  const double before = base.empty() ? 0.0 : solve(sums.information(base, base), sums.score(base)).gain;
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+  for (const LawRecording& r : recordings) {
+    LawColumns source(r.motion, r.table, all, false);
+    const ColumnSums sums = run_columns(r.input, source, stop);
+    information = information.size() == 0 ? sums.information : Eigen::MatrixXd(information + sums.information);
+    score = score.size() == 0 ? sums.score : Eigen::VectorXd(score + sums.score);
+  }
+  const std::vector<int> base = first_numbers(given.size());
+  const double before = base.empty() ? 0.0 : solve(information(base, base), score(base)).gain;
   std::vector<double> gains;
   for (std::size_t k = 0; k < alternatives.size(); ++k) {
     std::vector<int> with = base;
     with.push_back(static_cast<int>(given.size() + k));
-    gains.push_back(solve(sums.information(with, with), sums.score(with)).gain - before);
+    gains.push_back(solve(information(with, with), score(with)).gain - before);
   }
   return gains;
 }
@@ -213,11 +285,12 @@ class Subtraction : public ExtraSignatures {
 
 }  // namespace
 
-diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
+diagnosis::CorrectedRecording without_laws(const LawRecording& recording, const std::vector<LawTerm>& terms,
+                                           const Eigen::VectorXd& coefficient) {
+  const PassInput& input = recording.input;
   diagnosis::AngleVelocity delta_theta(input.data->delta_theta.begin(), input.data->delta_theta.end());
   diagnosis::AngleVelocity delta_v(input.data->delta_v.begin(), input.data->delta_v.end());
-  LawColumns columns(motion, table, terms, false);
+  LawColumns columns(recording.motion, recording.table, terms, false);
   Subtraction subtraction(columns, coefficient, delta_theta, delta_v);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &subtraction);
   Interval interval;

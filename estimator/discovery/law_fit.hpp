@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -21,6 +21,22 @@ struct LawTerm {
   std::vector<double> constants;  // of its `?`
 };
 
+// One recording that laws are fitted to. All must outlive it; `table` is that of a pass with this input, a forward pass
+// about the calibrated recording.
+struct LawRecording {
+  const LawMotion& motion;
+  const NodeTable& table;
+  const PassInput& input;
+};
+
+// The 24 of one recording with the laws, SI.
+struct FittedRecording {
+  ParameterVector parameters = ParameterVector::Zero();
+  ParameterMatrix covariance = ParameterMatrix::Zero();        // that of the laws included
+  ParameterMatrix covariance_alone = ParameterMatrix::Zero();  // were the laws known
+  Eigen::MatrixXd shift;  // [24 x (terms + constants)] by what the 24 follow coefficients and constants
+};
+
 struct LawFit {
   std::vector<LawTerm> terms;   // with refined constants
   Eigen::VectorXd coefficient;  // [terms] in unit_of(axis)
@@ -29,8 +45,7 @@ struct LawFit {
   std::vector<double> gain;       // [terms] fall of the square by each, the others fitted
   std::vector<double> collinear;  // [terms] share of the information that the other terms and constants take, 0 to 1
   std::vector<double> held_out_gain;  // [terms] log-likelihood on dwells and rotations left out in turn
-  ParameterVector parameters;         // the 24 with the laws, SI
-  ParameterMatrix parameter_covariance;
+  std::vector<FittedRecording> recordings;
 };
 
 // Columns of the terms, each with the derivative with respect to each of its constants behind all of them.
@@ -53,17 +68,17 @@ class LawColumns : public ColumnSource {
   std::size_t next_ = 0;  // node
 };
 
-// Gauss-Newton in the constants, at most `rounds`; `input` a forward pass about the calibrated recording.
-LawFit fit_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input, std::vector<LawTerm> terms,
-                int rounds, const std::stop_token& stop = {});
+// Coefficients and constants common to all recordings, each with 33 states of its own. Gauss-Newton in the constants, at
+// most `rounds`.
+LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> terms, int rounds,
+                const std::stop_token& stop = {});
 
-// Fall of the residuals' square by each term alone, given `given`, from one pass; constants as they are.
-std::vector<double> exact_gains(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                                const std::vector<LawTerm>& given, const std::vector<LawTerm>& alternatives,
-                                const std::stop_token& stop = {});
+// Fall of the residuals' square by each term alone, given `given`, from one pass over each recording; constants as they are.
+std::vector<double> exact_gains(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
+                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop = {});
 
 // The recording less the laws, stretch by stretch, each spread evenly over its samples.
-diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
-                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
+diagnosis::CorrectedRecording without_laws(const LawRecording& recording, const std::vector<LawTerm>& terms,
+                                           const Eigen::VectorXd& coefficient);
 
 }  // namespace selfcal::discovery

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/scene.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
@@ -33,17 +33,17 @@ std::optional<LawTrialFailure> check(const LawMotion& motion, const NodeTable& t
 
 }  // namespace
 
-tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(const ImuData& data, const CalibrationResult& calibration,
+tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
                                                               const std::vector<LawTerm>& laws,
                                                               const std::vector<double>& stated) {
-  const diagnosis::RecordingContext context(data);
-  const LawMotion motion(context);
-  const PassInput input = diagnosis::forward_pass(data, calibration);
-  const NodeTable table = collect_nodes(motion, input);
-  if (auto failure = check(motion, table, laws)) {
-    return tl::unexpected(std::move(*failure));
+  const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
+  for (const auto& scene : scenes) {
+    scene->table = collect_nodes(scene->motion, scene->input);
+    if (auto failure = check(scene->motion, scene->table, laws)) {
+      return tl::unexpected(std::move(*failure));
+    }
   }
-  const LawFit fit = fit_laws(motion, table, input, laws, constant_rounds);
+  const LawFit fit = fit_laws(laws_on(scenes), laws, constant_rounds);
   std::vector<TriedLaw> tried;
   auto at = static_cast<Eigen::Index>(laws.size());
   for (std::size_t k = 0; k < laws.size(); ++k) {

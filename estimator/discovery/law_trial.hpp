@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
@@ -26,9 +27,9 @@ struct LawTrialFailure {
   std::string words;
 };
 
-// All together, beside the 24. A law that needs a channel that the recording has not, or whose expression is not finite
-// somewhere on it, is a failure. `stated` [laws], NaN where the file has no coefficient.
-tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(const ImuData& data, const CalibrationResult& calibration,
+// All together, beside the 24 of each recording. A law that needs a channel that a recording has not, or whose expression is not
+// finite somewhere on one, is a failure. `stated` [laws], NaN where the file has no coefficient.
+tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
                                                               const std::vector<LawTerm>& laws,
                                                               const std::vector<double>& stated);
 

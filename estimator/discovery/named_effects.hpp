@@ -1,13 +1,44 @@
-// The recording without the effects that a diagnosis named: what discovery is to look at beside them.
+// The recordings of a unit without the effects that the diagnosis of each named: what discovery is to look at beside them.
 #pragma once
+
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
 
 #include "estimator/diagnosis/corrected_recording.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/discovery.hpp"
 
 namespace selfcal::discovery {
 
-// Less what the named effects put out; the recording itself, which must outlive it, where nothing was named. Motions of the base and
-// noise stay: they are in the calibration.
-diagnosis::CorrectedRecording without_named(const ImuData& data, const diagnosis::Diagnosis& diagnosis);
+// A recording and what the catalogue says of it. Both must outlive it.
+struct DiagnosedRecording {
+  const ImuData& data;
+  const diagnosis::Diagnosis& diagnosis;
+};
+
+// Recordings of one unit, less what was named, calibrated anew. An effect is taken out of a recording that named it. Where the
+// catalogue explains some of the recordings and leaves another unexplained, only what all of them name is taken out: a name that
+// one recording gives may stand for the law that the other one lacks, and one unit has one physics. Motions of the base and noise stay:
+// they are in the calibrations.
+class UnexplainedRest {
+ public:
+  // The failure is that of a calibration, or "stopped".
+  static tl::expected<UnexplainedRest, std::string> of(std::span<const DiagnosedRecording> unit,
+                                                       const std::stop_token& stop = {});
+
+  std::span<const UnitRecording> recordings() const { return recordings_; }
+  // Of the catalogue, each once.
+  const std::vector<const diagnosis::Effect*>& taken_out() const { return taken_out_; }
+
+ private:
+  std::vector<std::unique_ptr<diagnosis::CorrectedRecording>> corrected_;
+  std::vector<std::unique_ptr<CalibrationResult>> calibrations_;
+  std::vector<UnitRecording> recordings_;
+  std::vector<const diagnosis::Effect*> taken_out_;
+};
 
 }  // namespace selfcal::discovery

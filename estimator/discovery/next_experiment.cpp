@@ -106,23 +106,27 @@ std::vector<LawTerm> members_of(const DiscoveredLaw& law) {
 
 }  // namespace
 
-std::optional<NextExperiment> plan_experiment(const ImuData& data, const CalibrationResult& calibration,
-                                              const DiscoveredLaw& law, const ExperimentLimits& limits,
-                                              const std::stop_token& stop) {
+std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> recordings, const DiscoveredLaw& law,
+                                              const ExperimentLimits& limits, const std::stop_token& stop) {
   const std::vector<LawTerm> terms = members_of(law);
   if (terms.size() < 2) {
     return std::nullopt;
   }
   const double square = law.coefficient * law.coefficient;
-  const Eigen::MatrixXd now = square * information(data, diagnosis::forward_pass(data, calibration), terms, stop);
+  const auto count = static_cast<Eigen::Index>(terms.size());
+  Eigen::MatrixXd now = Eigen::MatrixXd::Zero(count, count);
+  for (const UnitRecording& r : recordings) {
+    now += square * information(r.data, diagnosis::forward_pass(r.data, r.calibration), terms, stop);
+  }
+  const UnitRecording& last = recordings.back();
   NextExperiment best;
   best.separation_now = std::sqrt(closest_in(now).square);
   for (const Schedule& plan : plans(limits)) {
     if (stop.stop_requested()) {
       break;
     }
-    const diagnosis::IdealRecording ideal(plan, calibration.initial_attitude, data.site, planning_rate_hz);
-    PassInput input = diagnosis::forward_pass(ideal.data(), calibration);
+    const diagnosis::IdealRecording ideal(plan, last.calibration.initial_attitude, last.data.site, planning_rate_hz);
+    PassInput input = diagnosis::forward_pass(ideal.data(), last.calibration);
     input.parameters.setZero();
     input.C_nb = ideal.C_nb_start();
     const Closest closest = closest_in(now + square * information(ideal.data(), input, terms, stop));

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -24,15 +25,15 @@ struct ExperimentLimits {
 
 struct NextExperiment {
   Schedule schedule;
-  double separation_now = 0.0;  // sigma, of the closest rival on the recording alone
+  double separation_now = 0.0;  // sigma, of the closest rival on the recordings alone
   double separation = 0.0;      // with the planned one
   double log_odds = 0.0;        // expected, of the law against the closest rival
   std::string closest;          // that rival
 };
 
-// Of a few dozen plans the one whose closest rival is farthest. None where the class has one member, or no plan helps.
-std::optional<NextExperiment> plan_experiment(const ImuData& data, const CalibrationResult& calibration,
-                                              const DiscoveredLaw& law, const ExperimentLimits& limits,
-                                              const std::stop_token& stop = {});
+// Of a few plans the one whose closest rival is farthest, given the recordings that there are. None where the class has one
+// member, or no plan helps. The base stands as in the last recording.
+std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> recordings, const DiscoveredLaw& law,
+                                              const ExperimentLimits& limits, const std::stop_token& stop = {});
 
 }  // namespace selfcal::discovery

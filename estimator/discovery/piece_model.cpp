@@ -28,13 +28,12 @@ PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
 void PieceModel::prepare(int axis) {
   const auto n = static_cast<Eigen::Index>(sums_.pieces.size());
   const auto rows = Eigen::seqN(axis, n, axis_count);
-  const Eigen::MatrixXd G = information_(rows, rows);
   const Eigen::MatrixXd& D = dictionary_.means;
   const auto f = static_cast<std::size_t>(axis);
-  const Eigen::MatrixXd image = G * D;
+  own_information_[f] = information_(rows, rows);
+  const Eigen::MatrixXd image = own_information_[f] * D;
   function_information_[f] = (D.array() * image.array()).colwise().sum().transpose();
-  const Eigen::VectorXd own_score = score_(rows);
-  function_score_[f] = D.transpose() * own_score;
+  function_score_[f] = D.transpose() * own_score(axis);
   partner_information_[f] = Eigen::VectorXd::Zero(D.cols());
   for (Eigen::Index k = 0; k < D.cols(); ++k) {
     const int partner = dictionary_.functions[static_cast<std::size_t>(k)].partner;
@@ -85,22 +84,23 @@ void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
   choose(again);
 }
 
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(const Eigen::MatrixXd& X) const {
-  Eigen::MatrixXd G = X.transpose() * (information_ * X);
-  Eigen::VectorXd b = X.transpose() * score_;
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const Eigen::MatrixXd& means) const {
+  Eigen::MatrixXd G = means.transpose() * (own_information_[static_cast<std::size_t>(axis)] * means);
+  Eigen::VectorXd b = means.transpose() * own_score(axis);
   if (chosen_.cols() > 0) {
-    const Eigen::MatrixXd cross = chosen_image_.transpose() * X;
+    const Eigen::MatrixXd cross = own_image(axis).transpose() * means;
     G -= cross.transpose() * chosen_solver_.solve(cross);
     b -= cross.transpose() * chosen_solver_.solve(chosen_score_);
   }
   return {G, b};
 }
 
-double PieceModel::gain(const Eigen::MatrixXd& columns) const {
-  const auto [G, b] = project(columns);
-  const Eigen::VectorXd before = (columns.transpose() * (information_ * columns)).diagonal();
+double PieceModel::gain(int axis, const Eigen::MatrixXd& means) const {
+  const auto [G, b] = project(axis, means);
   for (Eigen::Index k = 0; k < b.size(); ++k) {
-    if (G(k, k) < least_left * before(k) || G(k, k) <= 0.0) {
+    const auto column = means.col(k);
+    const double before = column.dot(own_information_[static_cast<std::size_t>(axis)] * column);
+    if (G(k, k) < least_left * before || G(k, k) <= 0.0) {
       return 0.0;
     }
   }
@@ -116,9 +116,7 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
     Eigen::VectorXd information = function_information_[f], score = function_score_[f],
                     partner = partner_information_[f];
     if (chosen_.cols() > 0) {
-      const auto n = static_cast<Eigen::Index>(sums_.pieces.size());
-      const Eigen::MatrixXd image = chosen_image_(Eigen::seqN(axis, n, axis_count), Eigen::all);
-      const Eigen::MatrixXd cross = image.transpose() * D;
+      const Eigen::MatrixXd cross = own_image(axis).transpose() * D;
       const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
       information -= (cross.array() * solved.array()).colwise().sum().matrix().transpose();
       score -= solved.transpose() * chosen_score_;

@@ -30,19 +30,23 @@ class PieceModel {
   // Columns X become random with covariance q I and are integrated out (Woodbury).
   void integrate_out(const Eigen::MatrixXd& X, double q);
 
-  // Fall of the residuals' square by these columns together, given the chosen ones; `least` of a column's information
-  // must be left by the projection, or it counts as one that is chosen already.
-  double gain(const Eigen::MatrixXd& columns) const;
+  // Fall of the residuals' square by columns of one axis together, [pieces x columns], given the chosen ones; `least` of a
+  // column's information must be left by the projection, or it counts as one that is chosen already.
+  double gain(int axis, const Eigen::MatrixXd& means) const;
   // All functions on all axes, largest merit first, at most `most`.
   std::vector<Ranked> rank(std::size_t most) const;
-  // Projected information and score of columns X, [k x k] and [k].
-  std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(const Eigen::MatrixXd& X) const;
+  // Projected information and score of columns of one axis, [k x k] and [k].
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(int axis, const Eigen::MatrixXd& means) const;
 
   double square() const { return square_; }  // of the residuals, the chosen ones' gain taken off
 
  private:
   void prepare(int axis);
-  Eigen::Index at(int axis, Eigen::Index piece) const { return piece * axis_count + axis; }
+  Eigen::VectorXd own_score(int axis) const { return score_(Eigen::seqN(axis, sums_.piece_dt.size(), axis_count)); }
+  // Rows of one axis of the chosen ones' image.
+  Eigen::MatrixXd own_image(int axis) const {
+    return chosen_image_(Eigen::seqN(axis, sums_.piece_dt.size(), axis_count), Eigen::all);
+  }
 
   const PieceSums& sums_;
   const Dictionary& dictionary_;
@@ -52,6 +56,7 @@ class PieceModel {
   Eigen::MatrixXd chosen_, chosen_image_;  // X, G X
   Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
   Eigen::VectorXd chosen_score_;
+  std::array<Eigen::MatrixXd, axis_count> own_information_;  // [pieces x pieces] blocks of one axis
   // Of every function on every axis before projection; of a wave with its partner.
   std::array<Eigen::VectorXd, axis_count> function_information_, partner_information_, function_score_;
 };

@@ -13,8 +13,6 @@ namespace {
 constexpr std::array<double, 6> dwell_edges_s = {0.0, 4.0, 10.0, 20.0, 36.0, 64.0};
 constexpr double later_step_s = 60.0;
 constexpr double least_piece_s = 2.0;
-// The time of the pass goes with the square of the number of pieces.
-constexpr std::size_t most_pieces = 280;
 constexpr int parts_of_turn = 6, least_parts_of_turn = 2;
 
 void cut_dwell(double start_s, double end_s, int dwell, bool coarse, std::vector<Piece>& pieces) {
@@ -107,7 +105,7 @@ class PieceSource : public ColumnSource {
 
 double unit_of(int axis) { return axis < 3 ? units::degree_per_hour : units::micro_g; }
 
-std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context) {
+std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context, std::size_t most) {
   const ImuData& data = context.data();
   const double start_s = data.time_s.front() - 1.0 / data.sample_rate_hz;
   const double duration_s = data.time_s.back() - start_s;
@@ -115,7 +113,7 @@ std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context) {
   for (const bool coarse : {false, true}) {
     for (int parts = parts_of_turn; parts >= least_parts_of_turn; parts -= 2) {
       pieces = cut(context.turns(), start_s, duration_s, parts, coarse);
-      if (pieces.size() <= most_pieces) {
+      if (pieces.size() <= most) {
         return pieces;
       }
     }
@@ -140,13 +138,53 @@ Eigen::VectorXd PieceSums::score(int axis) const {
   return sums.score(Eigen::seqN(axis, static_cast<Eigen::Index>(pieces.size()), axis_count));
 }
 
-PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop) {
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop,
+                          std::size_t most) {
   PieceSums result;
-  result.pieces = cut_into_pieces(motion.context());
+  result.pieces = cut_into_pieces(motion.context(), most);
   PieceSource source(motion, result);
   result.sums = run_columns(input, source, stop);
   source.finish();
   return result;
+}
+
+PieceSums join(const std::vector<PieceSums>& recordings) {
+  Eigen::Index columns = 0, nodes = 0, pieces = 0;
+  for (const PieceSums& r : recordings) {
+    columns += r.sums.score.size();
+    nodes += r.channels.rows();
+    pieces += r.piece_dt.size();
+  }
+  PieceSums all;
+  all.sums.information = Eigen::MatrixXd::Zero(columns, columns);
+  all.sums.score.resize(columns);
+  all.channels.resize(nodes, static_cast<Eigen::Index>(laws::variable_count));
+  all.piece_dt.resize(pieces);
+  columns = nodes = pieces = 0;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    const PieceSums& one = recordings[r];
+    const int first_dwell = all.pieces.empty() ? 0 : all.pieces.back().dwell + 1;
+    const Eigen::Index n = one.sums.score.size();
+    all.sums.information.block(columns, columns, n, n) = one.sums.information;
+    all.sums.score.segment(columns, n) = one.sums.score;
+    all.sums.square += one.sums.square;
+    all.sums.rows += one.sums.rows;
+    all.channels.middleRows(nodes, one.channels.rows()) = one.channels;
+    all.piece_dt.segment(pieces, one.piece_dt.size()) = one.piece_dt;
+    all.nodes.insert(all.nodes.end(), one.nodes.begin(), one.nodes.end());
+    for (const int piece : one.piece_of) {
+      all.piece_of.push_back(piece + static_cast<int>(pieces));
+    }
+    for (Piece piece : one.pieces) {
+      piece.dwell += first_dwell;
+      piece.recording = static_cast<int>(r);
+      all.pieces.push_back(piece);
+    }
+    columns += n;
+    nodes += one.channels.rows();
+    pieces += one.piece_dt.size();
+  }
+  return all;
 }
 
 }  // namespace selfcal::discovery

@@ -19,10 +19,13 @@ struct Piece {
   double start_s = 0.0, end_s = 0.0;  // since the start of the recording
   int dwell = 0;                      // number of turns begun before it
   bool turning = false;
+  int recording = 0;  // of several
 };
 
-// Dwells are cut ever more coarsely after a turn, turns into equal parts.
-std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context);
+// Dwells are cut ever more coarsely after a turn, turns into equal parts. The time of the pass goes with the square of the
+// number of pieces.
+constexpr std::size_t most_pieces = 280;
+std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context, std::size_t most = most_pieces);
 
 struct PieceSums : NodeTable {
   std::vector<Piece> pieces;
@@ -41,6 +44,11 @@ struct PieceSums : NodeTable {
 // SI size of one unit of an axis: 1 deg/h, 1 ug.
 double unit_of(int axis);
 
-PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop = {});
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop = {},
+                          std::size_t most = most_pieces);
+
+// Recordings one behind the other: what the states of each take up is projected out of each by itself, so that information
+// between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty.
+PieceSums join(const std::vector<PieceSums>& recordings);
 
 }  // namespace selfcal::discovery

@@ -8,34 +8,33 @@ namespace {
 
 constexpr double seconds_per_hour = 3600.0;
 
-// One column a dwell: the offset that holds from the start of a turn to that of the next.
-Eigen::MatrixXd jumps(const PieceModel& model, const PieceSums& sums, int axis) {
+// [pieces x dwells] one column a dwell: the offset that holds from the start of a turn to that of the next.
+Eigen::MatrixXd jumps(const PieceSums& sums) {
   const int count = sums.pieces.back().dwell + 1;
-  Eigen::MatrixXd columns(sums.sums.score.size(), count);
-  for (int dwell = 0; dwell < count; ++dwell) {
-    Eigen::VectorXd means(sums.piece_dt.size());
-    for (Eigen::Index p = 0; p < means.size(); ++p) {
-      means(p) = sums.pieces[static_cast<std::size_t>(p)].dwell == dwell ? 1.0 : 0.0;
-    }
-    columns.col(dwell) = model.column(axis, means);
+  Eigen::MatrixXd means = Eigen::MatrixXd::Zero(sums.piece_dt.size(), count);
+  for (Eigen::Index p = 0; p < means.rows(); ++p) {
+    means(p, sums.pieces[static_cast<std::size_t>(p)].dwell) = 1.0;
   }
-  return columns;
+  return means;
 }
 
-// One column an increment: from the middle of a piece to that of the next, of its share of the variance per hour.
-Eigen::MatrixXd increments(const PieceModel& model, const PieceSums& sums, int axis) {
+// [pieces x increments] from the middle of a piece to that of the next of the same recording, of its share of the variance
+// per hour.
+Eigen::MatrixXd increments(const PieceSums& sums) {
   const auto n = sums.piece_dt.size();
-  const auto middle = [&](Eigen::Index p) {
-    const Piece& piece = sums.pieces[static_cast<std::size_t>(p)];
-    return 0.5 * (piece.start_s + piece.end_s) / seconds_per_hour;
-  };
-  Eigen::MatrixXd columns(sums.sums.score.size(), n - 1);
+  const auto piece = [&](Eigen::Index p) { return sums.pieces[static_cast<std::size_t>(p)]; };
+  const auto middle = [&](Eigen::Index p) { return 0.5 * (piece(p).start_s + piece(p).end_s) / seconds_per_hour; };
+  Eigen::MatrixXd means = Eigen::MatrixXd::Zero(n, n - 1);
+  Eigen::Index column = 0;
   for (Eigen::Index k = 1; k < n; ++k) {
-    Eigen::VectorXd means = Eigen::VectorXd::Zero(n);
-    means.tail(n - k).setConstant(std::sqrt(middle(k) - middle(k - 1)));
-    columns.col(k - 1) = model.column(axis, means);
+    Eigen::Index end = k;
+    for (; end < n && piece(end).recording == piece(k - 1).recording; ++end) {
+    }
+    if (end > k) {
+      means.col(column++).segment(k, end - k).setConstant(std::sqrt(middle(k) - middle(k - 1)));
+    }
   }
-  return columns;
+  return means.leftCols(column);
 }
 
 }  // namespace
@@ -48,8 +47,10 @@ ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKi
   ProcessFit fit;
   fit.kind = kind;
   fit.axis = axis;
-  fit.columns = kind == ProcessKind::jump_per_turn ? jumps(model, sums, axis) : increments(model, sums, axis);
-  const auto [J, b] = model.project(fit.columns);
+  const Eigen::MatrixXd means = kind == ProcessKind::jump_per_turn ? jumps(sums) : increments(sums);
+  fit.columns = Eigen::MatrixXd::Zero(sums.sums.score.size(), means.cols());
+  fit.columns(Eigen::seqN(axis, means.rows(), axis_count), Eigen::all) = means;
+  const auto [J, b] = model.project(axis, means);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(J);
   const Eigen::ArrayXd d = eigen.eigenvalues().array().max(0.0);
   const Eigen::ArrayXd u2 = (eigen.eigenvectors().transpose() * b).array().square();

@@ -39,15 +39,14 @@ double highest_between(double low, double high, int rounds, F&& value) {
 
 }  // namespace
 
-Shortlist::Shortlist(const LawMotion& motion, const PieceSums& sums, const Dictionary& dictionary)
-    : motion_(motion), sums_(sums), dictionary_(dictionary) {}
+Shortlist::Shortlist(const PieceSums& sums, const Dictionary& dictionary) : sums_(sums), dictionary_(dictionary) {}
 
 double Shortlist::gain_of(const PieceModel& model, const LawTerm& term) const {
   const Eigen::ArrayXd values = term.expression.evaluate(sums_.channels, term.constants);
   if (!values.isFinite().all()) {
     return 0.0;
   }
-  return model.gain(model.column(term.axis, sums_.means(values)));
+  return model.gain(term.axis, sums_.means(values));
 }
 
 Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) const {
@@ -60,21 +59,20 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
   if (function.partner >= 0) {
     const Function& partner = dictionary_.functions[static_cast<std::size_t>(function.partner)];
     const auto waves = [&](double period) {
-      Eigen::MatrixXd X(sums_.sums.score.size(), 2);
+      Eigen::MatrixXd X(sums_.piece_dt.size(), 2);
       int column = 0;
       for (const Function* f : {&function, &partner}) {
         const auto expression = laws::Expression::parse(dictionary_.pattern(*f));
-        X.col(column++) =
-            model.column(ranked.axis, sums_.means(expression->evaluate(sums_.channels, std::vector<double>{period})));
+        X.col(column++) = sums_.means(expression->evaluate(sums_.channels, std::vector<double>{period}));
       }
       return X;
     };
     const double period = highest_between(function.constant * 0.85, function.constant * 1.18, 12,
-                                          [&](double p) { return model.gain(waves(p)); });
+                                          [&](double p) { return model.gain(ranked.axis, waves(p)); });
     const Eigen::MatrixXd X = waves(period);
-    const auto [G, b] = model.project(X);
+    const auto [G, b] = model.project(ranked.axis, X);
     const Eigen::VectorXd size = G.ldlt().solve(b);
-    c.gain = std::max(c.gain, model.gain(X));
+    c.gain = std::max(c.gain, model.gain(ranked.axis, X));
     pattern.replace(pattern.find(wave), std::string(wave).size(), wave_with_phase);
     c.term.expression = *laws::Expression::parse(pattern);
     c.term.constants = {period, std::atan2(size(1), size(0))};

@@ -22,7 +22,7 @@ struct Candidate {
 class Shortlist {
  public:
   // All must outlive this.
-  Shortlist(const LawMotion& motion, const PieceSums& sums, const Dictionary& dictionary);
+  Shortlist(const PieceSums& sums, const Dictionary& dictionary);
 
   // The best `most` laws over the pieces given what the model has chosen, each expression once, constants of greatest
   // gain; best first.
@@ -36,7 +36,6 @@ class Shortlist {
   Candidate candidate(const PieceModel& model, const Ranked& ranked) const;
   double gain_of(const PieceModel& model, const LawTerm& term) const;
 
-  const LawMotion& motion_;
   const PieceSums& sums_;
   const Dictionary& dictionary_;
 };

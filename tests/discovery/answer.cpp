@@ -45,8 +45,9 @@ ordered_json to_json(const discovery::Discovery& d) {
     j["processes"].push_back(
         {{"axis", p.axis}, {"process", discovery::name_of(p.kind)}, {"size", p.size}, {"sigma", p.sigma}});
   }
-  j["parameters"] = std::vector<double>(d.parameters.data(), d.parameters.data() + d.parameters.size());
-  const ParameterVector sigma = d.parameter_covariance.diagonal().cwiseSqrt();
+  const discovery::FittedRecording& fitted = d.fit.recordings.front();
+  j["parameters"] = std::vector<double>(fitted.parameters.begin(), fitted.parameters.end());
+  const ParameterVector sigma = fitted.covariance.diagonal().cwiseSqrt();
   j["parameter_sigma"] = std::vector<double>(sigma.data(), sigma.data() + sigma.size());
   return j;
 }
@@ -78,7 +79,8 @@ int answer(const std::string& path, bool always) {
   if (wanted) {
     const CalibrationOutcome calibration = diagnosis::calibrate_still(data, {});
     if (calibration.result) {
-      j["discovery"] = to_json(discovery::discover(data, *calibration.result, {}));
+      const std::vector<discovery::UnitRecording> recordings{{data, *calibration.result}};
+      j["discovery"] = to_json(discovery::discover(recordings, {}));
     }
   }
   j["seconds"] = elapsed();

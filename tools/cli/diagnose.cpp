@@ -122,7 +122,7 @@ Expected<void> write_files(const DiagnoseArguments& arguments, const diagnosis::
   diagnosis::Diagnosis diagnosis = found;
   std::string laws;
   if (beyond.explains()) {
-    diagnosis.value_as_named = beyond.found->parameters;
+    diagnosis.value_as_named = beyond.parameters();
     laws = format_laws(laws_of(*beyond.found));
   }
   Expected<void> written;
@@ -197,6 +197,49 @@ Expected<std::vector<diagnosis::Split>> plan_and_write_splits(const DiagnoseArgu
   return write_file_atomically(arguments.split_schedule, text).map([&] { return splits; });
 }
 
+// The further recordings of the unit (--with).
+using Others = std::vector<std::unique_ptr<Opened>>;
+
+// The same recording twice would count its noise as a second witness.
+Expected<Others> open_others(const DiagnoseArguments& arguments, const Opened& first) {
+  Others others;
+  std::vector<const document::InputFile*> known = {&first.file};
+  for (const std::string& file : arguments.discovery.with) {
+    Expected<std::unique_ptr<Opened>> opened = open(file);
+    if (!opened) {
+      return tl::unexpected(opened.error());
+    }
+    for (const document::InputFile* before : known) {
+      if (before->sha256 == (*opened)->file.sha256) {
+        return fail(ErrorKind::bad_input, fmt::format("{}: the same recording as {}", file, before->name));
+      }
+    }
+    others.push_back(std::move(*opened));
+    known.push_back(&others.back()->file);
+  }
+  return others;
+}
+
+// Each by itself.
+Expected<std::vector<diagnosis::Diagnosis>> diagnose_each(const Others& others,
+                                                          const diagnosis::DiagnosisOptions& options) {
+  std::vector<diagnosis::Diagnosis> diagnoses;
+  for (const auto& other : others) {
+    const std::string& file = other->file.name;
+    ProgressLine line;
+    diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(
+        other->data, options, [&](const std::string& words) { line.show(fmt::format("{}: {}", file, words)); });
+    if (!outcome.diagnosis) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, outcome.failure));
+    }
+    if (!outcome.diagnosis->faults.empty()) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, outcome.diagnosis->faults.front().words));
+    }
+    diagnoses.push_back(std::move(*outcome.diagnosis));
+  }
+  return diagnoses;
+}
+
 // There is no physics to try on another recording, to split or to write.
 Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
                           const document::InputFile& file) {
@@ -223,6 +266,10 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!arguments.against.empty()) {
     return compare_with(arguments, **opened, options);
   }
+  const Expected<Others> others = open_others(arguments, **opened);
+  if (!others) {
+    return tl::unexpected(others.error());
+  }
   const diagnosis::DiagnosisOutcome outcome = [&] {
     ProgressLine line;
     return diagnosis::diagnose(data, options, [&line](const std::string& words) { line.show(words); });
@@ -242,7 +289,15 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!splits) {
     return tl::unexpected(splits.error());
   }
-  const Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, data, diagnosis);
+  const Expected<std::vector<diagnosis::Diagnosis>> of_others = diagnose_each(*others, options);
+  if (!of_others) {
+    return tl::unexpected(of_others.error());
+  }
+  std::vector<DiagnosedFile> unit = {{(*opened)->file, data, diagnosis}};
+  for (std::size_t k = 0; k < others->size(); ++k) {
+    unit.push_back({(*others)[k]->file, (*others)[k]->data, (*of_others)[k]});
+  }
+  const Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit);
   if (!beyond) {
     return tl::unexpected(beyond.error());
   }

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/estimate/diagnosis_json.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+
 namespace selfcal::cli {
 namespace {
 
@@ -70,7 +73,95 @@ ordered_json constants_json(const std::vector<Constant>& constants) {
   return all;
 }
 
+std::string_view words_of(diagnosis::DiagnosisVerdict verdict) {
+  using V = diagnosis::DiagnosisVerdict;
+  switch (verdict) {
+    case V::adequate: return "recording and model agree";
+    case V::named: return "named";
+    case V::none_of_the_above: return "none of the above";
+    case V::not_enough_information: return "not enough information";
+    case V::data_fault: return "a fault of the data";
+  }
+  return "";
+}
+
+// "p = 0.31", "p = 1e-19"
+std::string p_text(double log_p) {
+  const double exponent = log_p / std::log(10.0);
+  return exponent > -3.0 ? fmt::format("p = {:.2g}", std::exp(log_p)) : fmt::format("p = 1e{:.0f}", exponent);
+}
+
+std::string shared_text(const char* what, bool shared, double log_p) {
+  return fmt::format("  {}: {} ({})\n", what, shared ? "the same in all of them" : "not the same in all of them",
+                     p_text(log_p));
+}
+
 }  // namespace
+
+std::string together_text(const Together& together) {
+  std::string text = fmt::format("{} recordings of one unit together\n", together.recordings.size());
+  for (std::size_t k = 0; k < together.recordings.size(); ++k) {
+    const Together::Recording& r = together.recordings[k];
+    text += fmt::format("  {}. {}: by itself {}{}\n", k + 1, r.file.name, words_of(r.verdict),
+                        r.names.empty() ? "" : fmt::format(": {}", fmt::join(r.names, ", ")));
+  }
+  if (!together.taken_out.empty()) {
+    text += fmt::format("  taken out of them first: {}\n", fmt::join(together.taken_out, ", "));
+  }
+  const discovery::SharedParameters& shared = together.shared;
+  text += shared_text("scale factors and misalignments", shared.lasting_shared, shared.log_p_lasting);
+  text += shared_text("accelerometer biases and gyro drifts", shared.biases_shared, shared.log_p_biases);
+  std::size_t shown = 0;
+  for (const discovery::UnsharedParameter& d : shared.differing) {
+    if (shown++ == members_shown) {
+      text += fmt::format("    and {} more\n", shared.differing.size() - members_shown);
+      break;
+    }
+    const SensorParameter& parameter = sensor_parameters.at(static_cast<std::size_t>(d.parameter));
+    text +=
+        fmt::format("    {}: {} more in recording {}\n", parameter.name,
+                    with_sigma(d.difference / parameter.si_per_unit, d.sigma / parameter.si_per_unit, parameter.unit),
+                    d.recording + 1);
+  }
+  return text;
+}
+
+ordered_json together_json(const Together& together) {
+  ordered_json recordings = ordered_json::array();
+  const discovery::SharedParameters& shared = together.shared;
+  for (std::size_t k = 0; k < together.recordings.size(); ++k) {
+    const Together::Recording& r = together.recordings[k];
+    ordered_json parameters = ordered_json::array();
+    for (std::size_t p = 0; p < sensor_parameters.size(); ++p) {
+      const auto at = static_cast<Eigen::Index>(p);
+      parameters.push_back({{"name", sensor_parameters[p].name},
+                            {"unit", sensor_parameters[p].unit},
+                            {"value", shared.parameters[k](at) / sensor_parameters[p].si_per_unit},
+                            {"sigma", std::sqrt(shared.covariance[k](at, at)) / sensor_parameters[p].si_per_unit}});
+    }
+    recordings.push_back({{"input", {{"name", r.file.name}, {"sha256", r.file.sha256}}},
+                          {"verdict", verdict_name(r.verdict)},
+                          {"findings", r.names},
+                          {"parameters", parameters}});
+  }
+  ordered_json differing = ordered_json::array();
+  for (const discovery::UnsharedParameter& d : shared.differing) {
+    const SensorParameter& parameter = sensor_parameters.at(static_cast<std::size_t>(d.parameter));
+    differing.push_back({{"name", parameter.name},
+                         {"unit", parameter.unit},
+                         {"recording", d.recording},
+                         {"difference", d.difference / parameter.si_per_unit},
+                         {"sigma", d.sigma / parameter.si_per_unit}});
+  }
+  return {{"recordings", recordings},
+          {"taken_out", together.taken_out},
+          {"shared",
+           {{"scale_factors_and_misalignments", shared.lasting_shared},
+            {"log_p_scale_factors_and_misalignments", shared.log_p_lasting},
+            {"biases", shared.biases_shared},
+            {"log_p_biases", shared.log_p_biases},
+            {"differing", differing}}}};
+}
 
 std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
   if (found.laws.empty() && found.processes.empty()) {

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
-#include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -47,13 +47,13 @@ Expected<LawsToTry> read_terms(const std::string& file) {
   return laws;
 }
 
-Expected<void> try_them(const std::string& file, const ImuData& data, const CalibrationResult& calibration,
+Expected<void> try_them(const std::string& file, std::span<const discovery::UnitRecording> unit,
                         BeyondCatalogue& result) {
   const Expected<LawsToTry> laws = read_terms(file);
   if (!laws) {
     return tl::unexpected(laws.error());
   }
-  auto tried = discovery::try_laws(data, calibration, laws->terms, laws->stated);
+  auto tried = discovery::try_laws(unit, laws->terms, laws->stated);
   if (!tried) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: law {}: expression: {}", file, tried.error().law + 1, tried.error().words));
@@ -62,10 +62,10 @@ Expected<void> try_them(const std::string& file, const ImuData& data, const Cali
   return {};
 }
 
-Expected<void> plan_next(const std::string& file, const ImuData& data, const CalibrationResult& calibration,
+Expected<void> plan_next(const std::string& file, std::span<const discovery::UnitRecording> unit,
                          BeyondCatalogue& result) {
   for (const discovery::DiscoveredLaw& law : result.found->laws) {
-    const auto next = discovery::plan_experiment(data, calibration, law, {});
+    const auto next = discovery::plan_experiment(unit, law, {});
     if (next && (!result.next || next->separation_now < result.next->separation_now)) {
       result.next = next;
     }
@@ -83,50 +83,79 @@ Expected<void> plan_next(const std::string& file, const ImuData& data, const Cal
                         result.next->separation, result.next->separation_now, format_schedule(result.next->schedule)));
 }
 
+Together join(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
+              const discovery::Discovery& found) {
+  Together together;
+  for (const DiagnosedFile& r : recordings) {
+    together.recordings.push_back({r.file, r.diagnosis.verdict, {}});
+    for (const diagnosis::Finding& finding : r.diagnosis.findings) {
+      together.recordings.back().names.push_back(finding.effect);
+    }
+  }
+  for (const diagnosis::Effect* effect : rest.taken_out()) {
+    together.taken_out.emplace_back(effect->id);
+  }
+  together.shared = discovery::share_parameters(found.fit);
+  return together;
+}
+
 }  // namespace
 
 void add_discovery_options(Options& options, DiscoveryArguments& arguments) {
   options.flag("--discover", arguments.discover,
                "look for equations beyond the catalogue also where the catalogue leaves nothing");
+  options.texts("--with", arguments.with,
+                "a further recording of the same unit, looked at together with the first; repeated");
+  options.exclude("--with", "--against");
   options.text("--law", arguments.laws, "try the laws of this file beside the 24 and what was named");
   options.text("--next-experiment", arguments.next_experiment,
                "write the schedule that would tell the equations found from their rivals");
 }
 
 std::string BeyondCatalogue::text() const {
-  return (found ? discovery_text(*found, next) : std::string()) + (tried.empty() ? std::string() : trial_text(tried));
+  return (together ? together_text(*together) : std::string()) +
+         (found ? discovery_text(*found, next) : std::string()) + (tried.empty() ? std::string() : trial_text(tried));
 }
 
 void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {
   add_next_experiment(document, next);
+  if (together) {
+    document["together"] = together_json(*together);
+  }
   if (!tried.empty()) {
     document["laws"] = trial_json(tried);
   }
 }
 
-Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const ImuData& data,
-                                      const diagnosis::Diagnosis& diagnosis) {
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings) {
   BeyondCatalogue result;
-  const bool discover = arguments.discover || diagnosis.unexplained || !arguments.next_experiment.empty();
+  const bool unexplained =
+      std::any_of(recordings.begin(), recordings.end(), [](const DiagnosedFile& r) { return r.diagnosis.unexplained; });
+  const bool discover =
+      arguments.discover || unexplained || recordings.size() > 1 || !arguments.next_experiment.empty();
   if (!discover && arguments.laws.empty()) {
     return result;
   }
-  const auto without = discovery::without_named(data, diagnosis);
-  const ImuData& rest = without.data();
-  const CalibrationOutcome calibration = selfcal::diagnosis::calibrate_still(rest, {});
-  if (!calibration.result) {
-    return fail(ErrorKind::bad_input, calibration.failure.message);
+  std::vector<discovery::DiagnosedRecording> diagnosed;
+  for (const DiagnosedFile& r : recordings) {
+    diagnosed.push_back({r.data, r.diagnosis});
+  }
+  const auto rest = discovery::UnexplainedRest::of(diagnosed);
+  if (!rest) {
+    return fail(ErrorKind::bad_input, rest.error());
   }
   if (!arguments.laws.empty()) {
-    if (const auto tried = try_them(arguments.laws, rest, *calibration.result, result); !tried) {
+    if (const auto tried = try_them(arguments.laws, rest->recordings(), result); !tried) {
       return tl::unexpected(tried.error());
     }
   }
   if (discover) {
     ProgressLine line;
-    result.found =
-        discovery::discover(rest, *calibration.result, {}, [&line](const std::string& words) { line.show(words); });
-    if (const auto planned = plan_next(arguments.next_experiment, rest, *calibration.result, result); !planned) {
+    result.found = discovery::discover(rest->recordings(), {}, [&line](const std::string& words) { line.show(words); });
+    if (recordings.size() > 1) {
+      result.together = join(recordings, *rest, *result.found);
+    }
+    if (const auto planned = plan_next(arguments.next_experiment, rest->recordings(), result); !planned) {
       return tl::unexpected(planned.error());
     }
   }

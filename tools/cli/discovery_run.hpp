@@ -3,11 +3,13 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "protocol/document/document_head.hpp"
 #include "protocol/error.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/discovery_output.hpp"
@@ -15,28 +17,40 @@
 namespace selfcal::cli {
 
 struct DiscoveryArguments {
-  bool discover = false;        // also where the catalogue leaves nothing
-  std::string laws;             // file of laws to try
-  std::string next_experiment;  // schedule file to write
+  bool discover = false;          // also where the catalogue leaves nothing
+  std::string laws;               // file of laws to try
+  std::vector<std::string> with;  // further recordings of the same unit
+  std::string next_experiment;    // schedule file to write
 };
 
 void add_discovery_options(Options& options, DiscoveryArguments& arguments);
 
 struct BeyondCatalogue {
   std::optional<discovery::Discovery> found;
+  std::optional<Together> together;
   std::optional<discovery::NextExperiment> next;
   std::vector<discovery::TriedLaw> tried;
 
   // Whether equations or processes were found that take away the misfit.
   bool explains() const { return selfcal::explains(found_or_null()); }
   const discovery::Discovery* found_or_null() const { return found ? &*found : nullptr; }
+  // The 24 of the first recording with what was found; with what all recordings share imposed, where there are several.
+  ParameterVector parameters() const {
+    return together ? together->shared.parameters.front() : found->fit.recordings.front().parameters;
+  }
   std::string text() const;
   void add_to(nlohmann::ordered_json& document) const;
 };
 
-// Looks where the diagnosis left something unexplained, or where asked to. Errors: a file of laws that is wrong (file, law,
-// column), a schedule that cannot be written.
-Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, const ImuData& data,
-                                      const diagnosis::Diagnosis& diagnosis);
+// A recording with its diagnosis. All must outlive it.
+struct DiagnosedFile {
+  const document::InputFile& file;
+  const ImuData& data;
+  const diagnosis::Diagnosis& diagnosis;
+};
+
+// Looks where the diagnosis of a recording left something unexplained, where there are several, or where asked to; in all of them
+// together. Errors: a file of laws that is wrong (file, law, column), a schedule that cannot be written.
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings);
 
 }  // namespace selfcal::cli
