@@ -12,7 +12,8 @@
 #include <map>
 
 #include "protocol/command_line/command_line.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/profile/read_profile.hpp"
+#include "protocol/profile/records.hpp"
 #include "sim_ins/device/bus_node.hpp"
 #include "sim_ins/simulate.hpp"
 
@@ -22,7 +23,7 @@ namespace {
 volatile int stop_requested = 0;
 
 struct Arguments {
-  std::string config, key, flash, truth, physics, scenario;
+  std::string profile, config, key, flash, truth, physics, scenario;
   std::uint64_t seed = 1;
   std::vector<std::string> faults;
   std::uint64_t arbitration_rate = 1'000'000, data_rate = 5'000'000;
@@ -100,12 +101,64 @@ Expected<uds::SecurityKey> read_key(const std::string& path) {
   return key;
 }
 
+// Looked for before the command line is parsed: what the profile says are the defaults of other options.
+std::string profile_argument(int argc, char** argv) {
+  constexpr std::string_view name = "--profile";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    if (argument == name && i + 1 < argc) {
+      return argv[i + 1];
+    }
+    if (argument.starts_with(name) && argument.substr(name.size()).starts_with('=')) {
+      return std::string(argument.substr(name.size() + 1));
+    }
+  }
+  return {};
+}
+
+Expected<void> take_profile(const std::string& file, NodeOptions& node) {
+  if (!file.empty()) {
+    auto profile = profile::load_profile(file);
+    if (!profile) {
+      return tl::unexpected(profile.error());
+    }
+    node.diagnostics.profile = std::move(*profile);
+  }
+  const profile::Bus& bus = node.diagnostics.profile->bus;
+  node.request_id = bus.request;
+  node.response_id = bus.response;
+  node.functional_id = bus.functional;
+  node.status_id = bus.status.value_or(0);
+  node.tells_status = bus.status.has_value();
+  node.extended_ids = bus.extended_ids;
+  node.fd = bus.fd;
+  return {};
+}
+
+// What the profile gives because the INS does not tell it must be so here.
+Expected<void> check_format(const profile::Profile& profile, const ins::SampleFormatRecord& own) {
+  const auto bytes = profile::encode(profile, own);
+  const auto told = bytes ? profile::decode_sample_format(profile, *bytes) : tl::unexpected(bytes.error());
+  if (!told) {
+    return tl::unexpected(told.error());
+  }
+  constexpr double as_f32 = 1e-6;
+  for (const auto& [name, by_profile, here] :
+       {std::tuple("sample_rate", told->sample_rate_hz, own.sample_rate_hz),
+        std::tuple("angle_per_count", told->delta_theta_lsb_rad, own.delta_theta_lsb_rad),
+        std::tuple("velocity_per_count", told->delta_v_lsb_mps, own.delta_v_lsb_mps),
+        std::tuple("gimbal_per_count", told->gimbal_lsb_rad, own.gimbal_lsb_rad)}) {
+    if (!(std::abs(by_profile - here) <= as_f32 * here)) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: sample_format: {} is {:.9g}, this INS has {:.9g}",
+                                                    profile.file, name, by_profile, here));
+    }
+  }
+  return {};
+}
+
 void configure(Options& options, Arguments& a) {
   NodeOptions& node = a.node;
-  node.request_id = ins::can_id::request;
-  node.response_id = ins::can_id::response;
-  node.functional_id = ins::can_id::functional;
-  node.status_id = ins::can_id::status;
+  options.text("--profile", a.profile, "what it speaks, TOML (config/profiles); without it our own INS");
   options.text("--interface", node.interface, "CAN interface");
   options.text("--config", a.config, "sim.toml: site, attitude, sensors, gimbal");
   options.whole("--seed", a.seed, range::seed, "of every random draw: the same seed gives the same bits");
@@ -173,9 +226,14 @@ Expected<int> run(Arguments& a) {
   if (!flash) {
     return tl::unexpected(flash.error());
   }
-  auto instrument = Instrument::create(*config, a.seed, *physics, std::move(*flash), scenario);
+  const profile::Profile& profile = *a.node.diagnostics.profile;
+  auto instrument =
+      Instrument::create(*config, a.seed, *physics, std::move(*flash), scenario, profile.raw.page.most_repetitions());
   if (!instrument) {
     return tl::unexpected(instrument.error());
+  }
+  if (const auto same = check_format(profile, (*instrument)->sample_format()); !same) {
+    return tl::unexpected(same.error());
   }
   a.node.rates = {static_cast<std::uint32_t>(a.arbitration_rate), static_cast<std::uint32_t>(a.data_rate)};
   a.node.diagnostics.key = *key;
@@ -196,6 +254,10 @@ Expected<int> run(Arguments& a) {
 int configure_and_run(int argc, char** argv) {
   CommandLine line("sim_ins", SELFCAL_VERSION, "A virtual INS with its own two-axis gimbal, on a CAN interface");
   Arguments arguments;
+  if (const auto taken = take_profile(profile_argument(argc, argv), arguments.node); !taken) {
+    fmt::print(stderr, "sim_ins: {}\n", taken.error().message);
+    return static_cast<int>(taken.error().kind);
+  }
   configure(line.options(), arguments);
   if (const std::optional<int> ended = line.parse(argc, argv)) {
     return *ended;

@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
 #include <span>
 #include <sstream>
 
+#include "protocol/profile/read_profile.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
 #include "protocol/toml_file/toml_text.hpp"
 
@@ -64,7 +67,8 @@ Key<Target> flag(std::string_view name, bool Target::*member) {
           }};
 }
 
-Key<InsConfig> can_id(std::string_view name, std::uint32_t InsConfig::*member) {
+template <typename Id>
+Key<InsConfig> can_id(std::string_view name, Id InsConfig::*member) {
   return {name, [=](const toml::node& node, InsConfig& ins) -> std::string {
             const auto value = node.value_exact<std::int64_t>();
             if (!value || *value < 0 || *value > 0x1FFFFFFF) {
@@ -121,6 +125,7 @@ const std::vector<Key<Config>>& daemon_keys() {
 const std::vector<Key<InsConfig>>& ins_keys() {
   static const std::vector<Key<InsConfig>> keys{
       text("interface", &InsConfig::interface),
+      text("profile", &InsConfig::profile_name),
       can_id("request_id", &InsConfig::request_id),
       can_id("response_id", &InsConfig::response_id),
       can_id("functional_id", &InsConfig::functional_id),
@@ -187,6 +192,36 @@ class Reader {
   std::string complaints_;
 };
 
+// "selfcal" is built in; a path is one from the configuration's folder, a mere name is a file of its folder profiles.
+profile::ProfilePtr profile_of(const toml::table& table, const std::string& section, const std::string& file,
+                               Reader& reader) {
+  const toml::node* node = table.get("profile");
+  if (node == nullptr) {
+    return profile::built_in();
+  }
+  const auto line = node->source().begin.line;
+  const auto name = node->value_exact<std::string>();
+  if (!name || name->empty()) {
+    reader.complain(line, section + ".profile", "must be a string that is not empty");
+    return profile::built_in();
+  }
+  if (*name == profile::built_in()->name) {
+    return profile::built_in();
+  }
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  const bool is_path = name->find('/') != std::string::npos || name->ends_with(".toml");
+  auto loaded = profile::load_profile((is_path ? folder / *name : folder / "profiles" / (*name + ".toml")).string());
+  if (loaded) {
+    return *loaded;
+  }
+  const std::string& faults = loaded.error().message;
+  const auto more = std::ranges::count(faults, '\n');
+  reader.complain(line, section + ".profile",
+                  faults.substr(0, faults.find('\n')) +
+                      (more > 0 ? fmt::format(" (and {} more: selfcal device lint)", more) : std::string()));
+  return profile::built_in();
+}
+
 // What no single key shows: missing ones, and sections that contradict each other.
 void check_instruments(const toml::table& sections, Config& config, Reader& reader) {
   for (InsConfig& ins : config.instruments) {
@@ -200,10 +235,19 @@ void check_instruments(const toml::table& sections, Config& config, Reader& read
     if (table.contains("longitude_deg") != ins.site_given || table.contains("height_m") != ins.site_given) {
       reader.complain(line, section, "latitude_deg, longitude_deg and height_m belong together");
     }
+    if (!ins.profile->site.did && !ins.site_given) {
+      reader.complain(line, section + ".latitude_deg", "missing, and the profile has no record site");
+    }
+    if (!ins.profile->navigation_check.id) {
+      if (table.contains("drift_check_s") && ins.drift_check_s > 0) {
+        reader.complain(line, section + ".drift_check_s", "the profile has no navigation check: 0 is the only value");
+      }
+      ins.drift_check_s = 0.0;
+    }
     const std::uint32_t highest = ins.extended_ids ? 0x1FFFFFFFu : 0x7FFu;
     for (const auto& [key, id] :
          {std::pair{"request_id", ins.request_id}, std::pair{"response_id", ins.response_id},
-          std::pair{"functional_id", ins.functional_id}, std::pair{"status_id", ins.status_id}}) {
+          std::pair{"functional_id", ins.functional_id}, std::pair{"status_id", ins.status_id.value_or(0)}}) {
       if (id > highest) {
         reader.complain(line, section + "." + key, fmt::format("{:#x} needs extended_ids = true", id));
       }
@@ -249,7 +293,7 @@ Expected<Config> parse_config(std::string_view content, const std::string& file)
           reader.complain(name.source().begin.line, full, "must be a section [ins.NAME]");
           continue;
         }
-        InsConfig ins;
+        InsConfig ins(profile_of(*ins_node.as_table(), full, file, reader));
         ins.name = name.str();
         if (ins.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos) {
           reader.complain(name.source().begin.line, full, "a name holds a-z, 0-9 and _ only");

@@ -10,24 +10,32 @@
 
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "protocol/error.hpp"
+#include "protocol/profile/profile.hpp"
 
 namespace selfcal {
 
 struct InsConfig {
+  InsConfig() = default;
+  explicit InsConfig(profile::ProfilePtr which) : profile(std::move(which)) {}
+
   std::string name;       // the section's: [ins.NAME]
   std::string interface;  // CAN network interface
-  std::uint32_t request_id = 0x640;
-  std::uint32_t response_id = 0x648;
-  std::uint32_t functional_id = 0x7DF;
-  std::uint32_t status_id = 0x650;  // of the state frame; the gimbal frame has the next one
-  bool extended_ids = false;        // 29-bit identifiers
-  bool fd = false;                  // CAN FD frames with bit rate switch
+  // What the INS speaks. Keys of the section that say the same as the profile come before it.
+  profile::ProfilePtr profile = profile::built_in();
+  std::string profile_name = profile->name;  // as the section names it
+  std::uint32_t request_id = profile->bus.request;
+  std::uint32_t response_id = profile->bus.response;
+  std::uint32_t functional_id = profile->bus.functional;
+  std::optional<std::uint32_t> status_id =
+      profile->bus.status;                        // of the state frame; the gimbal frame has the next one
+  bool extended_ids = profile->bus.extended_ids;  // 29-bit identifiers
+  bool fd = profile->bus.fd;                      // CAN FD frames with bit rate switch
   std::string key_file;  // SecurityAccess key, 16 bytes as 32 hex digits; empty: credential "NAME.key", then "ins.key"
   std::string schedule = "horizontal";
   double dwell_s = 150.0;
   double rotation_s = 5.0;
-  double request_timeout_s = 1.0;    // P2 client
-  double lost_after_s = 30.0;        // link lost for longer: the run fails
+  double request_timeout_s = profile->timing.request_timeout_s;  // P2 client
+  double lost_after_s = 30.0;                                    // link lost for longer: the run fails
   double running_estimate_s = 60.0;  // estimate anew while turning, after so much data more; 0: only at the end
   double drift_check_s = 300.0;      // free-inertial drift before and after; 0: not measured
   double time_scale = 1.0;           // the INS's clock runs so many times faster (virtual INS only)
@@ -51,7 +59,8 @@ struct Config {
   const InsConfig* find(std::string_view name) const;
 };
 
-// All complaints at once, one per line: "FILE:LINE: key: what is wrong".
+// All complaints at once, one per line: "FILE:LINE: key: what is wrong". A profile is looked for in the folder profiles beside
+// `file`, or where its path says, from the folder of `file`.
 Expected<Config> parse_config(std::string_view text, const std::string& file);
 Expected<Config> load_config(const std::string& file);
 

@@ -18,7 +18,7 @@ void count(const can::CanFrame& frame, const InsConfig& config, Heard& heard) {
   }
   if (ours && frame.id == config.response_id) {
     ++(frame.fd && !config.fd ? heard.answers_fd : heard.answers);
-  } else if (ours && (frame.id == config.status_id || frame.id == config.status_id + 1)) {
+  } else if (ours && config.status_id && (frame.id == *config.status_id || frame.id == *config.status_id + 1)) {
     ++heard.status;
   } else {
     ++heard.others;
@@ -36,14 +36,14 @@ std::string why_silent(const Heard& heard, const InsConfig& config) {
     return fmt::format(
         "the INS is alive, its status frames {:#x} come; it does not answer {:#x}: check request_id and "
         "response_id ({:#x}){}",
-        config.status_id, config.request_id, config.response_id,
+        config.status_id.value_or(0), config.request_id, config.response_id,
         config.fd ? ", and whether it takes CAN FD: fd = true is configured" : "");
   }
   if (heard.others > 0) {
     return fmt::format(
         "{} frames of others are on the bus, none of the INS ({:#x}, {:#x}): is it switched on, are its "
         "identifiers those configured?",
-        heard.others, config.response_id, config.status_id);
+        heard.others, config.response_id, config.status_id.value_or(config.response_id));
   }
   return "no frame at all is on the bus: is the INS switched on and connected, is the bit rate the same?";
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "protocol/can/link.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/messages.hpp"
 
 namespace selfcal {
@@ -15,7 +14,7 @@ constexpr std::size_t longest_answer = 128;
 
 BusQuestion::BusQuestion(EventLoop& loop, const InsConfig& config, std::function<void(const std::string&)> done)
     : config_(config), listener_(config), port_(loop, config) {
-  port_.request(uds::read_request(ins::did::serial_number), longest_answer,
+  port_.request(uds::read_request(config_.profile->serial), longest_answer,
                 [this, done = std::move(done)](const Answer<Bytes>& answer) { done(words_of(answer)); });
 }
 

@@ -26,12 +26,18 @@ isotp::Options transport_options(const InsConfig& config) {
   options.address = {config.request_id, config.response_id, config.functional_id, config.extended_ids};
   options.fd = config.fd;
   options.frame_bytes = config.fd ? can::max_fd_bytes : can::max_classic_bytes;
+  options.padding_byte = config.profile->bus.padding;
+  options.block_size = config.profile->bus.block_size;
+  options.st_min = config.profile->bus.st_min;
   return options;
 }
 
 uds::ClientTimings timings(const InsConfig& config) {
   uds::ClientTimings timings;
   timings.p2 = std::chrono::nanoseconds(static_cast<std::int64_t>(config.request_timeout_s * 1e9));
+  const auto seconds = [](double s) { return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9)); };
+  timings.p2_star = seconds(config.profile->timing.p2_star_s);
+  timings.tester_present = seconds(config.profile->timing.tester_present_s);
   return timings;
 }
 
@@ -52,8 +58,10 @@ void CanPort::open() {
   options.interface = config_.interface;
   options.fd = config_.fd;
   constexpr std::uint32_t exact = 0x1FFFFFFF;
-  for (const std::uint32_t id : {config_.response_id, config_.status_id, config_.status_id + 1}) {
-    options.filters.push_back({id, exact, config_.extended_ids});
+  options.filters.push_back({config_.response_id, exact, config_.extended_ids});
+  if (config_.status_id) {
+    options.filters.push_back({*config_.status_id, exact, config_.extended_ids});
+    options.filters.push_back({*config_.status_id + 1, exact, config_.extended_ids});
   }
   auto socket = can::Socket::open(options);
   if (!socket) {
@@ -199,15 +207,15 @@ bool CanPort::receive_batch() {
 }
 
 void CanPort::take_status(const can::CanFrame& frame, bool& news) {
-  if (frame.extended != config_.extended_ids) {
+  if (frame.extended != config_.extended_ids || !config_.status_id) {
     return;
   }
   can::CanFrame named = frame;
   named.extended = false;
-  if (frame.id == config_.status_id) {
+  if (frame.id == *config_.status_id) {
     named.id = ins::can_id::status;
   }
-  if (frame.id == config_.status_id + 1) {
+  if (frame.id == *config_.status_id + 1) {
     named.id = ins::can_id::gimbal;
   }
   news = ins::apply_status_frame(named, status_) || news;

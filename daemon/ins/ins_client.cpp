@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "protocol/flash/page.hpp"
+#include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
 #include "protocol/uds/security.hpp"
 
@@ -68,15 +69,37 @@ tl::unexpected<PortError> protocol_error(const InsPort& port, const Error& error
 }
 
 template <typename Record>
-Answer<Record> decoded(const InsPort& port, const Answer<Bytes>& bytes, Expected<Record> (*decode)(ins::ByteView)) {
+Answer<Record> decoded(const InsPort& port, const profile::Profile& profile, const Answer<Bytes>& bytes,
+                       Expected<Record> (*decode)(const profile::Profile&, profile::ByteView)) {
   if (!bytes) {
     return tl::unexpected(bytes.error());
   }
-  auto record = decode(*bytes);
+  auto record = decode(profile, *bytes);
   if (!record) {
     return protocol_error(port, record.error());
   }
   return std::move(*record);
+}
+
+// A page as the service keeps it.
+Expected<Bytes> as_kept(const profile::Profile& profile, std::span<const std::uint8_t> told) {
+  const profile::Layout& layout = profile.raw.page;
+  if (layout.checksum && profile::stored_checksum(layout, told) != profile::computed_checksum(layout, told)) {
+    return fail(ErrorKind::device, "wrong CRC");
+  }
+  const auto page = profile::decode_page(profile, told);
+  if (!page) {
+    return tl::unexpected(page.error());
+  }
+  flash::PageBytes bytes;
+  flash::encode_page(*page, bytes);
+  return Bytes(bytes.begin(), bytes.end());
+}
+
+// A set of coefficients as the service keeps it.
+Bytes kept(const ins::Coefficients& set) {
+  const auto bytes = ins::encode(set);
+  return {bytes.begin(), bytes.end()};
 }
 
 std::string text(const Bytes& bytes) {
@@ -146,11 +169,11 @@ Task<Answer<Bytes>> InsClient::routine(uds::RoutineAction action, std::uint16_t 
 }
 
 Task<Answer<InsClient::Identity>> InsClient::identify() {
-  const Answer<Bytes> serial = co_await read_record(ins::did::serial_number);
+  const Answer<Bytes> serial = co_await read_record(profile_->serial);
   if (!serial) {
     co_return tl::unexpected(serial.error());
   }
-  const Answer<Bytes> software = co_await read_record(ins::did::software_version);
+  const Answer<Bytes> software = co_await read_record(profile_->software);
   if (!software) {
     co_return tl::unexpected(software.error());
   }
@@ -163,21 +186,26 @@ Task<Answer<InsClient::Identity>> InsClient::identify() {
 
 Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   session_asked_for_ = true;
-  Answer<Bytes> response = co_await ask(uds::session_request(uds::Session::extended), longest_other);
+  const auto session = static_cast<uds::Session>(profile_->session);
+  const std::uint8_t level = profile_->security.level;
+  Answer<Bytes> response = co_await ask(uds::session_request(session), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
-  const auto timings = uds::read_session_response(*response, uds::Session::extended);
+  const auto timings = uds::read_session_response(*response, session);
   if (!timings) {
     co_return protocol_error(port_, timings.error());
   }
   port_.take_timings(*timings);
   port_.keep_session(true);
-  response = co_await ask(uds::seed_request(), longest_other);
+  if (!profile_->security.needed) {
+    co_return Done{};
+  }
+  response = co_await ask(uds::seed_request(level), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
-  const auto seed = uds::read_seed_response(*response);
+  const auto seed = uds::read_seed_response(*response, level);
   if (!seed) {
     co_return protocol_error(port_, seed.error());
   }
@@ -188,34 +216,145 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   if (!secret) {
     co_return protocol_error(port_, secret.error());
   }
-  response = co_await ask(uds::key_request(*secret), longest_other);
+  response = co_await ask(uds::key_request(*secret, level), longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
-  if (auto well = uds::read_key_response(*response); !well) {
+  if (auto well = uds::read_key_response(*response, level); !well) {
     co_return protocol_error(port_, well.error());
   }
   co_return Done{};
 }
 
 Task<Answer<ins::StateRecord>> InsClient::read_state() {
-  const Answer<Bytes> bytes = co_await read_record(ins::did::state);
-  co_return decoded(port_, bytes, ins::decode_state);
+  const Answer<Bytes> bytes = co_await read_record(*profile_->state.did);
+  co_return decoded(port_, *profile_, bytes, profile::decode_state);
 }
 
 Task<Answer<ins::DirectoryRecord>> InsClient::read_directory() {
-  const Answer<Bytes> bytes = co_await read_record(ins::did::raw_data_directory);
-  co_return decoded(port_, bytes, ins::decode_directory);
+  const Answer<Bytes> bytes = co_await read_record(*profile_->directory.did);
+  co_return decoded(port_, *profile_, bytes, profile::decode_directory);
 }
 
 Task<Answer<ins::SampleFormatRecord>> InsClient::read_sample_format() {
-  const Answer<Bytes> bytes = co_await read_record(ins::did::sample_format);
-  co_return decoded(port_, bytes, ins::decode_sample_format);
+  if (!profile_->sample_format.did) {  // the profile gives it
+    co_return decoded(port_, *profile_, Answer<Bytes>(Bytes{}), profile::decode_sample_format);
+  }
+  const Answer<Bytes> bytes = co_await read_record(*profile_->sample_format.did);
+  co_return decoded(port_, *profile_, bytes, profile::decode_sample_format);
 }
 
 Task<Answer<ins::SiteRecord>> InsClient::read_site() {
-  const Answer<Bytes> bytes = co_await read_record(ins::did::site);
-  co_return decoded(port_, bytes, ins::decode_site);
+  if (!profile_->site.did) {  // the configuration gives it
+    co_return ins::SiteRecord{};
+  }
+  const Answer<Bytes> bytes = co_await read_record(*profile_->site.did);
+  co_return decoded(port_, *profile_, bytes, profile::decode_site);
+}
+
+Task<Answer<Bytes>> InsClient::read_set(SetOf which) {
+  Answer<Bytes> told =
+      co_await read_record(which == SetOf::in_force ? *profile_->set_in_force : *profile_->set_inactive);
+  if (!told) {
+    co_return told;
+  }
+  const auto set = profile::decode_coefficients(*profile_, *told);
+  co_return set ? kept(*set) : std::move(*told);
+}
+
+// To a fixed point: where the INS's numbers are in other units, a conversion there and back moves the last bit, and the next
+// one no more.
+Answer<Bytes> InsClient::as_held(const ins::Coefficients& set) const {
+  constexpr int rounds = 4;
+  ins::Coefficients held = set;
+  for (int round = 0; round < rounds; ++round) {
+    const auto bytes = profile::encode(*profile_, held);
+    const auto again = bytes ? profile::decode_coefficients(*profile_, *bytes) : tl::unexpected(bytes.error());
+    if (!again) {
+      return protocol_error(port_, again.error());
+    }
+    if (*again == held) {
+      return kept(held);
+    }
+    held = *again;
+  }
+  return protocol_error(port_,
+                        {ErrorKind::internal, "the record of coefficients does not settle when it is converted"});
+}
+
+Task<Answer<Done>> InsClient::command(uds::RoutineAction action, std::uint16_t id, Expected<Bytes> option) {
+  if (!option) {
+    co_return protocol_error(port_, option.error());
+  }
+  const auto done = co_await routine(action, id, std::move(*option));
+  if (!done) {
+    co_return tl::unexpected(done.error());
+  }
+  co_return Done{};
+}
+
+Task<Answer<Done>> InsClient::erase_inactive() {
+  if (!erases()) {
+    co_return Done{};
+  }
+  co_return co_await command(uds::RoutineAction::start, *profile_->erase.id, Bytes{});
+}
+
+Task<Answer<Done>> InsClient::write_inactive(Bytes set) {
+  const auto decoded_set = ins::decode_coefficients(set);
+  auto bytes = decoded_set ? profile::encode(*profile_, *decoded_set) : tl::unexpected(decoded_set.error());
+  if (!bytes) {
+    co_return protocol_error(port_, bytes.error());
+  }
+  co_return co_await write_record(*profile_->set_inactive, std::move(*bytes));
+}
+
+Task<Answer<Done>> InsClient::commit(Bytes set) {
+  if (!profile_->commit.id) {
+    co_return Done{};
+  }
+  const auto decoded_set = ins::decode_coefficients(set);
+  const auto bytes = decoded_set ? profile::encode(*profile_, *decoded_set) : tl::unexpected(decoded_set.error());
+  if (!bytes) {
+    co_return protocol_error(port_, bytes.error());
+  }
+  co_return co_await command(uds::RoutineAction::start, *profile_->commit.id, profile::commit_start(*profile_, *bytes));
+}
+
+Task<Answer<Done>> InsClient::write_schedule(ins::ScheduleRecord schedule) {
+  auto bytes = profile::encode(*profile_, schedule);
+  if (!bytes) {
+    co_return protocol_error(port_, bytes.error());
+  }
+  co_return co_await write_record(*profile_->schedule.did, std::move(*bytes));
+}
+
+Task<Answer<Done>> InsClient::start_rotation(std::uint32_t run_id) {
+  co_return co_await command(uds::RoutineAction::start, *profile_->rotate.id,
+                             profile::rotation_start(*profile_, run_id));
+}
+
+Task<Answer<Done>> InsClient::stop_rotation() {
+  co_return co_await command(uds::RoutineAction::stop, *profile_->rotate.id, Bytes{});
+}
+
+Task<Answer<ins::RunRecord>> InsClient::rotation_result() {
+  const Answer<Bytes> bytes = co_await routine(uds::RoutineAction::result, *profile_->rotate.id, {});
+  co_return decoded(port_, *profile_, bytes, profile::decode_run);
+}
+
+Task<Answer<Done>> InsClient::start_check(ins::NavigationCheckRequest request) {
+  co_return co_await command(uds::RoutineAction::start, *profile_->navigation_check.id,
+                             profile::encode(*profile_, request));
+}
+
+Task<Answer<Done>> InsClient::stop_check() {
+  co_return co_await command(uds::RoutineAction::stop, *profile_->navigation_check.id, Bytes{});
+}
+
+Task<Answer<ins::NavigationCheckRecord>> InsClient::check_result() {
+  const Answer<Bytes> bytes = co_await routine(uds::RoutineAction::result, *profile_->navigation_check.id, {});
+  co_return decoded(port_, *profile_, bytes, profile::decode_navigation_result);
 }
 
 Task<Answer<Done>> InsClient::reset() {
@@ -248,8 +387,20 @@ Task<Answer<Bytes>> InsClient::next_block(std::uint8_t block, std::uint32_t long
 }
 
 Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
-  const std::size_t wanted = std::size_t{count} * flash::page_bytes;
-  Answer<Bytes> response = co_await ask(uds::upload_request(first, static_cast<std::uint32_t>(wanted)), longest_other);
+  const profile::Raw& raw = profile_->raw;
+  const std::size_t page_bytes = raw.page.bytes;
+  const std::size_t wanted = std::size_t{count} * page_bytes;
+  const std::size_t address = raw.by_page ? first : std::size_t{first} * page_bytes;
+  const auto fits = [](std::size_t value, std::size_t bytes) { return bytes >= 8 || value >> (8 * bytes) == 0; };
+  if (!fits(address, raw.address_bytes) || !fits(wanted, raw.size_bytes)) {
+    co_return protocol_error(
+        port_, {ErrorKind::device, fmt::format("RequestUpload: address {} and size {} do not fit {} and {} bytes",
+                                               address, wanted, raw.address_bytes, raw.size_bytes)});
+  }
+  Answer<Bytes> response =
+      co_await ask(uds::upload_request(static_cast<std::uint32_t>(address), static_cast<std::uint32_t>(wanted),
+                                       {raw.address_bytes, raw.size_bytes}),
+                   longest_other);
   if (!response) {
     co_return tl::unexpected(response.error());
   }
@@ -272,8 +423,8 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
                                                  std::min(least_block_data, left), left)});
     }
     data.insert(data.end(), part->begin(), part->end());
-    for (; (whole + 1) * flash::page_bytes <= data.size(); ++whole) {
-      on_page(first + whole, std::span(data).subspan(whole * flash::page_bytes, flash::page_bytes));
+    for (; (whole + 1) * page_bytes <= data.size(); ++whole) {
+      on_page(first + whole, as_kept(*profile_, std::span(data).subspan(whole * page_bytes, page_bytes)));
     }
   }
   response = co_await ask(uds::transfer_exit_request(), longest_other);

@@ -1,5 +1,6 @@
 // The dialogues with an INS, each a coroutine that answers with what was learnt or why it was not. No state of the
-// calibration lives here.
+// calibration lives here. Which bytes go over the bus is the profile's matter: behind this class are the service's records, sets
+// of coefficients as the service keeps them (ins::encode), and pages as it keeps them (flash).
 #pragma once
 
 #include <functional>
@@ -11,15 +12,16 @@
 #include "daemon/ins/request_tally.hpp"
 #include "daemon/ins/unlock_key.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/ins_interface/records.hpp"
+#include "protocol/profile/profile.hpp"
 #include "protocol/uds/services.hpp"
 
 namespace selfcal {
 
 class InsClient {
  public:
-  InsClient(Timers& timers, InsPort& port) : timers_(timers), port_(port) {}
+  InsClient(Timers& timers, InsPort& port, profile::ProfilePtr profile = profile::built_in())
+      : timers_(timers), port_(port), profile_(std::move(profile)) {}
 
   // Whether a session other than the default one was asked for: it is to be ended (session_end.hpp).
   bool session_asked_for() const { return session_asked_for_; }
@@ -35,21 +37,43 @@ class InsClient {
   Task<Answer<ins::DirectoryRecord>> read_directory();
   Task<Answer<ins::SampleFormatRecord>> read_sample_format();
   Task<Answer<ins::SiteRecord>> read_site();
+  Task<Answer<Done>> reset();
+
+  // A set. What the INS tells and is none (erased FLASH, a wrong checksum) comes as it is told.
+  enum class SetOf : std::uint8_t { in_force, inactive };
+  Task<Answer<Bytes>> read_set(SetOf which);
+  // As the INS will hold it: where its record has fewer bits or fields than ours, what it reads back is not what was sent.
+  Answer<Bytes> as_held(const ins::Coefficients& set) const;
+  Task<Answer<Done>> erase_inactive();
+  bool erases() const { return profile_->erase.id.has_value(); }
+  Task<Answer<Done>> write_inactive(Bytes set);
+  Task<Answer<Done>> commit(Bytes set);
+
+  Task<Answer<Done>> write_schedule(ins::ScheduleRecord schedule);
+  Task<Answer<Done>> start_rotation(std::uint32_t run_id);
+  Task<Answer<Done>> stop_rotation();
+  Task<Answer<ins::RunRecord>> rotation_result();
+  Task<Answer<Done>> start_check(ins::NavigationCheckRequest request);
+  Task<Answer<Done>> stop_check();
+  Task<Answer<ins::NavigationCheckRecord>> check_result();
+
   Task<Answer<Bytes>> read_record(std::uint16_t did);
   Task<Answer<Done>> write_record(std::uint16_t did, Bytes record);
   Task<Answer<Bytes>> routine(uds::RoutineAction action, std::uint16_t routine, Bytes option);
-  Task<Answer<Done>> reset();
 
-  // Pages first .. first+count-1 of the latest run; `on_page(page, bytes)` gets each as soon as it is whole.
-  using OnPage = std::function<void(std::uint32_t, std::span<const std::uint8_t>)>;
+  // Pages first .. first+count-1 of the latest run; `on_page(page, bytes)` gets each as soon as it is whole, or why it cannot
+  // be read.
+  using OnPage = std::function<void(std::uint32_t, const Expected<Bytes>&)>;
   Task<Answer<Done>> upload(std::uint32_t first, std::uint32_t count, OnPage on_page);
 
  private:
   Task<Answer<Bytes>> ask(Bytes payload, std::size_t longest_answer);
   Task<Answer<Bytes>> next_block(std::uint8_t block, std::uint32_t longest);
+  Task<Answer<Done>> command(uds::RoutineAction action, std::uint16_t id, Expected<Bytes> option);
 
   Timers& timers_;
   InsPort& port_;
+  profile::ProfilePtr profile_;
   RequestTally tally_;
   bool session_asked_for_ = false;
 };

@@ -30,7 +30,7 @@ CalibrationRun::CalibrationRun(RunContext context, InsConfig config, Schedule sc
     : context_(context),
       journal_(context.timers, context.store, context.port, context.observer, std::move(record)),
       data_(std::move(config), std::move(schedule), key, std::move(folder)),
-      client_(context.timers, context.port),
+      client_(context.timers, context.port, data_.config.profile),
       session_end_(context.timers, context.port),
       budget_(context.timers, data_.config, [this](double waited_s) { budget_spent(waited_s); }),
       raw_(step_context()),

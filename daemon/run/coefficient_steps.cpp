@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "daemon/run/ins_checks.hpp"
-#include "protocol/byte_order.hpp"
 
 namespace selfcal {
 namespace {
@@ -45,14 +44,20 @@ Task<Step> CoefficientSteps::erase_inactive_slot() {
   if (wanted->version <= data_.state.coefficients_version) {
     wanted->version = data_.state.coefficients_version + 1;
   }
-  const auto bytes = ins::encode(*wanted);
-  data_.new_set.assign(bytes.begin(), bytes.end());
+  auto held = client_.as_held(*wanted);
+  if (!held) {
+    co_return tl::unexpected(held.error());
+  }
+  data_.new_set = std::move(*held);
   if (auto stored = store_.store_set(journal_.record.id, SetRole::written, data_.new_set); !stored) {
     co_return local_trouble(stored.error());
   }
-  const auto erased = co_await client_.routine(uds::RoutineAction::start, ins::routine::erase_inactive, {});
+  const auto erased = co_await client_.erase_inactive();
   if (!erased) {
     co_return tl::unexpected(erased.error());
+  }
+  if (!client_.erases()) {
+    co_return Event::slot_erased;
   }
   if (auto empty = co_await check_erased(); !empty) {
     co_return tl::unexpected(empty.error());
@@ -62,7 +67,7 @@ Task<Step> CoefficientSteps::erase_inactive_slot() {
 
 // An erased slot reads as nothing (conditionsNotCorrect, requestOutOfRange) or as erased FLASH.
 Task<Answer<Done>> CoefficientSteps::check_erased() {
-  const auto slot = co_await client_.read_record(ins::did::coefficients_inactive);
+  const auto slot = co_await client_.read_set(InsClient::SetOf::inactive);
   if (!slot) {
     const bool nothing = slot.error().kind == PortError::Kind::negative &&
                          (slot.error().nrc == static_cast<std::uint8_t>(uds::Nrc::conditions_not_correct) ||
@@ -85,7 +90,7 @@ Task<Step> CoefficientSteps::write_set() {
   if (auto same = co_await connection_.confirm_identity("the set is written"); !same) {
     co_return tl::unexpected(same.error());
   }
-  const auto written = co_await client_.write_record(ins::did::coefficients_inactive, data_.new_set);
+  const auto written = co_await client_.write_inactive(data_.new_set);
   if (!written) {
     co_return tl::unexpected(written.error());
   }
@@ -93,7 +98,7 @@ Task<Step> CoefficientSteps::write_set() {
 }
 
 Task<Step> CoefficientSteps::read_back() {
-  const auto slot = co_await client_.read_record(ins::did::coefficients_inactive);
+  const auto slot = co_await client_.read_set(InsClient::SetOf::inactive);
   if (!slot) {
     co_return tl::unexpected(slot.error());
   }
@@ -113,13 +118,8 @@ Task<Step> CoefficientSteps::commit() {
   if (auto same = co_await connection_.confirm_identity("the set is committed"); !same) {
     co_return tl::unexpected(same.error());
   }
-  ins::CoefficientsBytes bytes;
-  std::copy(data_.new_set.begin(), data_.new_set.end(), bytes.begin());
-  Bytes crc(4);
-  ByteWriter(crc).put(ins::stored_crc(bytes));
   data_.commit_asked = true;
-  const auto done =
-      co_await client_.routine(uds::RoutineAction::start, ins::routine::commit_coefficients, std::move(crc));
+  const auto done = co_await client_.commit(data_.new_set);
   if (!done) {
     co_return tl::unexpected(done.error());
   }

@@ -43,7 +43,7 @@ Task<Answer<Done>> ConnectionSteps::take_stock() {
   }
   data_.power_cycles = state->power_cycles;
   data_.state = *state;
-  auto set = co_await client_.read_record(ins::did::coefficients_in_force);
+  auto set = co_await client_.read_set(InsClient::SetOf::in_force);
   if (!set) {
     co_return tl::unexpected(set.error());
   }
@@ -72,7 +72,7 @@ Task<Answer<Done>> ConnectionSteps::check_power_cycles(ins::StateRecord found, s
   if (++data_.restarts_taken_up > at_most) {
     co_return refused(fmt::format("the restart number {} of this run", data_.restarts_taken_up));
   }
-  const auto in_force = co_await client_.read_record(ins::did::coefficients_in_force);
+  const auto in_force = co_await client_.read_set(InsClient::SetOf::in_force);
   if (!in_force) {
     co_return tl::unexpected(in_force.error());
   }

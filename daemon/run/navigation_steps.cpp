@@ -37,8 +37,7 @@ Task<Step> NavigationSteps::measure_drift(double RunRecord::*figure) {
   data_.power_cycles = before->power_cycles;
   // A daemon that was restarted meanwhile finds its own check going on; the INS would refuse another one.
   if (before->state != ins::State::checking) {
-    const auto begun =
-        co_await client_.routine(uds::RoutineAction::start, ins::routine::navigation_check, ins::encode(request));
+    const auto begun = co_await client_.start_check(request);
     if (!begun) {
       co_return tl::unexpected(begun.error());
     }
@@ -54,13 +53,9 @@ Task<Step> NavigationSteps::measure_drift(double RunRecord::*figure) {
           PortError{PortError::Kind::link, 0,
                     data_.config.interface + ": the INS restarted in the middle of its navigation check"});
     }
-    const auto answer = co_await client_.routine(uds::RoutineAction::result, ins::routine::navigation_check, {});
-    if (!answer) {
-      co_return tl::unexpected(answer.error());
-    }
-    const auto drift = ins::decode_navigation_result(*answer);
+    const auto drift = co_await client_.check_result();
     if (!drift) {
-      co_return protocol_error(drift.error().message);
+      co_return tl::unexpected(drift.error());
     }
     if (const Complaint complaint = check_navigation(*drift, request.duration_s)) {
       co_return protocol_error(*complaint);
@@ -93,7 +88,7 @@ Task<Answer<Done>> NavigationSteps::stop_check() {
     co_return Done{};
   }
   double limit_s = check_stop_limit_s;
-  const auto stopped = co_await client_.routine(uds::RoutineAction::stop, ins::routine::navigation_check, {});
+  const auto stopped = co_await client_.stop_check();
   if (!stopped) {
     if (!cannot_be_stopped(stopped.error())) {
       co_return tl::unexpected(stopped.error());

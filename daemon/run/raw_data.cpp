@@ -153,21 +153,21 @@ Task<Answer<Done>> RawData::await_completion() {
 
 Task<Answer<Done>> RawData::pull() {
   const PageFile::Range range = pages_->missing(pages_known_, pages_per_upload);
-  auto done = co_await client_.upload(range.first, range.count,
-                                      [this](std::uint32_t page, std::span<const std::uint8_t> bytes) {
-                                        const auto stored = pages_->store(page, bytes);
-                                        if (!stored) {
-                                          storage_error_ = stored.error();
-                                        }
-                                        if (stored && !stored->empty()) {
-                                          note_bad_page(page, *stored);
-                                        }
-                                        if (pages_->count() > journal_.progress.pages_pulled) {
-                                          progressed();
-                                        }
-                                        journal_.progress.pages_pulled = pages_->count();
-                                        journal_.report_progress();
-                                      });
+  auto done =
+      co_await client_.upload(range.first, range.count, [this](std::uint32_t page, const Expected<Bytes>& bytes) {
+        const auto stored = bytes ? pages_->store(page, *bytes) : Expected<std::string>(bytes.error().message);
+        if (!stored) {
+          storage_error_ = stored.error();
+        }
+        if (stored && !stored->empty()) {
+          note_bad_page(page, *stored);
+        }
+        if (pages_->count() > journal_.progress.pages_pulled) {
+          progressed();
+        }
+        journal_.progress.pages_pulled = pages_->count();
+        journal_.report_progress();
+      });
   if (!done) {
     co_return tl::unexpected(done.error());
   }

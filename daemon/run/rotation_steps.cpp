@@ -6,7 +6,6 @@
 #include <random>
 
 #include "daemon/run/ins_checks.hpp"
-#include "protocol/byte_order.hpp"
 
 namespace selfcal {
 namespace {
@@ -50,7 +49,7 @@ Task<Step> RotationSteps::write_schedule() {
   if (auto room = co_await raw_.check_space(); !room) {
     co_return tl::unexpected(room.error());
   }
-  const auto written = co_await client_.write_record(ins::did::schedule, ins::encode(schedule_record(data_.schedule)));
+  const auto written = co_await client_.write_schedule(schedule_record(data_.schedule));
   if (!written) {
     co_return tl::unexpected(written.error());
   }
@@ -60,11 +59,8 @@ Task<Step> RotationSteps::write_schedule() {
 }
 
 Task<Step> RotationSteps::start_rotation() {
-  Bytes number(4);
-  ByteWriter(number).put(journal_.record.rotation);
   data_.rotation_clock.start_asked(timers_.now());
-  const auto started =
-      co_await client_.routine(uds::RoutineAction::start, ins::routine::self_calibration, std::move(number));
+  const auto started = co_await client_.start_rotation(journal_.record.rotation);
   if (!started) {
     co_return tl::unexpected(started.error());
   }
@@ -187,7 +183,7 @@ Task<Answer<Done>> RotationSteps::bring_to_rest() {
   if (auto state = co_await ask_state(); !state) {
     co_return tl::unexpected(state.error());
   } else if (state->state == ins::State::rotating) {
-    const auto stopped = co_await client_.routine(uds::RoutineAction::stop, ins::routine::self_calibration, {});
+    const auto stopped = co_await client_.stop_rotation();
     if (!stopped) {
       co_return tl::unexpected(stopped.error());
     }

@@ -106,13 +106,9 @@ bool RunningSteps::may_end_early() const {
 Task<Answer<bool>> RunningSteps::confirm_standing() {
   const double told_s = data_.schedule.duration_s() - journal_.progress.ins.time_left_s;
   const SteadyTime heard_at = data_.status_at;
-  const auto result = co_await client_.routine(uds::RoutineAction::result, ins::routine::self_calibration, {});
-  if (!result) {
-    co_return tl::unexpected(result.error());
-  }
-  const auto answered = ins::decode_run(*result);
+  const auto answered = co_await client_.rotation_result();
   if (!answered) {
-    co_return protocol_error(answered.error().message);
+    co_return tl::unexpected(answered.error());
   }
   const auto directory = co_await raw_.read_directory();
   if (!directory) {

@@ -127,7 +127,7 @@ Expected<long double> get_number(const Layout& layout, const Field& field, ByteV
         return static_cast<long double>(ours);
       }
     }
-    return wrong(layout, fmt::format("{} is {}", field.name, number_text(raw)));
+    return wrong(layout, fmt::format("{} is {} ({})", field.name, number_text(raw), field.meaning));
   }
   return raw * field.scale + field.offset;
 }
@@ -265,6 +265,20 @@ std::uint64_t computed_checksum(const Layout& layout, ByteView bytes) {
     return flash::crc32c(covered);
   }
   return sum.algorithm == "crc16" ? crc16(covered) : crc_reflected(covered, 0xEDB88320U, 0xFFFFFFFFU);
+}
+
+bool length_fits(const Layout& layout, ByteView bytes) {
+  if (!layout.each || layout.bytes > 0) {
+    return bytes.size() == layout.bytes;
+  }
+  const Field* count = layout.find(layout.each->count);
+  if (bytes.size() < layout.each->at || count == nullptr) {
+    return false;
+  }
+  const auto number = get_number(layout, *count, bytes.subspan(count->at));
+  return number && *number >= 0 &&
+         static_cast<long double>(bytes.size() - layout.each->at) ==
+             *number * static_cast<long double>(layout.each->stride);
 }
 
 Expected<Values> read_fields(const Layout& layout, ByteView bytes) {

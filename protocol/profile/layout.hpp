@@ -32,10 +32,11 @@ std::span<const FieldType> field_types();
 
 struct Field {
   std::string name;
-  std::size_t line = 0;   // of the profile
-  std::size_t at = 0;     // bytes from the beginning of the record, or of the repetition
-  FieldType type;         // with the length in bytes
-  std::size_t count = 1;  // elements, one behind the other
+  std::string_view meaning;  // for messages; of the role's table
+  std::size_t line = 0;      // of the profile
+  std::size_t at = 0;        // bytes from the beginning of the record, or of the repetition
+  FieldType type;            // with the length in bytes
+  std::size_t count = 1;     // elements, one behind the other
   ByteOrder order = ByteOrder::big;
   unsigned first_bit = 0, bits = 0;  // part of an unsigned integer, bit 0 the lowest; bits 0: all of it
   // Value in the role's unit = raw * scale + offset.
@@ -90,6 +91,9 @@ struct Values {
 [[nodiscard]] Expected<Values> read_fields(const Layout& layout, ByteView bytes);
 // Fails where a value is missing or does not fit its field.
 [[nodiscard]] Expected<Bytes> write_fields(const Layout& layout, const Values& values);
+
+// Whether bytes have the length that the layout, and their count of repetitions, ask for.
+bool length_fits(const Layout& layout, ByteView bytes);
 
 // The checksum of a record that holds it: stored and computed.
 std::uint64_t stored_checksum(const Layout& layout, ByteView bytes);

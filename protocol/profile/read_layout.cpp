@@ -131,6 +131,7 @@ bool check_constant(Section& section, const Field& field, double value) {
 
 void read_field(Section& section, const RoleField* role, ByteOrder order, Field& field) {
   field.line = section.line();
+  field.meaning = role == nullptr ? std::string_view() : role->meaning;
   field.at = section.whole("at", 0, longest_record - 1, true).value_or(0);
   read_type(section, order, 255, field);
   read_bits(section, field);

@@ -207,11 +207,13 @@ Expected<ins::SampleFormatRecord> decode_sample_format(const Profile& profile, B
       !taken) {
     return tl::unexpected(taken.error());
   }
-  if (r.page_bytes != page.bytes || r.samples_per_page > page.most_repetitions()) {
-    return fail(
-        ErrorKind::bad_input,
-        fmt::format("{} record: {} samples in pages of {} bytes; the profile has {} in {}", record.layout.record,
-                    r.samples_per_page, r.page_bytes, page.most_repetitions(), page.bytes));
+  for (const auto& [what, told, least, most] :
+       {std::tuple("bytes of a page", std::size_t{r.page_bytes}, page.bytes, page.bytes),
+        std::tuple("samples of a page", std::size_t{r.samples_per_page}, std::size_t{1}, page.most_repetitions())}) {
+    if (told < least || told > most) {
+      return fail(ErrorKind::bad_input, fmt::format("{} record: {} is {}, must lie between {} and {}",
+                                                    record.layout.record, what, told, least, most));
+    }
   }
   r.page_bytes = flash::page_bytes;
   return checked({}, r);

@@ -20,7 +20,7 @@ constexpr std::array state_fields{
     F{"in_force", "", false, "slot of the coefficients in force", slots},
     F{"coefficients_version", "", false, "of the set in force"},
     F{"coefficients_crc", "", false, "checksum of the set in force"},
-    F{"run_id", "", false, "latest self-calibration; 0: none"},
+    F{"run_id", "", true, "latest self-calibration; 0: none"},
     F{"power_cycles", "", true, "counts every power-on"}};
 constexpr std::array schedule_fields{
     F{"positions", "", true, "number of positions"}, F{"rotation", "ms", true, "from one position to the next"},

@@ -9,8 +9,6 @@
 namespace selfcal::uds {
 namespace {
 
-// address and length of 4 bytes each (ISO 14229-1, addressAndLengthFormatIdentifier)
-constexpr std::uint8_t four_and_four = 0x44;
 constexpr std::uint8_t no_compression = 0x00;
 
 template <typename... Fields>
@@ -59,6 +57,10 @@ Expected<void> check_did(ByteView response, std::uint8_t service, std::uint16_t 
 
 std::uint8_t code(auto value) { return static_cast<std::uint8_t>(value); }
 
+// ISO 14229-1, addressAndLengthFormatIdentifier: bytes of the size in the high nibble, of the address in the low one.
+std::uint8_t format_code(UploadFormat format) { return code(format.size_bytes << 4U | format.address_bytes); }
+std::uint8_t key_level(std::uint8_t seed_level) { return code(seed_level + 1U); }
+
 }  // namespace
 
 Bytes session_request(Session session) { return message(service::session_control, code(session)); }
@@ -66,15 +68,23 @@ Bytes reset_request(ResetType type) { return message(service::ecu_reset, code(ty
 Bytes tester_present_request(bool suppress_response) {
   return message(service::tester_present, suppress_response ? suppress_response_bit : std::uint8_t{0});
 }
-Bytes seed_request() { return message(service::security_access, security_seed_level); }
-Bytes key_request(ByteView key) { return with_tail(message(service::security_access, security_key_level), key); }
+Bytes seed_request(std::uint8_t level) { return message(service::security_access, level); }
+Bytes key_request(ByteView key, std::uint8_t seed_level) {
+  return with_tail(message(service::security_access, key_level(seed_level)), key);
+}
 Bytes read_request(std::uint16_t did) { return message(service::read_data, did); }
 Bytes write_request(std::uint16_t did, ByteView record) { return with_tail(message(service::write_data, did), record); }
 Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView option) {
   return with_tail(message(service::routine_control, code(action), routine), option);
 }
-Bytes upload_request(std::uint32_t first_page, std::uint32_t bytes) {
-  return message(service::request_upload, no_compression, four_and_four, first_page, bytes);
+Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
+  Bytes request = message(service::request_upload, no_compression, format_code(format));
+  for (const auto& [value, count] : {std::pair(address, format.address_bytes), std::pair(bytes, format.size_bytes)}) {
+    for (std::size_t i = count; i-- > 0;) {
+      request.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    }
+  }
+  return request;
 }
 Bytes transfer_request(std::uint8_t block) { return message(service::transfer_data, block); }
 Bytes transfer_exit_request() { return message(service::transfer_exit); }
@@ -91,16 +101,16 @@ Expected<void> read_reset_response(ByteView response, ResetType type) {
   return check_code(response, service::ecu_reset, code(type), 2);
 }
 
-Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response) {
-  return check_code(response, service::security_access, security_seed_level, 2 + seed_bytes).map([&] {
+Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response, std::uint8_t level) {
+  return check_code(response, service::security_access, level, 2 + seed_bytes).map([&] {
     std::array<std::uint8_t, seed_bytes> seed{};
     std::ranges::copy(response.subspan(2, seed_bytes), seed.begin());
     return seed;
   });
 }
 
-Expected<void> read_key_response(ByteView response) {
-  return check_code(response, service::security_access, security_key_level, 2);
+Expected<void> read_key_response(ByteView response, std::uint8_t seed_level) {
+  return check_code(response, service::security_access, key_level(seed_level), 2);
 }
 
 Expected<ByteView> read_read_response(ByteView response, std::uint16_t did) {
@@ -143,23 +153,26 @@ Expected<ByteView> read_transfer_exit_response(ByteView response) {
   return check(response, service::transfer_exit, {}, 1).map([&] { return response.subspan(1); });
 }
 
-tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request) {
+tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format) {
   constexpr std::size_t shortest = 5;  // service, two formats, one byte each of address and length
-  constexpr std::size_t wanted = 11;
   if (request.size() < shortest) {
     return tl::unexpected(Nrc::incorrect_message_length);
   }
-  ByteReader in(request.subspan(1));
-  if (in.get<std::uint8_t>() != no_compression || in.get<std::uint8_t>() != four_and_four) {
+  if (request[1] != no_compression || request[2] != format_code(format)) {
     return tl::unexpected(Nrc::request_out_of_range);
   }
-  if (request.size() != wanted) {  // for this format
+  if (request.size() != 3 + format.address_bytes + format.size_bytes) {  // for this format
     return tl::unexpected(Nrc::incorrect_message_length);
   }
-  UploadRange range;
-  range.first_page = in.get<std::uint32_t>();
-  range.bytes = in.get<std::uint32_t>();
-  return range;
+  const auto number = [](ByteView bytes) {
+    std::uint32_t value = 0;
+    for (const std::uint8_t byte : bytes) {
+      value = value << 8U | byte;
+    }
+    return value;
+  };
+  return UploadRange{number(request.subspan(3, format.address_bytes)),
+                     number(request.subspan(3 + format.address_bytes))};
 }
 
 tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request) {
@@ -188,8 +201,8 @@ Bytes session_response(Session session, const SessionTimings& timings) {
                  static_cast<std::uint16_t>(duration_cast<milliseconds>(timings.p2).count()),
                  static_cast<std::uint16_t>(duration_cast<milliseconds>(timings.p2_star).count() / 10));
 }
-Bytes seed_response(ByteView seed) {
-  return with_tail(message(positive(service::security_access), security_seed_level), seed);
+Bytes seed_response(ByteView seed, std::uint8_t level) {
+  return with_tail(message(positive(service::security_access), level), seed);
 }
 Bytes read_response(std::uint16_t did, ByteView record) {
   return with_tail(message(positive(service::read_data), did), record);

@@ -24,13 +24,17 @@ inline constexpr std::size_t seed_bytes = 16;
 Bytes session_request(Session session);
 Bytes reset_request(ResetType type);
 Bytes tester_present_request(bool suppress_response);
-Bytes seed_request();
-Bytes key_request(ByteView key);
+Bytes seed_request(std::uint8_t level = security_seed_level);  // sendKey has the next one
+Bytes key_request(ByteView key, std::uint8_t seed_level = security_seed_level);
 Bytes read_request(std::uint16_t did);
 Bytes write_request(std::uint16_t did, ByteView record);
 Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView option = {});
-Bytes upload_request(std::uint32_t first_page, std::uint32_t bytes);  // format 0x44; the address is a page number
-Bytes transfer_request(std::uint8_t block);                           // 1 first; after 0xFF comes 0x00
+// Bytes that address and size of RequestUpload have (addressAndLengthFormatIdentifier), 1 to 4 each.
+struct UploadFormat {
+  std::size_t address_bytes = 4, size_bytes = 4;
+};
+Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
+Bytes transfer_request(std::uint8_t block);  // 1 first; after 0xFF comes 0x00
 Bytes transfer_exit_request();
 
 // Responses, as the client reads them
@@ -41,8 +45,9 @@ struct SessionTimings {
 [[nodiscard]] Expected<SessionTimings> read_session_response(ByteView response, Session session);
 [[nodiscard]] Expected<void> read_reset_response(ByteView response, ResetType type);
 // All zeros: already unlocked.
-[[nodiscard]] Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response);
-[[nodiscard]] Expected<void> read_key_response(ByteView response);
+[[nodiscard]] Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(
+    ByteView response, std::uint8_t level = security_seed_level);
+[[nodiscard]] Expected<void> read_key_response(ByteView response, std::uint8_t seed_level = security_seed_level);
 [[nodiscard]] Expected<ByteView> read_read_response(ByteView response, std::uint16_t did);  // the record
 [[nodiscard]] Expected<void> read_write_response(ByteView response, std::uint16_t did);
 [[nodiscard]] Expected<ByteView> read_routine_response(ByteView response, RoutineAction action,
@@ -56,7 +61,7 @@ inline constexpr std::size_t transfer_overhead = 2;
 
 // Requests, as the server reads them; the error is the NRC to answer with.
 struct UploadRange {
-  std::uint32_t first_page = 0;
+  std::uint32_t address = 0;  // of our own INS a page of the run
   std::uint32_t bytes = 0;
 };
 struct RoutineCall {
@@ -64,13 +69,13 @@ struct RoutineCall {
   std::uint16_t routine = 0;
   ByteView option;
 };
-[[nodiscard]] tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request);
+[[nodiscard]] tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format = {});
 [[nodiscard]] tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request);
 
 // Responses, as the server writes them
 std::array<std::uint8_t, 3> negative_response(std::uint8_t service, Nrc nrc);
 Bytes session_response(Session session, const SessionTimings& timings);
-Bytes seed_response(ByteView seed);
+Bytes seed_response(ByteView seed, std::uint8_t level = security_seed_level);
 Bytes read_response(std::uint16_t did, ByteView record);
 Bytes write_response(std::uint16_t did);
 Bytes routine_response(const RoutineCall& call, ByteView status = {});

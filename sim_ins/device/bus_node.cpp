@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/ins_interface/status.hpp"
 
 namespace selfcal::sim {
@@ -42,6 +41,7 @@ isotp::Options transport_options(const NodeOptions& o) {
   options.fd = o.fd;
   options.frame_bytes = o.fd ? can::max_fd_bytes : can::max_classic_bytes;
   options.max_message = 65535;
+  options.padding_byte = o.diagnostics.profile->bus.padding;
   for (Time* time : {&options.n_as, &options.n_bs, &options.n_cr}) {
     *time = stretched(*time, o.patience);
   }
@@ -185,7 +185,7 @@ void BusNode::reset_on_demand(Time now) {
 }
 
 void BusNode::queue_status() {
-  if (now_s_ < next_status_s_) {
+  if (!options_.tells_status || now_s_ < next_status_s_) {
     return;
   }
   next_status_s_ = now_s_ + std::max(status_interval_s, least_real_interval_s * options_.speed);
@@ -248,7 +248,8 @@ void BusNode::hear_second_tester(Time now) {
   request.id = options_.request_id;
   request.extended = options_.extended_ids;
   request.size = 8;
-  request.data = {0x03, 0x22, 0xF1, 0x8C};
+  const std::uint16_t serial = options_.diagnostics.profile->serial;
+  request.data = {0x03, 0x22, static_cast<std::uint8_t>(serial >> 8U), static_cast<std::uint8_t>(serial)};
   faulty_.count(FaultKind::second_tester);
   bus_.transmit(request, ins_time());
   if (send_all({&request, 1}) && instrument_.ready()) {

@@ -23,6 +23,7 @@ struct NodeOptions {
   std::uint32_t response_id = 0;
   std::uint32_t functional_id = 0;
   std::uint32_t status_id = 0;  // and status_id + 1
+  bool tells_status = true;
   bool extended_ids = false;
   bool fd = false;
   can::BitRates rates;

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/profile/records.hpp"
 
 namespace selfcal::sim {
 namespace {
@@ -15,11 +15,6 @@ namespace service = uds::service;
 
 constexpr std::string_view software_version = "sim_ins 1.0";
 constexpr uds::SessionTimings timings{std::chrono::milliseconds(50), std::chrono::seconds(5)};
-constexpr std::size_t schedule_head_bytes = 5;  // number of positions, time of a move
-constexpr std::size_t position_bytes = 12;
-constexpr std::size_t site_bytes = 24;
-constexpr std::size_t check_request_bytes = 5;
-constexpr std::size_t word_bytes = 4;
 
 // What figures 5 and 6 ask of every request. No sub-function depends on the session other than through its service, so
 // that subFunctionNotSupportedInActiveSession (0x7E) never comes.
@@ -51,31 +46,15 @@ constexpr std::array<ServiceRule, 10> service_rules = {{
 
 uds::Bytes as_bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
-template <typename Array>
-uds::Bytes as_bytes(const Array& array) requires requires {
-  array.size();
-} &&(!std::is_convertible_v<Array, std::string_view>) {
-  return {array.begin(), array.end()};
-}
-
-const ins::DataIdentifier* find_did(std::uint16_t id) {
-  const auto found = std::ranges::find(ins::data_identifiers, id, &ins::DataIdentifier::id);
-  return found == ins::data_identifiers.end() ? nullptr : &*found;
-}
-
-// Those that take no time to speak of have nothing to stop and no result.
-bool lasts(std::uint16_t routine) {
-  return routine == ins::routine::self_calibration || routine == ins::routine::navigation_check;
-}
-
 tl::unexpected<Nrc> no(Nrc nrc) { return tl::unexpected(nrc); }
 
 }  // namespace
 
 Diagnostics::Diagnostics(Instrument& instrument, const DiagnosticOptions& options)
     : instrument_(instrument),
+      profile_(options.profile),
       lock_(instrument.flash(), instrument.counters(), options.key, options.seed_salt),
-      upload_(instrument.raw(), options.longest_response) {}
+      upload_(instrument.raw(), options.longest_response, options.profile) {}
 
 void Diagnostics::power_on(Time now) {
   enter(uds::Session::standard);
@@ -117,7 +96,9 @@ uds::RequestHandler::Answer Diagnostics::handle(View request, uds::Bytes& respon
 std::optional<uds::Bytes> Diagnostics::take_answer() {
   if (const auto reply = lock_.take_answer(now_s_)) {
     if (*reply) {
-      return **reply;
+      uds::Bytes response = **reply;
+      response[1] = static_cast<std::uint8_t>(profile_->security.level + 1U);
+      return response;
     }
     const auto negative = uds::negative_response(service::security_access, reply->error());
     return uds::Bytes(negative.begin(), negative.end());
@@ -142,7 +123,14 @@ Nrc Diagnostics::general_objection(View request) const {
   }
   if (rule->sub_functions != 0) {
     const unsigned value = request[1] & ~unsigned{uds::suppress_response_bit};
-    if (value > 15 || (rule->sub_functions >> value & 1U) == 0) {
+    const unsigned level = profile_->security.level;
+    const bool of_profile = (rule->id == service::session_control && value == profile_->session) ||
+                            (rule->id == service::security_access && (value == level || value == level + 1));
+    const bool other_level = rule->id == service::security_access && !of_profile;
+    if (of_profile) {
+      return Nrc::none;
+    }
+    if (other_level || value > 15 || (rule->sub_functions >> value & 1U) == 0) {
       return Nrc::sub_function_not_supported;
     }
   }
@@ -178,7 +166,7 @@ Diagnostics::Reply Diagnostics::session_control(View request) {
 }
 
 Diagnostics::Reply Diagnostics::ecu_reset(View request) {
-  if (!lock_.open()) {  // figure 6: security of the sub-function before all that is the service's own
+  if (!unlocked()) {  // figure 6: security of the sub-function before all that is the service's own
     return no(Nrc::security_access_denied);
   }
   if (request.size() != 2) {
@@ -190,7 +178,7 @@ Diagnostics::Reply Diagnostics::ecu_reset(View request) {
 }
 
 Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
-  const bool seed_wanted = (request[1] & ~uds::suppress_response_bit) == uds::security_seed_level;
+  const bool seed_wanted = (request[1] & ~uds::suppress_response_bit) == profile_->security.level;
   if (!seed_wanted && !lock_.seed_given()) {  // figure 6: sequence of the sub-functions
     return no(Nrc::request_sequence_error);
   }
@@ -198,30 +186,56 @@ Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
     return no(Nrc::incorrect_message_length);
   }
   if (seed_wanted) {
-    return lock_.give_seed(now);
+    return lock_.give_seed(now).map([&](uds::Bytes response) {
+      response[1] = profile_->security.level;
+      return response;
+    });
   }
   lock_.begin_attempt(request.subspan(2), now);
   return uds::Bytes{};
 }
 
+bool Diagnostics::knows(std::uint16_t did) const {
+  const profile::Profile& p = *profile_;
+  const std::array dids{
+      std::optional(p.serial), std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
+      p.directory.did,         p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
+  return std::ranges::find(dids, std::optional(did)) != dids.end();
+}
+
+// nullopt: nothing is there yet, or the profile's fields do not hold it.
 std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
-  const auto set = [](const std::optional<ins::Coefficients>& coefficients) {
-    return coefficients ? std::optional(as_bytes(ins::encode(*coefficients))) : std::nullopt;
+  const profile::Profile& p = *profile_;
+  const auto told = [&](const auto& content) -> std::optional<uds::Bytes> {
+    auto bytes = profile::encode(p, content);
+    return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
   };
-  switch (id) {
-    case ins::did::serial_number: return as_bytes(std::string_view(instrument_.serial()));
-    case ins::did::software_version: return as_bytes(software_version);
-    case ins::did::state: return ins::encode(instrument_.state_record());
-    case ins::did::schedule:
-      return instrument_.schedule() ? std::optional(ins::encode(*instrument_.schedule())) : std::nullopt;
-    case ins::did::site: return ins::encode(instrument_.site());
-    case ins::did::coefficients_in_force: return set(instrument_.coefficients().in_force());
-    case ins::did::coefficients_inactive: return set(instrument_.coefficients().inactive());
-    case ins::did::coefficients_factory: return set(instrument_.coefficients().factory());
-    case ins::did::raw_data_directory: return ins::encode(instrument_.raw().directory());
-    case ins::did::sample_format: return ins::encode(instrument_.sample_format());
-    default: return std::nullopt;
+  const auto told_if_there = [&](const auto& content) { return content ? told(*content) : std::nullopt; };
+  if (id == p.serial) {
+    return as_bytes(std::string_view(instrument_.serial()));
   }
+  if (id == p.software) {
+    return as_bytes(software_version);
+  }
+  if (id == p.state.did) {
+    return told(instrument_.state_record());
+  }
+  if (id == p.schedule.did) {
+    return told_if_there(instrument_.schedule());
+  }
+  if (id == p.site.did) {
+    return told(instrument_.site());
+  }
+  if (id == p.set_in_force) {
+    return told(instrument_.coefficients().in_force());
+  }
+  if (id == p.set_inactive) {
+    return told_if_there(instrument_.coefficients().inactive());
+  }
+  if (id == p.set_factory) {
+    return told_if_there(instrument_.coefficients().factory());
+  }
+  return id == p.directory.did ? told(instrument_.raw().directory()) : told(instrument_.sample_format());
 }
 
 Diagnostics::Reply Diagnostics::read_data(View request) {
@@ -229,7 +243,7 @@ Diagnostics::Reply Diagnostics::read_data(View request) {
     return no(Nrc::incorrect_message_length);
   }
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  if (find_did(id) == nullptr) {
+  if (!knows(id)) {
     return no(Nrc::request_out_of_range);
   }
   const auto content = record(id);
@@ -239,25 +253,25 @@ Diagnostics::Reply Diagnostics::read_data(View request) {
 // ISO 14229-1, WriteDataByIdentifier: identifier, its security, total length, record, conditions.
 Diagnostics::Reply Diagnostics::write_data(View request) {
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  const ins::DataIdentifier* const known = find_did(id);
-  if (known == nullptr || !known->writable) {
+  const profile::Profile& p = *profile_;
+  if (id != p.schedule.did && id != p.site.did && id != p.set_inactive) {
     return no(Nrc::request_out_of_range);
   }
-  if (!lock_.open()) {
+  if (!unlocked()) {
     return no(Nrc::security_access_denied);
   }
   const View record = request.subspan(3);
-  const Reply written = id == ins::did::schedule ? write_schedule(record)
-                        : id == ins::did::site   ? write_site(record)
-                                                 : write_coefficients(record);
+  const Reply written = id == p.schedule.did ? write_schedule(record)
+                        : id == p.site.did   ? write_site(record)
+                                             : write_coefficients(record);
   return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
 }
 
 Diagnostics::Reply Diagnostics::write_schedule(View record) {
-  if (record.size() != schedule_head_bytes + position_bytes * record[0]) {
+  if (!profile::length_fits(profile_->schedule.layout, record)) {
     return no(Nrc::incorrect_message_length);
   }
-  const auto schedule = ins::decode_schedule(record);
+  const auto schedule = profile::decode_schedule(*profile_, record);
   if (!schedule || !instrument_.check_schedule(*schedule)) {
     return no(Nrc::request_out_of_range);
   }
@@ -269,10 +283,10 @@ Diagnostics::Reply Diagnostics::write_schedule(View record) {
 }
 
 Diagnostics::Reply Diagnostics::write_site(View record) {
-  if (record.size() != site_bytes) {
+  if (!profile::length_fits(profile_->site.layout, record)) {
     return no(Nrc::incorrect_message_length);
   }
-  const auto site = ins::decode_site(record);
+  const auto site = profile::decode_site(*profile_, record);
   if (!site) {
     return no(Nrc::request_out_of_range);
   }
@@ -284,10 +298,10 @@ Diagnostics::Reply Diagnostics::write_site(View record) {
 }
 
 Diagnostics::Reply Diagnostics::write_coefficients(View record) {
-  if (record.size() != ins::coefficients_bytes) {
+  if (!profile::length_fits(profile_->set, record)) {
     return no(Nrc::incorrect_message_length);
   }
-  const auto set = ins::decode_coefficients(record);
+  const auto set = profile::decode_coefficients(*profile_, record);
   if (!set) {
     return no(Nrc::request_out_of_range);
   }
@@ -307,22 +321,25 @@ Diagnostics::Reply Diagnostics::routine(View request) {
   if (!call) {
     return no(call.error());
   }
-  if (std::ranges::find(ins::routines, call->routine, &ins::Routine::id) == ins::routines.end()) {
+  const profile::Profile& p = *profile_;
+  const bool calibration = call->routine == p.rotate.id;
+  const bool lasts =
+      calibration || call->routine == p.navigation_check.id;  // others have nothing to stop and no result
+  if (!lasts && call->routine != p.erase.id && call->routine != p.commit.id) {
     return no(Nrc::request_out_of_range);
   }
-  if (!lock_.open()) {
+  if (!unlocked()) {
     return no(Nrc::security_access_denied);
   }
   if (call->action == uds::RoutineAction::start) {
     return start_routine(*call);
   }
-  if (!lasts(call->routine)) {
+  if (!lasts) {
     return no(Nrc::sub_function_not_supported);
   }
   if (!call->option.empty()) {
     return no(Nrc::incorrect_message_length);
   }
-  const bool calibration = call->routine == ins::routine::self_calibration;
   if (!(calibration ? calibration_started_ : check_started_)) {
     return no(Nrc::request_sequence_error);
   }
@@ -334,17 +351,20 @@ Diagnostics::Reply Diagnostics::routine(View request) {
 }
 
 Diagnostics::Reply Diagnostics::routine_result(const uds::RoutineCall& call) {
-  return uds::routine_response(call, call.routine == ins::routine::self_calibration
-                                         ? ins::encode(instrument_.run_record())
-                                         : ins::encode(instrument_.navigation_check()));
+  const auto result = call.routine == profile_->rotate.id ? profile::encode(*profile_, instrument_.run_record())
+                                                          : profile::encode(*profile_, instrument_.navigation_check());
+  return result ? Reply(uds::routine_response(call, *result)) : Reply(no(Nrc::conditions_not_correct));
 }
 
 Diagnostics::Reply Diagnostics::start_routine(const uds::RoutineCall& call) {
-  switch (call.routine) {
-    case ins::routine::self_calibration: return start_calibration(call);
-    case ins::routine::commit_coefficients: return commit(call);
-    case ins::routine::navigation_check: return start_check(call);
-    default: break;
+  if (call.routine == profile_->rotate.id) {
+    return start_calibration(call);
+  }
+  if (call.routine == profile_->commit.id) {
+    return commit(call);
+  }
+  if (call.routine == profile_->navigation_check.id) {
+    return start_check(call);
   }
   if (!call.option.empty()) {
     return no(Nrc::incorrect_message_length);
@@ -357,10 +377,14 @@ Diagnostics::Reply Diagnostics::start_routine(const uds::RoutineCall& call) {
 }
 
 Diagnostics::Reply Diagnostics::start_calibration(const uds::RoutineCall& call) {
-  if (call.option.size() != word_bytes) {
+  if (!profile::length_fits(profile_->rotate.start, call.option)) {
     return no(Nrc::incorrect_message_length);
   }
-  if (!instrument_.start_rotation(ByteReader(call.option).get<std::uint32_t>(), now_s_)) {
+  const auto run_id = profile::read_rotation_start(*profile_, call.option);
+  if (!run_id) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (!instrument_.start_rotation(*run_id, now_s_)) {
     return no(Nrc::conditions_not_correct);
   }
   calibration_started_ = true;
@@ -369,11 +393,13 @@ Diagnostics::Reply Diagnostics::start_calibration(const uds::RoutineCall& call) 
 }
 
 Diagnostics::Reply Diagnostics::commit(const uds::RoutineCall& call) {
-  if (call.option.size() != word_bytes) {
+  if (!profile::length_fits(profile_->commit.start, call.option)) {
     return no(Nrc::incorrect_message_length);
   }
-  const auto crc = ByteReader(call.option).get<std::uint32_t>();
-  if (instrument_.coefficients().inactive_crc() != crc) {
+  const auto set = instrument_.coefficients().inactive();
+  const auto bytes = set ? profile::encode(*profile_, *set) : Expected<uds::Bytes>(uds::Bytes());
+  const auto wanted = set && bytes ? profile::commit_start(*profile_, *bytes) : tl::unexpected(Error{});
+  if (!wanted || !std::ranges::equal(*wanted, call.option)) {
     return no(Nrc::request_out_of_range);
   }
   if (instrument_.busy()) {
@@ -384,10 +410,10 @@ Diagnostics::Reply Diagnostics::commit(const uds::RoutineCall& call) {
 }
 
 Diagnostics::Reply Diagnostics::start_check(const uds::RoutineCall& call) {
-  if (call.option.size() != check_request_bytes) {
+  if (!profile::length_fits(profile_->navigation_check.start, call.option)) {
     return no(Nrc::incorrect_message_length);
   }
-  const auto request = ins::decode_navigation_request(call.option);
+  const auto request = profile::decode_navigation_request(*profile_, call.option);
   if (!request) {
     return no(Nrc::request_out_of_range);
   }

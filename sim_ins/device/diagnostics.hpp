@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/profile/profile.hpp"
 #include "protocol/uds/messages.hpp"
 #include "protocol/uds/security.hpp"
 #include "protocol/uds/server.hpp"
@@ -19,6 +20,7 @@
 namespace selfcal::sim {
 
 struct DiagnosticOptions {
+  profile::ProfilePtr profile = profile::built_in();
   uds::SecurityKey key{};
   std::uint32_t longest_response = 4095;  // of TransferData, bytes
   std::uint64_t seed_salt = 0;            // 0: seeds from the system's entropy; else reproducible (tests)
@@ -36,7 +38,7 @@ class Diagnostics : public uds::RequestHandler {
   void power_on(Time now);                                               // default session, locked
   void answer_all_with(std::optional<uds::Nrc> nrc) { refusal_ = nrc; }  // fault on demand
   void set_instrument_time(double now_s) { now_s_ = now_s; }
-  bool unlocked() const { return lock_.open(); }
+  bool unlocked() const { return profile_->security.needed ? lock_.open() : session_ != uds::Session::standard; }
   uds::Session session() const { return session_; }
   bool session_timer_wanted() const { return session_ != uds::Session::standard; }
   bool take_reset_request() { return std::exchange(reset_wanted_, false); }
@@ -54,6 +56,7 @@ class Diagnostics : public uds::RequestHandler {
   Reply ecu_reset(View request);
   Reply security_access(View request, Time now);
   Reply read_data(View request);
+  bool knows(std::uint16_t did) const;
   std::optional<uds::Bytes> record(std::uint16_t id);
   Reply write_data(View request);
   Reply write_schedule(View record);
@@ -68,6 +71,7 @@ class Diagnostics : public uds::RequestHandler {
   void enter(uds::Session session);
 
   Instrument& instrument_;
+  profile::ProfilePtr profile_;
   double now_s_ = 0.0;
   uds::Session session_ = uds::Session::standard;
   SecurityLock lock_;

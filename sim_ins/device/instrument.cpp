@@ -40,21 +40,23 @@ double degrees_in_turn(double radians) {
 }  // namespace
 
 Instrument::Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
-                       const Scenario& scenario)
+                       const Scenario& scenario, std::size_t samples_per_page)
     : config_(config),
       seed_(seed),
       physics_(physics),
       scenario_(scenario),
+      samples_per_page_(samples_per_page),
       flash_(std::move(flash)),
       coefficients_(flash_),
       counters_(flash_),
-      raw_(flash_),
+      raw_(flash_, samples_per_page),
       site_{config.latitude_deg, config.longitude_deg, config.height_m} {}
 
 Expected<std::unique_ptr<Instrument>> Instrument::create(const SimConfig& config, std::uint64_t seed,
                                                          const ConcealedPhysics& physics, FlashMemory flash,
-                                                         const Scenario& scenario) {
-  std::unique_ptr<Instrument> instrument(new Instrument(config, seed, physics, std::move(flash), scenario));
+                                                         const Scenario& scenario, std::size_t samples_per_page) {
+  std::unique_ptr<Instrument> instrument(
+      new Instrument(config, seed, physics, std::move(flash), scenario, samples_per_page));
   // Proves configuration and physics before anybody relies on them.
   if (auto imu = instrument->make_imu({{GimbalPosition{}}, {1.0}, 5.0}, {}); !imu) {
     return tl::unexpected(imu.error());
@@ -115,7 +117,7 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   samples_ = 0;
   samples_wanted_ = static_cast<std::uint64_t>(std::llround(schedule.duration_s() * config_.sample_rate_hz));
   run_id_ = run_id;
-  const std::uint64_t pages = (samples_wanted_ + flash::samples_per_page - 1) / flash::samples_per_page;
+  const std::uint64_t pages = (samples_wanted_ + samples_per_page_ - 1) / samples_per_page_;
   raw_.begin(run_id, static_cast<std::uint32_t>(pages));
   for (const Fault& fault : scenario_.faults) {
     if (fault.kind == FaultKind::spoilt_page) {
@@ -181,7 +183,7 @@ void Instrument::take_sample() {
     page_.samples.push_back(
         {sample.delta_theta, sample.delta_v, gimbal_counts(sample.outer), gimbal_counts(sample.inner)});
   }
-  if (page_.samples.size() == flash::samples_per_page) {
+  if (page_.samples.size() == samples_per_page_) {
     flush_page(samples_ == samples_wanted_);
   }
   if (gimbal_noticed_s_ && t > *gimbal_noticed_s_) {
@@ -293,7 +295,7 @@ ins::SampleFormatRecord Instrument::sample_format() const {
           config_.accel_lsb_m_per_s,
           360.0 * units::degree / flash::counts_per_turn,
           static_cast<std::uint32_t>(flash::page_bytes),
-          static_cast<std::uint16_t>(flash::samples_per_page)};
+          static_cast<std::uint16_t>(samples_per_page_)};
 }
 
 }  // namespace selfcal::sim

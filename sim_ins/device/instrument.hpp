@@ -21,9 +21,9 @@ namespace selfcal::sim {
 
 class Instrument {
  public:
-  [[nodiscard]] static Expected<std::unique_ptr<Instrument>> create(const SimConfig& config, std::uint64_t seed,
-                                                                    const ConcealedPhysics& physics, FlashMemory flash,
-                                                                    const Scenario& scenario);
+  [[nodiscard]] static Expected<std::unique_ptr<Instrument>> create(
+      const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
+      const Scenario& scenario, std::size_t samples_per_page = flash::samples_per_page);
 
   void power_on(double now_s);  // also after a reset: all is lost but what the FLASH had done
   void advance(double now_s);   // everything due up to then happens
@@ -59,7 +59,7 @@ class Instrument {
 
  private:
   Instrument(const SimConfig& config, std::uint64_t seed, const ConcealedPhysics& physics, FlashMemory flash,
-             const Scenario& scenario);
+             const Scenario& scenario, std::size_t samples_per_page);
 
   void take_sample();
   void apply_faults(ImuSample& sample, double t);
@@ -73,6 +73,7 @@ class Instrument {
   std::uint64_t seed_;
   ConcealedPhysics physics_;
   Scenario scenario_;  // of it the faults of gimbal, sensors and pages
+  std::size_t samples_per_page_;
   FlashMemory flash_;
   CoefficientStore coefficients_;
   CounterStore counters_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "protocol/profile/records.hpp"
+
 namespace selfcal::sim {
 
 using uds::Nrc;
@@ -13,17 +15,21 @@ void RawUpload::forget() {
 }
 
 Reply RawUpload::request(std::span<const std::uint8_t> request) {
-  const auto range = uds::parse_upload_request(request);
+  const profile::Raw& raw = profile_->raw;
+  const auto range = uds::parse_upload_request(request, {raw.address_bytes, raw.size_bytes});
   if (!range) {
     return tl::unexpected(range.error());
   }
   const ins::DirectoryRecord directory = raw_.directory();
-  const std::uint64_t end = std::uint64_t{range->first_page} * flash::page_bytes + range->bytes;
-  if (range->bytes == 0 || range->first_page < directory.first_page ||
-      end > std::uint64_t{directory.pages_written} * flash::page_bytes) {
+  const std::uint32_t first_page = raw.by_page ? range->address : range->address / page_bytes();
+  const std::uint64_t end = std::uint64_t{first_page} * page_bytes() + range->bytes;
+  const bool between_pages = !raw.by_page && range->address % page_bytes() != 0;
+  if (range->bytes == 0 || between_pages || first_page < directory.first_page ||
+      end > std::uint64_t{directory.pages_written} * page_bytes()) {
     return tl::unexpected(Nrc::request_out_of_range);
   }
-  upload_ = Upload{range->first_page, range->bytes, 0, 1, 0};
+  upload_ = Upload{first_page, range->bytes, 0, 1, 0};
+  told_.reset();
   return uds::upload_response(longest_response_);
 }
 
@@ -52,19 +58,29 @@ Reply RawUpload::transfer(std::span<const std::uint8_t> request, uds::Bytes& res
   uds::transfer_response(block, data(next), response);
   next.done += next.last_size;
   upload_ = next;
-  pages_served_ = std::max(pages_served_, next.first_page + next.done / static_cast<std::uint32_t>(flash::page_bytes));
+  pages_served_ = std::max(pages_served_, next.first_page + next.done / page_bytes());
   return uds::Bytes{};
 }
 
+// A page that the FLASH does not hold whole reads as erased.
+std::span<const std::uint8_t> RawUpload::told_page(std::uint32_t page) {
+  if (!told_ || told_->first != page) {
+    flash::Page content;
+    const auto whole = flash::decode_page(raw_.page(page), content);
+    auto bytes = whole ? profile::encode_page(*profile_, content) : uds::Bytes();
+    told_.emplace(page, bytes && !bytes->empty() ? std::move(*bytes) : uds::Bytes(page_bytes(), 0xFF));
+  }
+  return told_->second;
+}
+
 uds::Bytes RawUpload::data(const Upload& upload) {
-  constexpr auto page_bytes = static_cast<std::uint32_t>(flash::page_bytes);
   uds::Bytes data;
   data.reserve(upload.last_size);
   const std::uint32_t end = upload.done + upload.last_size;
   for (std::uint32_t at = upload.done; at < end;) {
-    const std::uint32_t page = upload.first_page + at / page_bytes;
-    const std::uint32_t part = std::min(page_bytes - at % page_bytes, end - at);
-    const auto bytes = raw_.page(page).subspan(at % page_bytes, part);
+    const std::uint32_t page = upload.first_page + at / page_bytes();
+    const std::uint32_t part = std::min(page_bytes() - at % page_bytes(), end - at);
+    const auto bytes = told_page(page).subspan(at % page_bytes(), part);
     data.insert(data.end(), bytes.begin(), bytes.end());
     if (raw_.spoilt() == page && part > 64) {
       data.back() ^= 0x40;

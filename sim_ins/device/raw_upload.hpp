@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "protocol/profile/profile.hpp"
 #include "protocol/uds/messages.hpp"
 #include "sim_ins/device/stores.hpp"
 
@@ -13,7 +14,8 @@ namespace selfcal::sim {
 class RawUpload {
  public:
   // `longest_response` of TransferData, bytes.
-  RawUpload(RawStore& raw, std::uint32_t longest_response) : raw_(raw), longest_response_(longest_response) {}
+  RawUpload(RawStore& raw, std::uint32_t longest_response, profile::ProfilePtr profile)
+      : raw_(raw), longest_response_(longest_response), profile_(std::move(profile)) {}
 
   void forget();  // power-on, or a run that writes over what was uploaded
   void drop() { upload_.reset(); }
@@ -34,9 +36,13 @@ class RawUpload {
     std::uint32_t last_size = 0;  // of the block before, should it be asked for again
   };
   uds::Bytes data(const Upload& upload);  // of the block that begins at `done`
+  std::span<const std::uint8_t> told_page(std::uint32_t page);
+  std::uint32_t page_bytes() const { return static_cast<std::uint32_t>(profile_->raw.page.bytes); }
 
   RawStore& raw_;
   std::uint32_t longest_response_;
+  profile::ProfilePtr profile_;
+  std::optional<std::pair<std::uint32_t, uds::Bytes>> told_;  // the last page, in the profile's bytes
   std::optional<Upload> upload_;
   std::uint32_t pages_served_ = 0;
 };

@@ -174,7 +174,7 @@ void RawStore::find_pages() {
   while (first_ > 0 && held(first_ - 1)) {
     --first_;
   }
-  samples_ = std::uint64_t{newest->sequence} * flash::samples_per_page + newest->samples.size();  // all others are full
+  samples_ = std::uint64_t{newest->sequence} * samples_per_page_ + newest->samples.size();  // all others are full
 }
 
 void RawStore::begin(std::uint32_t run_id, std::uint32_t pages_expected) {

@@ -78,7 +78,8 @@ class CounterStore {
 // first block and the last two, so that pages of an earlier run, whatever its number was, are never taken for this one's.
 class RawStore {
  public:
-  explicit RawStore(FlashMemory& flash) : flash_(flash) {}
+  explicit RawStore(FlashMemory& flash, std::size_t samples_per_page = flash::samples_per_page)
+      : flash_(flash), samples_per_page_(samples_per_page) {}
 
   void power_on();  // finds the latest run and how far it got
   void begin(std::uint32_t run_id, std::uint32_t pages_expected);
@@ -99,6 +100,7 @@ class RawStore {
   void find_pages();
 
   FlashMemory& flash_;
+  std::size_t samples_per_page_;
   std::uint32_t run_id_ = 0, expected_ = 0, first_ = 0, written_ = 0;
   std::uint64_t samples_ = 0;
   bool complete_ = true;

@@ -9,6 +9,7 @@
 
 #include "daemon/run/calibration_run.hpp"
 #include "daemon/run/state_budget.hpp"
+#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/client.hpp"
 #include "tests/hostile/middle.hpp"
 #include "tests/unit/daemon/simulated_timers.hpp"

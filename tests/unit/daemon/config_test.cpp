@@ -52,6 +52,30 @@ TEST(Config, TheShippedFileShowsEveryKey) {
   }
 }
 
+TEST(Config, AKeyComesBeforeTheProfileAndTheProfileBeforeTheDefault) {
+  const std::string section =
+      "[ins.a]\ninterface = \"c\"\nprofile = \"" SELFCAL_SOURCE_DIR "/config/profiles/example.toml\"\n";
+  const auto plain = parse_config(section, "f.toml");
+  ASSERT_TRUE(plain) << plain.error().message;
+  const InsConfig& ins = plain->instruments.at(0);
+  EXPECT_EQ(ins.profile->name, "example");
+  EXPECT_EQ(ins.request_id, 0x18DA2AF1U);
+  EXPECT_TRUE(ins.extended_ids);
+  EXPECT_EQ(ins.request_timeout_s, 1.5);
+  EXPECT_EQ(ins.status_id, std::nullopt);
+  const auto own = parse_config(section + "request_id = 0x18DA2BF1\nrequest_timeout_s = 3.0\n", "f.toml");
+  ASSERT_TRUE(own) << own.error().message;
+  EXPECT_EQ(own->instruments.at(0).request_id, 0x18DA2BF1U);
+  EXPECT_EQ(own->instruments.at(0).response_id, 0x18DAF12AU);
+  EXPECT_EQ(own->instruments.at(0).request_timeout_s, 3.0);
+  EXPECT_EQ(InsConfig().request_id, profile::built_in()->bus.request);
+}
+
+TEST(Config, AProfileThatCannotBeReadIsNamedWithTheKeysLine) {
+  EXPECT_EQ(complaint("[ins.a]\ninterface = \"c\"\nprofile = \"nowhere\"\n"),
+            "f.toml:3: ins.a.profile: profiles/nowhere.toml: cannot be opened");
+}
+
 TEST(Config, UnknownKeyIsNamedWithItsLine) {
   EXPECT_EQ(complaint("[ins.a]\ninterface = \"vcan0\"\ntypo = 1\n"), "f.toml:3: ins.a.typo: unknown key");
   EXPECT_EQ(complaint("[ins.a]\ninterface = \"vcan0\"\n[deamon]\n"), "f.toml:3: deamon: unknown section");

@@ -322,7 +322,7 @@ Answer<Bytes> FakeIns::respond(std::span<const std::uint8_t> request) {
       if (!range) {
         return no(0x31);
       }
-      upload_page_ = range->first_page;
+      upload_page_ = range->address;
       upload_rest_.clear();
       return uds::upload_response(flash::page_bytes + uds::transfer_overhead);
     }

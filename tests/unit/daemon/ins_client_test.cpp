@@ -55,16 +55,15 @@ TEST(InsClient, SenselessAnswersNameTheInterface) {
   TersePort port;
   testing_support::SimulatedTimers timers;
   InsClient client(timers, port);
-  const std::string lines[] = {
-      complaint(port, client.identify()),
-      complaint(port, client.read_state()),
-      complaint(port, client.read_directory()),
-      complaint(port, client.read_site()),
-      complaint(port, client.read_sample_format()),
-      complaint(port, client.write_record(0xF190, {1, 2, 3})),
-      complaint(port, client.routine(uds::RoutineAction::start, 0x0200, {})),
-      complaint(port, client.upload(0, 1, [](std::uint32_t, std::span<const std::uint8_t>) {})),
-      complaint(port, client.unlock(UnlockKey{}))};
+  const std::string lines[] = {complaint(port, client.identify()),
+                               complaint(port, client.read_state()),
+                               complaint(port, client.read_directory()),
+                               complaint(port, client.read_site()),
+                               complaint(port, client.read_sample_format()),
+                               complaint(port, client.write_record(0xF190, {1, 2, 3})),
+                               complaint(port, client.routine(uds::RoutineAction::start, 0x0200, {})),
+                               complaint(port, client.upload(0, 1, [](std::uint32_t, const Expected<Bytes>&) {})),
+                               complaint(port, client.unlock(UnlockKey{}))};
   for (const std::string& line : lines) {
     EXPECT_TRUE(line.starts_with("can7: ")) << line;
     EXPECT_EQ(line.find('\n'), std::string::npos) << line;

@@ -1,0 +1,352 @@
+#include "protocol/profile/describe.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/profile/byte_picture.hpp"
+#include "protocol/profile/coefficient_fields.hpp"
+
+namespace selfcal::profile {
+namespace {
+
+using Row = std::vector<std::string>;
+
+std::string html_text(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : std::string(1, c);
+  }
+  return out;
+}
+
+// The document in one of its two forms.
+class Writer {
+ public:
+  Writer(Markup markup, std::string_view title) : html_(markup == Markup::html) {
+    if (html_) {
+      text_ = fmt::format(
+          "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>\n"
+          "body{{font:16px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}\n"
+          "table{{border-collapse:collapse}}td,th{{border:1px solid #999;padding:.2em .6em;text-align:left}}\n"
+          "pre{{overflow-x:auto;background:#f4f4f4;padding:.6em}}\n</style></head><body>\n<h1>{0}</h1>\n",
+          html_text(title));
+    } else {
+      text_ = fmt::format("# {}\n\n", title);
+    }
+  }
+  void heading(std::string_view words) {
+    text_ += html_ ? fmt::format("<h2>{}</h2>\n", html_text(words)) : fmt::format("## {}\n\n", words);
+  }
+  void say(std::string_view words) {
+    text_ += html_ ? fmt::format("<p>{}</p>\n", html_text(words)) : fmt::format("{}\n\n", words);
+  }
+  void table(const Row& head, const std::vector<Row>& rows) {
+    const auto line = [&](const Row& cells, std::string_view tag) {
+      if (!html_) {
+        return fmt::format("| {} |\n", fmt::join(cells, " | "));
+      }
+      std::string out = "<tr>";
+      for (const std::string& text : cells) {
+        out += fmt::format("<{0}>{1}</{0}>", tag, html_text(text));
+      }
+      return out + "</tr>\n";
+    };
+    text_ += html_ ? "<table>\n" : "";
+    text_ += line(head, "th");
+    if (!html_) {
+      text_ += fmt::format("|{}\n", fmt::join(Row(head.size(), "---|"), ""));
+    }
+    for (const Row& row : rows) {
+      text_ += line(row, "td");
+    }
+    text_ += html_ ? "</table>\n" : "\n";
+  }
+  void picture(std::string_view drawing) {
+    text_ += html_ ? fmt::format("<pre>{}</pre>\n", html_text(drawing)) : fmt::format("```\n{}```\n\n", drawing);
+  }
+  std::string end() { return html_ ? text_ + "</body></html>\n" : text_.substr(0, text_.size() - 1); }
+
+ private:
+  bool html_;
+  std::string text_;
+};
+
+std::string id_text(std::uint32_t id, bool extended) { return fmt::format("0x{:0{}X}", id, extended ? 8 : 3); }
+
+std::string meaning(const Field& field, const RecordRole& role) {
+  if (field.constant) {
+    return fmt::format("always {:.10g} (0x{:X})", static_cast<double>(*field.constant),
+                       static_cast<std::uint64_t>(std::max(0.0L, *field.constant)));
+  }
+  const auto known = std::ranges::find(role.fields, field.name, &RoleField::name);
+  std::string words(known == role.fields.end() ? "" : known->meaning);
+  if (!field.codes.empty()) {
+    std::vector<std::string> codes;
+    for (const auto& [ours, theirs] : field.codes) {
+      codes.push_back(fmt::format("{} {}", theirs, known->words[ours]));
+    }
+    words += fmt::format("{}{}", words.empty() ? "" : ": ", fmt::join(codes, ", "));
+  }
+  return words;
+}
+
+// What one count is worth in the unit that the profile writes.
+std::string scale_text(const Field& field, const RecordRole& role) {
+  const auto known = std::ranges::find(role.fields, field.name, &RoleField::name);
+  if (known == role.fields.end() || field.constant || !field.codes.empty() || field.type.kind == Kind::text) {
+    return "";
+  }
+  const Unit* own = find_unit(field.unit.empty() ? known->unit : field.unit);
+  const Unit* wanted = find_unit(known->unit);
+  const double factor = field.unit.empty() || own == wanted ? 1.0 : own->si / wanted->si;
+  std::string words = fmt::format("{:.10g}{}{}", field.scale / factor, own->name.empty() ? "" : " ", own->name);
+  if (field.offset != 0.0) {
+    words += fmt::format(", plus {:.10g}", field.offset / factor);
+  }
+  return words;
+}
+
+std::vector<Row> rows_of(const std::vector<Field>& fields, const RecordRole& role) {
+  std::vector<Row> rows;
+  for (const Field& field : fields) {
+    rows.push_back(
+        {field.name,
+         field.end() - field.at > 1 ? fmt::format("{} to {}", field.at, field.end() - 1) : std::to_string(field.at),
+         fmt::format(
+             "{}{}{}", field.type.name, field.count > 1 ? fmt::format(" x {}", field.count) : "",
+             field.bits > 0 ? fmt::format(", bits {} to {}", field.first_bit, field.first_bit + field.bits - 1) : ""),
+         field.type.bytes == 1 || field.type.kind == Kind::text ? ""
+         : field.order == ByteOrder::big                        ? "big"
+                                                                : "little",
+         scale_text(field, role), meaning(field, role)});
+  }
+  std::ranges::stable_sort(rows, {}, [](const Row& row) { return std::stoul(row[1]); });
+  return rows;
+}
+
+void write_record(Writer& out, const Layout& layout, const RecordRole& role) {
+  const Row head{"field", "bytes", "type", "byte order", "one count is", "meaning"};
+  if (layout.each && layout.bytes == 0) {
+    out.say(fmt::format("{} bytes, and {} for each of {}.", layout.each->at, layout.each->stride, layout.each->count));
+  } else if (layout.bytes == 0) {
+    out.say("No bytes.");
+    return;
+  } else {
+    const bool bits = std::ranges::any_of(layout.fields, [](const Field& field) { return field.bits > 0; });
+    out.say(fmt::format("{} bytes. Bytes that no field has are 0x{:02X}.{}", layout.bytes, layout.fill,
+                        bits ? " Bit 0 is the lowest of its integer." : ""));
+  }
+  out.table(head, rows_of(layout.fields, role));
+  if (layout.each) {
+    out.say(fmt::format("From byte {} on, every {} bytes, as often as {} says, {} times at most; bytes within one:",
+                        layout.each->at, layout.each->stride, layout.each->count, layout.each->most));
+    out.table(head, rows_of(layout.each->fields, role));
+  }
+  if (layout.checksum) {
+    const Checksum& sum = *layout.checksum;
+    const std::string_view words =
+        sum.algorithm == "crc32c"  ? "CRC-32C (Castagnoli, reflected, initial value and final XOR 0xFFFFFFFF)"
+        : sum.algorithm == "crc32" ? "CRC-32 (IEEE 802.3, reflected, initial value and final XOR 0xFFFFFFFF)"
+                                   : "CRC-16 (polynomial 0x1021, not reflected, initial value 0xFFFF, no final XOR)";
+    out.say(fmt::format(
+        "Checksum in bytes {} to {}, {}, {}-endian: {} of bytes {} to {}; where its own bytes are among them, they "
+        "count as 0.",
+        sum.field.at, sum.field.end() - 1, sum.field.type.name, sum.field.order == ByteOrder::big ? "big" : "little",
+        words, sum.from, sum.to - 1));
+  }
+  out.picture(byte_picture(layout));
+}
+
+class Document {
+ public:
+  Document(const Profile& profile, Markup markup)
+      : p_(profile), out_(markup, fmt::format("Interface of INS {}", profile.name)) {}
+
+  std::string write() {
+    out_.say(
+        "What an INS has to do so that selfcal calibrates it: rotate its IMU on its own gimbal, store and tell the raw "
+        "data, "
+        "take the 24 coefficients and use them after the next power-on. Made from the profile.");
+    write_bus();
+    write_services();
+    write_identifiers();
+    write_records();
+    write_routines();
+    write_upload();
+    write_axes();
+    return out_.end();
+  }
+
+ private:
+  void write_bus() {
+    const Bus& b = p_.bus;
+    out_.heading("Bus");
+    out_.say(
+        fmt::format("CAN{}, identifiers of {} bits, ISO 15765-2 with normal addressing (no address byte in the data).",
+                    b.fd ? " FD with bit rate switch" : ", classic", b.extended_ids ? 29 : 11));
+    std::vector<Row> rows{
+        {id_text(b.request, b.extended_ids), "tester to INS", "requests"},
+        {id_text(b.response, b.extended_ids), "INS to tester", "responses"},
+        {id_text(b.functional, b.extended_ids), "tester to all", "TesterPresent, single frames, no response"}};
+    if (b.status) {
+      rows.push_back(
+          {id_text(*b.status, b.extended_ids), "INS to all", "state frame, periodic; the gimbal frame has the next"});
+    }
+    out_.table({"identifier", "from", "what"}, rows);
+    out_.say(fmt::format(
+        "The tester fills short frames to 8 bytes with 0x{:02X}. Its flow control tells block size {} and STmin "
+        "0x{:02X}. It waits {:g} s for an answer (P2), {:g} s after 0x78 (P2*), and longer where the answer to "
+        "DiagnosticSessionControl states longer times; in a session it sends TesterPresent (3E 80) every {:g} s.",
+        b.padding, b.block_size, b.st_min, p_.timing.request_timeout_s, p_.timing.p2_star_s,
+        p_.timing.tester_present_s));
+  }
+
+  void write_services() {
+    out_.heading("Services");
+    out_.say(
+        "ISO 14229-1. A positive response begins with the service plus 0x40 and repeats the identifier; a negative one "
+        "is 7F, the "
+        "service, the code. Everything but reading needs the session, and what writes, starts or resets needs the lock "
+        "open.");
+    std::vector<Row> rows{{fmt::format("10 {:02X}", p_.session), fmt::format("50 {:02X} P2 P2*", p_.session),
+                           "session; P2 in ms, P2* in 10 ms, two bytes each, big-endian; locks"},
+                          {"10 01", "50 01 P2 P2*", "back to the default session; locks"}};
+    if (p_.security.needed) {
+      rows.push_back({fmt::format("27 {:02X}", p_.security.level), fmt::format("67 {:02X} SEED", p_.security.level),
+                      "16 bytes of seed, fresh each time; all zeros: open already"});
+      rows.push_back({fmt::format("27 {:02X} KEY", p_.security.level + 1),
+                      fmt::format("67 {:02X}", p_.security.level + 1),
+                      "KEY is AES-CMAC-128 (RFC 4493) of the seed, 16 bytes"});
+    }
+    rows.push_back({"22 DID", "62 DID RECORD", "read, in any session; DID has two bytes, big-endian"});
+    rows.push_back({"2E DID RECORD", "6E DID", "write"});
+    rows.push_back({"31 01 ID OPTION", "71 01 ID", "start a routine; ID has two bytes, big-endian"});
+    rows.push_back({"31 02 ID", "71 02 ID", "stop it"});
+    rows.push_back({"31 03 ID", "71 03 ID RESULT", "its result"});
+    rows.push_back(
+        {"11 01", "51 01", "restart: the sets of coefficients are read anew, the newest committed one is in force"});
+    rows.push_back(
+        {"3E 00", "7E 00", "keep the session; 3E 80: without response. Without any request for 5 s it ends"});
+    out_.table({"request", "response", "meaning"}, rows);
+  }
+
+  void write_identifiers() {
+    out_.heading("Data identifiers");
+    std::vector<Row> rows;
+    const auto add = [&](std::optional<std::uint16_t> did, std::string_view name, std::string_view access) {
+      if (did) {
+        rows.push_back({fmt::format("0x{:04X}", *did), std::string(name), std::string(access)});
+      }
+    };
+    add(p_.serial, "serial number, ASCII", "read");
+    add(p_.software, "software version, ASCII", "read");
+    add(p_.state.did, "state", "read");
+    add(p_.schedule.did, "schedule", "read, write");
+    add(p_.site.did, "site", "read");
+    add(p_.directory.did, "directory", "read");
+    add(p_.sample_format.did, "sample format", "read");
+    add(p_.set_in_force, "coefficients in force, as taken at power-on", "read");
+    add(p_.set_inactive, "coefficients in the slot not in force; erased: negative response 0x22, or all 0xFF",
+        "read, write");
+    add(p_.set_factory, "coefficients of the factory", "read");
+    out_.table({"DID", "content", "access"}, rows);
+  }
+
+  void write_records() {
+    for (const auto& [table, record] :
+         {std::pair("state", &p_.state), std::pair("schedule", &p_.schedule), std::pair("site", &p_.site),
+          std::pair("directory", &p_.directory), std::pair("sample_format", &p_.sample_format)}) {
+      const RecordRole& role = record_role(table);
+      if (!record->did && record->given.empty()) {
+        continue;
+      }
+      out_.heading(fmt::format("Record {}: {}", record->layout.record, role.meaning));
+      if (record->did) {
+        write_record(out_, record->layout, role);
+      }
+      for (const auto& [name, value] : record->given) {
+        out_.say(fmt::format("Not told, always the same: {} {:.12g}.", name, value));
+      }
+    }
+    out_.heading("Record coefficients: a set of the 24");
+    out_.say(
+        "Sensor output = truth + error, in selfcal's axes (below). df = bias + K+ max(f, 0) + K- max(-f, 0) per axis, "
+        "then df_y += "
+        "A_yx f_x, df_z += A_zx f_x + A_zy f_y; dw = drift + K_G w per axis, then dw_x += G_xy w_y + G_xz w_z and so "
+        "on. Of the "
+        "fields, values is all 24: bias xyz, drift xyz, K+ xyz, K- xyz, A yx zx zy, K_G xyz, G xy xz yx yz zx zy.");
+    write_record(out_, p_.set, set_role());
+  }
+
+  void write_routine(const Routine& routine, std::string_view table, std::string_view words, bool has_result) {
+    if (!routine.id) {
+      return;
+    }
+    out_.heading(fmt::format("Routine 0x{:04X}: {}", *routine.id, words));
+    out_.say("Option of the start:");
+    const std::string start = fmt::format("{}.start", table);
+    const auto roles = record_roles();
+    const auto role = std::ranges::find(roles, start, &RecordRole::table);
+    write_record(out_, routine.start, role == roles.end() ? roles[0] : *role);
+    if (has_result) {
+      out_.say("Result:");
+      write_record(out_, routine.result, record_role(fmt::format("{}.result", table)));
+    }
+  }
+
+  void write_routines() {
+    write_routine(p_.rotate, "rotate",
+                  "rotate by the schedule and store raw data; it can be stopped, the state is then aborted", true);
+    write_routine(p_.erase, "erase", "erase the inactive slot", false);
+    write_routine(p_.commit, "commit", "make the inactive set the one in force from the next power-on on", false);
+    write_routine(p_.navigation_check, "navigation_check", "navigate free-inertially at rest; it can be stopped", true);
+  }
+
+  void write_upload() {
+    const Raw& raw = p_.raw;
+    out_.heading("Raw data");
+    out_.say(
+        fmt::format("35 00 {:X}{:X} ADDRESS SIZE, big-endian, {} and {} bytes. ADDRESS is {}, SIZE a multiple of {} in "
+                    "bytes. The response is 75 40 "
+                    "and four bytes, big-endian: the longest response to TransferData. Then 36 BLOCK, BLOCK from 1 on, "
+                    "after FF comes 00: the "
+                    "response is 76 BLOCK DATA; the same BLOCK again: the same data. 37 ends it: 77. Pages are told "
+                    "while the gimbal still turns.",
+                    raw.size_bytes, raw.address_bytes, raw.address_bytes, raw.size_bytes,
+                    raw.by_page ? "the number of a page of the run"
+                                : fmt::format("{} times the number of a page of the run", raw.page.bytes),
+                    raw.page.bytes));
+    out_.heading("Record page: samples of the IMU");
+    out_.say(
+        "Every page but the last of a run is full. Sample i of the run ends i + 1 sample intervals after its start.");
+    write_record(out_, raw.page, record_role("page"));
+  }
+
+  void write_axes() {
+    out_.heading("Axes");
+    out_.say(
+        "selfcal's IMU axes x y z are right-handed; with both gimbal angles 0 they are front, up, right of the host. "
+        "The outer gimbal "
+        "turns about z, the inner one about y of what the outer one carries, right-handed.");
+    std::vector<Row> rows;
+    constexpr std::string_view imu[] = {"x", "y", "z"}, gimbal[] = {"outer", "inner"};
+    for (std::size_t k = 0; k < 3; ++k) {
+      rows.push_back({std::string(imu[k]), fmt::format("{}{}", p_.raw.sign[k] < 0 ? "-" : "", imu[p_.raw.axis[k]])});
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      rows.push_back({std::string(gimbal[k]),
+                      fmt::format("{}{}", p_.raw.gimbal_sign[k] < 0 ? "-" : "", gimbal[p_.raw.gimbal[k]])});
+    }
+    out_.table({"selfcal's", "is the INS's"}, rows);
+  }
+
+  const Profile& p_;
+  Writer out_;
+};
+
+}  // namespace
+
+std::string describe(const Profile& profile, Markup markup) { return Document(profile, markup).write(); }
+
+}  // namespace selfcal::profile
