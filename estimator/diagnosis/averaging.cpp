@@ -60,13 +60,14 @@ struct Mixture {
 
 class Averaging {
  public:
-  Averaging(const Evidence& evidence, const Eigen::MatrixXd& shift, const std::vector<Chosen>& chosen)
-      : evidence_(evidence), shift_(shift), chosen_(chosen) {}
+  Averaging(const Evidence& evidence, const Eigen::MatrixXd& shift, const std::vector<PlacedTerm>& terms)
+      : evidence_(evidence), shift_(shift), terms_(terms) {}
 
-  const Chosen& chosen(std::size_t i) const { return chosen_[i]; }
+  const PlacedTerm& term(std::size_t i) const { return terms_[i]; }
   double rows() const { return evidence_.rows; }
   bool names(const Effect& effect) const {
-    return std::any_of(chosen_.begin(), chosen_.end(), [&](const Chosen& x) { return x.candidate.effect == &effect; });
+    return std::any_of(terms_.begin(), terms_.end(),
+                       [&](const PlacedTerm& x) { return x.candidate.effect == &effect; });
   }
 
   // All coefficients of a candidate, or one of them; `derivative`: of its first coefficient by the constant, or -1.
@@ -112,11 +113,11 @@ class Averaging {
 
   // About the constant as fitted, and linear in what it is off by.
   std::vector<Part> linear_parts(std::size_t i) const {
-    return parts(chosen_[i].candidate, chosen_[i].derivative, chosen_[i].size, 0.0);
+    return parts(terms_[i].candidate, terms_[i].derivative, terms_[i].amplitude, 0.0);
   }
   // Each of the constants beside it: what is known of a constant to a factor of 2 only is not linear in it.
   std::vector<Part> own_parts(std::size_t i) const {
-    const std::vector<Candidate>& constants = chosen_[i].constants;
+    const std::vector<Candidate>& constants = terms_[i].constants;
     if (constants.empty()) {
       return linear_parts(i);
     }
@@ -134,12 +135,12 @@ class Averaging {
 
   // Effect by effect the most probable part, the others at theirs.
   void settle() {
-    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    for (std::size_t i = 0; i < terms_.size(); ++i) {
       current_.push_back(
-          part(chosen_[i].candidate, -1, scales[first_scale - 1], chosen_[i].derivative, chosen_[i].size));
+          part(terms_[i].candidate, -1, scales[first_scale - 1], terms_[i].derivative, terms_[i].amplitude));
     }
-    for (int sweep = 0; sweep < (chosen_.size() > 1 ? 2 : 1); ++sweep) {
-      for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    for (int sweep = 0; sweep < (terms_.size() > 1 ? 2 : 1); ++sweep) {
+      for (std::size_t i = 0; i < terms_.size(); ++i) {
         double best = -HUGE_VAL;
         for (const Part& p : linear_parts(i)) {
           const double found = explain(i, p, false).log_p;
@@ -152,7 +153,7 @@ class Averaging {
     }
   }
 
-  // `p` in the place of chosen effect i, the others as they are.
+  // `p` in the place of term i, the others as they are.
   Explanation explain(std::size_t i, const Part& p, bool full) const {
     std::vector<const Part*> all = {&p};
     for (std::size_t j = 0; j < current_.size(); ++j) {
@@ -204,11 +205,11 @@ class Averaging {
  private:
   const Evidence& evidence_;
   const Eigen::MatrixXd& shift_;
-  const std::vector<Chosen>& chosen_;
+  const std::vector<PlacedTerm>& terms_;
   std::vector<Part> current_;
 };
 
-// A candidate's part in the place of a chosen effect.
+// A candidate's part in the place of a term.
 struct Tried {
   const Candidate* candidate;
   Part part;
@@ -222,7 +223,7 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
       tried.push_back({&candidate, p, averaging.explain(i, p, false).log_p});
     }
   };
-  with(averaging.chosen(i).candidate, averaging.own_parts(i));
+  with(averaging.term(i).candidate, averaging.own_parts(i));
   for (const Candidate& rival : candidates) {
     if (!averaging.names(*rival.effect)) {
       with(rival, Averaging::parts(rival, -1, {}, -std::log(variants(*rival.effect, averaging.rows()))));
@@ -231,7 +232,7 @@ std::vector<Tried> try_all(const Averaging& averaging, std::size_t i, const std:
   return tried;
 }
 
-// What the explanations in the place of one chosen effect say together.
+// What the explanations in the place of one term say together.
 struct PlaceAverage {
   Mixture<ParameterVector, ParameterMatrix> shift;  // of the 24, by all effects
   std::vector<Share> constants;
@@ -248,7 +249,7 @@ double top_of(const std::vector<Tried>& tried) {
 
 PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std::vector<Tried>& tried) {
   const double top = top_of(tried);
-  const Chosen& own = averaging.chosen(i);
+  const PlacedTerm& own = averaging.term(i);
   PlaceAverage place;
   for (const Tried& t : tried) {
     if (t.log_p < top - negligible) {
@@ -277,11 +278,10 @@ PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std:
 
 // Size and sigma of the coefficients, all of them unknown: that only one is concerned may well be the better guess, but
 // an interval must not rest on it. Size and constant as told belong together; sigma says what else they may be.
-void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, Chosen& chosen) {
-  std::erase_if(tried,
-                [&](const Tried& t) { return t.candidate != &averaging.chosen(i).candidate || t.part.only >= 0; });
+void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, AveragedTerm& told) {
+  std::erase_if(tried, [&](const Tried& t) { return t.candidate != &averaging.term(i).candidate || t.part.only >= 0; });
   const double top = top_of(tried);
-  const Eigen::Index count = chosen.candidate.count;
+  const Eigen::Index count = averaging.term(i).candidate.count;
   Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;  // with any constant, with the one told
   std::vector<std::vector<Share>> each(static_cast<std::size_t>(count));
   for (const Tried& t : tried) {
@@ -293,44 +293,44 @@ void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tr
     const Eigen::VectorXd mean = e.mean.head(count);
     const Eigen::MatrixXd covariance = e.covariance.topLeftCorner(count, count);
     any.add(weight, mean, covariance);
-    if (std::isnan(t.part.constant) || t.part.constant == chosen.candidate.constant) {
+    if (std::isnan(t.part.constant) || t.part.constant == averaging.term(i).candidate.constant) {
       fitted.add(weight, mean, covariance);
     }
     for (Eigen::Index k = 0; k < count; ++k) {
       each[static_cast<std::size_t>(k)].push_back({weight, mean(k), std::sqrt(covariance(k, k))});
     }
   }
-  chosen.size = (fitted.weight > 0.0 ? fitted : any).mean();
-  chosen.covariance = any.covariance();
+  told.amplitude = (fitted.weight > 0.0 ? fitted : any).mean();
+  told.covariance = any.covariance();
   Eigen::VectorXd stretch(count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    stretch(k) = sigma_about(chosen.size(k), each[static_cast<std::size_t>(k)]) / std::sqrt(chosen.covariance(k, k));
+    stretch(k) = sigma_about(told.amplitude(k), each[static_cast<std::size_t>(k)]) / std::sqrt(told.covariance(k, k));
   }
-  chosen.covariance = stretch.asDiagonal() * chosen.covariance * stretch.asDiagonal();
+  told.covariance = stretch.asDiagonal() * told.covariance * stretch.asDiagonal();
 }
 
 }  // namespace
 
-Averages average_explanations(const Evidence& evidence, const Eigen::MatrixXd& shift, const std::vector<Chosen>& chosen,
-                              const std::vector<Candidate>& alternatives) {
-  Averages result{chosen};
-  if (chosen.empty()) {
+Averages average_explanations(const Evidence& evidence, const Eigen::MatrixXd& shift,
+                              const std::vector<PlacedTerm>& terms, const std::vector<Candidate>& alternatives) {
+  Averages result;
+  if (terms.empty()) {
     return result;
   }
-  Averaging averaging(evidence, shift, chosen);
+  Averaging averaging(evidence, shift, terms);
   averaging.settle();
   const Explanation best = averaging.current(0);
   result.shift = best.shift;
   result.shift_covariance = best.shift_covariance;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
+  for (std::size_t i = 0; i < terms.size(); ++i) {
     const std::vector<Tried> tried = try_all(averaging, i, alternatives);
     const PlaceAverage place = average_place(averaging, i, tried);
-    Chosen& c = result.chosen[i];
-    c.probability = place.probability;
-    tell_sizes(averaging, i, tried, c);
-    if (!place.constants.empty()) {
-      c.constant_sigma = sigma_about(c.candidate.constant, place.constants);
-    }
+    AveragedTerm told;
+    told.probability = place.probability;
+    tell_sizes(averaging, i, tried, told);
+    told.constant_sigma =
+        place.constants.empty() ? terms[i].constant_sigma : sigma_about(terms[i].candidate.constant, place.constants);
+    result.terms.push_back(std::move(told));
     result.shift += place.shift.mean() - best.shift;
     result.shift_covariance += place.shift.covariance() - best.shift_covariance;
     for (int k = 0; k < sensor_parameter_count; ++k) {  // averaging one effect never adds certainty about the others

@@ -13,7 +13,9 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double largest_shift_s = 2.0;  // between the same turns of both
-constexpr double rejection_rate = 0.01;  // of right names, by what they leave
+// What both hold drops out only as far as they stood alike: names that make nine tenths of the difference stand beside what is
+// left of it.
+constexpr double tolerable_share = 0.1;
 
 std::string schedules_differ(const ImuData& a, const ImuData& b) {
   char text[160];
@@ -60,11 +62,11 @@ std::string Side::take_out(const Correction& correction, const DiagnosisOptions&
 }
 
 // Equations that can be taken out of increments, and of a recording with or without a temperature channel.
-Correction carried(const std::vector<Chosen>& chosen, bool temperature) {
+Correction carried(const std::vector<NamedTerm>& named, bool temperature) {
   Correction correction;
-  for (const Chosen& c : chosen) {
-    if (temperature || c.candidate.effect->temperature != TemperatureUse::measured) {
-      correction.add(*c.candidate.effect, c.candidate.constant, c.size);
+  for (const NamedTerm& c : named) {
+    if (temperature || c.effect->temperature != TemperatureUse::measured) {
+      correction.add(*c.effect, c.constant, c.amplitude);
     }
   }
   return correction;
@@ -87,8 +89,8 @@ class Comparer {
   NoiseModel common_noise() const;
   const Eigen::VectorXd& simulated_residual(const NoiseModel& noise);
   bool moored() const { return recording_.calibration.moored || simulation_.calibration.moored; }
-  void judge(const Naming& naming);
-  void compare_parameters(const Naming& naming);
+  Rules rules() const;
+  void compare_parameters(const SearchResult& found);
   double attitude_difference() const;
   void say(const std::string& words) const {
     if (progress_) {
@@ -107,16 +109,16 @@ class Comparer {
 
 std::string Comparer::take_out_common() {
   const RecordingContext context(simulation_.data());
-  Naming naming(context, forward_pass(simulation_.data(), simulation_.calibration), log_names_);
-  naming.run({}, options_.stop);
-  const Correction common = carried(naming.chosen(), !recording_.data().temperature.empty());
+  const SearchResult found =
+      search(context, forward_pass(simulation_.data(), simulation_.calibration), {log_names_, {}, options_.stop});
+  const Correction common = carried(found.named, !recording_.data().temperature.empty());
   if (common.effects.empty()) {
     return {};
   }
-  for (const Chosen& c : naming.chosen()) {
+  for (const NamedTerm& c : found.named) {
     if (std::any_of(common.effects.begin(), common.effects.end(),
-                    [&](const Candidate& x) { return x.effect == c.candidate.effect; })) {
-      result_.in_both.push_back(describe(c, naming.rows()));
+                    [&](const Candidate& x) { return x.effect == c.effect; })) {
+      result_.in_both.push_back(describe(c, found.rows));
     }
   }
   std::string failure = simulation_.take_out(common, options_);
@@ -152,56 +154,20 @@ const Eigen::VectorXd& Comparer::simulated_residual(const NoiseModel& asked) {
   return simulated_residual_;
 }
 
-void Comparer::judge(const Naming& naming) {
-  Diagnosis& d = result_.diagnosis;
-  const double alpha = options_.false_alarm_rate;
-  const Map after = naming.map_after();
-  d.log_p_limit = naming.log_p_limit();
-  d.located = naming.map_before().places;
-  d.remaining = after.places;
-  d.before = adequacy(budget_of_two, naming.square_before(), naming.rows(), naming.log_p_white_before(),
-                      naming.map_before(), alpha, moored());
-  d.after =
-      adequacy(budget_of_two, naming.square_after(), naming.rows(), naming.log_p_white_after(), after, alpha, moored());
-  for (const Chosen& c : naming.chosen()) {
-    d.findings.push_back(describe(c, naming.rows()));
-    d.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
-  }
-  bool jumps = false;
-  for (const WalkTest& w : naming.walks()) {
-    const bool real = walks_inside_dwells(recording_.data(), recording_.calibration.noise, w);
-    jumps = jumps || !real;
-    (real ? d.findings : d.rejected).push_back(describe(w, naming.rows()));
-  }
-  std::stable_sort(d.findings.begin(), d.findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
-  if (!moored()) {
-    d.after.log_p_structure = naming.log_p_structure();
-    d.after.accepted =
-        d.after.accepted &&
-        d.after.log_p_structure > std::log(d.findings.empty() ? budget_of_two.structure * alpha : rejection_rate);
-  }
-  const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
-  d.after.accepted = d.after.accepted && !jumps && itself && !naming.entangled();
-  d.unexplained = !d.after.accepted;
-  constexpr double tolerable_share = 0.1;  // names must explain all but this much of the misfit
-  if (d.unexplained && d.after.misfit > tolerable_share * d.before.misfit) {
-    d.rejected.insert(d.rejected.end(), d.findings.begin(), d.findings.end());
-    d.findings.clear();
-    d.model.clear();
-  }
+Rules Comparer::rules() const {
+  return {.budget = budget_of_two,
+          .alpha = options_.false_alarm_rate,
+          .motion_fitted = moored(),
+          .tolerable_share = tolerable_share,
+          .goes_on = [this](const RandomWalk& walk) {
+            return walks_inside_dwells(recording_.data(), recording_.calibration.noise, walk);
+          }};
 }
 
 // The difference of the 24, with what the findings shift them by.
-void Comparer::compare_parameters(const Naming& naming) {
-  Diagnosis& d = result_.diagnosis;
-  d.value = naming.value();
-  d.value_as_named = naming.value_as_named();
-  d.covariance = naming.covariance();
-  d.sigma = d.covariance.diagonal().cwiseSqrt();
-  d.calibration = recording_.calibration;
-  result_.difference = d.value - simulation_.calibration.value;
-  result_.sigma = (d.covariance + simulation_.calibration.covariance).diagonal().cwiseSqrt();
+void Comparer::compare_parameters(const SearchResult& found) {
+  result_.difference = found.value - simulation_.calibration.value;
+  result_.sigma = (found.covariance + simulation_.calibration.covariance).diagonal().cwiseSqrt();
 }
 
 double Comparer::attitude_difference() const {
@@ -237,21 +203,19 @@ ComparisonOutcome Comparer::run() {
   });
   PassInput input = forward_pass(recording_.data(), recording_.calibration);
   input.noise = common_noise();
-  Naming naming(context, input, log_names_);
-  naming.run(progress_, options_.stop);
+  const SearchResult found = search(context, input, {log_names_, progress_, options_.stop});
   if (options_.stop.stop_requested()) {
     return {std::nullopt, "stopped"};
   }
-  judge(naming);
-  compare_parameters(naming);
   Diagnosis& d = result_.diagnosis;
+  d.calibration = recording_.calibration;
+  write_down(found, judge(found, rules()), d);
+  compare_parameters(found);
   const double z = result_.difference.cwiseAbs().cwiseQuotient(result_.sigma).maxCoeff();
   const bool same_parameters = log_corrected(log_chi_squared_tail(z * z, 1.0), sensor_parameter_count) >
                                std::log(budget_of_two.parameters * options_.false_alarm_rate);
   d.mismatch = !d.findings.empty() || d.unexplained || !same_parameters;
-  d.verdict = !d.findings.empty() ? DiagnosisVerdict::named
-              : d.unexplained     ? DiagnosisVerdict::none_of_the_above
-                                  : DiagnosisVerdict::adequate;
+  d.verdict = verdict_of(!d.findings.empty(), d.unexplained, false);
   result_.attitude_difference = attitude_difference();
   return {std::move(result_), {}};
 }

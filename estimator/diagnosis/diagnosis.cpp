@@ -10,109 +10,21 @@
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/diagnosis/velocity_noise.hpp"
 #include "estimator/diagnosis/walk_check.hpp"
-#include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr double rejection_rate = 0.01;  // of right names, by the biases that they leave
-constexpr double remainder_rate = 0.01;  // and by map, whiteness and size
-constexpr double suspicion = 0.05;       // corrected p at which an effect is worth a further experiment
-constexpr double seen_z = 3.0;           // an effect of typical size is detectable here beyond it
+constexpr double suspicion = 0.05;  // corrected p at which an effect is worth a further experiment
+constexpr double seen_z = 3.0;      // an effect of typical size is detectable here beyond it
 
-const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
-
-}  // namespace
-
-Finding describe(const Suspect& suspect) {
-  Finding f;
-  f.source = suspect.effect;
-  f.effect = suspect.effect->id;
-  f.equation = suspect.effect->equation;
-  f.experiment = suspect.effect->experiment;
-  f.log_p = suspect.log_p;
-  f.significance = sigma_from_log_p(suspect.log_p);
-  return f;
-}
-
-Finding describe(const Chosen& chosen, double rows) {
-  const Effect& effect = *chosen.candidate.effect;
-  Finding f;
-  f.source = &effect;
-  f.effect = effect.id;
-  f.equation = effect.equation;
-  f.excited = effect.excited;
-  f.experiment = effect.experiment;
-  for (Eigen::Index k = 0; k < chosen.size.size(); ++k) {
-    const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
-    const double value = chosen.size(k) * p.typical;
-    f.parameters.push_back(
-        {p.name, p.unit, value, std::sqrt(chosen.covariance(k, k)) * p.typical, effect.physics_prefix + p.name, value});
-  }
-  if (!std::isnan(chosen.candidate.constant)) {
-    f.parameters.push_back({std::string(effect.constant.name), std::string(effect.constant.unit),
-                            chosen.candidate.constant, chosen.constant_sigma, std::string(effect.constant.physics_key),
-                            chosen.candidate.constant * effect.constant.physics_per_unit});
-  }
-  f.equivalent = ids_of(chosen.equivalent);
-  f.rivals = chosen.equivalent;
-  for (const auto& [rival, p] : chosen.probability) {
-    f.probability[rival->id] = p;
-  }
-  f.log_p = chosen.log_p;
-  f.significance = sigma_from_log_p(chosen.log_p);
-  f.delta_bic = chosen.gain - chosen.rank * std::log(rows);
-  f.held_out_gain = chosen.held_out;
-  return f;
-}
-
-Finding describe(const WalkTest& walk, double rows) {
-  Finding f;
-  f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
-  f.equation = "bias walks: variance grows with time";
-  f.excited = "whole recording";
-  f.experiment = "a longer recording";
-  const double unit = map_unit(walk.axis) / (walk.axis < 3 ? units::degree_per_hour : units::micro_g);
-  f.parameters.push_back({axis_letters[static_cast<std::size_t>(walk.axis)],
-                          walk.axis < 3 ? "deg/h/sqrt(h)" : "ug/sqrt(h)", walk.rate * unit, walk.sigma * unit});
-  f.log_p = log_normal_tail(std::sqrt(walk.gain));
-  f.significance = sigma_from_log_p(f.log_p);
-  f.delta_bic = walk.gain - std::log(rows);
-  f.stochastic = true;
-  return f;
-}
-
-Adequacy adequacy(const FalseAlarmBudget& budget, double square, double rows, double log_p_white, const Map& map,
-                  double alpha, bool motion_fitted, double alpha_elsewhere) {
-  Adequacy a;
-  a.nis = square / rows;
-  a.log_p_white = log_p_white;
-  a.largest_sigma = map.largest_sigma;
-  a.misfit = std::max(0.0, square - rows);
-  const auto good = [&](double sigma, double rate) {
-    return log_corrected(log_normal_tail(sigma), std::max(1, map.tests)) > std::log(budget.map * rate);
-  };
-  const bool map_good =
-      good(map.largest_named_sigma, alpha) && good(map.largest_sigma, std::min(alpha, alpha_elsewhere));
-  // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
-  const bool white = motion_fitted || log_p_white > std::log(budget.whiteness * alpha);
-  const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
-  const bool size_good =
-      motion_fitted || log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) > std::log(budget.size * alpha);
-  a.accepted = map_good && white && size_good;
-  return a;
-}
-
-namespace {
-
-DataFault fault_of(const Chosen& chosen, const ImuData& data) {
-  const Effect& effect = *chosen.candidate.effect;
-  Eigen::VectorXd unit(chosen.size.size());
+DataFault fault_of(const NamedTerm& term, const ImuData& data) {
+  const Effect& effect = *term.effect;
+  Eigen::VectorXd unit(term.amplitude.size());
   for (Eigen::Index k = 0; k < unit.size(); ++k) {
     unit(k) = effect.parameters[static_cast<std::size_t>(k)].typical;
   }
-  const Eigen::VectorXd sigma = chosen.covariance.diagonal().cwiseSqrt();
-  return {effect.id, effect.data_fault(chosen.size.cwiseProduct(unit), sigma.cwiseProduct(unit), data.site), 0,
+  const Eigen::VectorXd sigma = term.covariance.diagonal().cwiseSqrt();
+  return {effect.id, effect.data_fault(term.amplitude.cwiseProduct(unit), sigma.cwiseProduct(unit), data.site), 0,
           data.size()};
 }
 
@@ -127,19 +39,17 @@ const char* words_of(FormKind kind) {
   return "";
 }
 
-std::optional<Remainder> remainder_of(const Naming& naming) {
-  const OpenForms& forms = naming.forms();
-  if (forms.empty()) {
+std::optional<Remainder> remainder_of(const SearchResult& found) {
+  if (found.open_forms.empty()) {
     return std::nullopt;
   }
   Remainder r;
-  r.share = naming.share_of_misfit(forms.square);
-  r.sigma = std::sqrt(std::max(0.0, forms.square));
-  for (const FormFamily& f : forms.families) {
-    r.forms.push_back(
-        {naming.chosen()[f.chosen].candidate.effect->id, words_of(f.kind), naming.share_of_misfit(f.square)});
+  r.share = found.square_of_forms / found.misfit;
+  r.sigma = std::sqrt(std::max(0.0, found.square_of_forms));
+  for (const OpenForm& f : found.open_forms) {
+    r.forms.push_back({f.effect->id, words_of(f.kind), f.square / found.misfit});
   }
-  r.places = naming.map_without_forms().places;
+  r.places = found.map_without_forms.places;
   return r;
 }
 
@@ -158,7 +68,8 @@ class Diagnoser {
   void name();
   void leave_unjudged();
   void judge_noise_alone();
-  void decide(const Naming& naming);
+  void decide(const RecordingContext& context, const SearchResult& found);
+  Rules rules() const;
   void say(const std::string& words) const {
     if (say_) {
       say_(words);
@@ -193,90 +104,35 @@ void Diagnoser::name() {
   const RecordingContext context(recording.data());
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
   say("signatures");
-  Naming naming(context, input, log_names_);
-  naming.run(say_, options_.stop);
-  decide(naming);
+  decide(context, search(context, input, {log_names_, say_, options_.stop}));
 }
 
-void Diagnoser::decide(const Naming& naming) {
-  const double alpha = options_.false_alarm_rate;
-  const Map after = naming.map_after();
-  d_.log_p_limit = naming.log_p_limit();
-  d_.located = naming.map_before().places;
-  d_.remaining = after.places;
-  // Beats of a quantum drift in frequency and leave a comb that no line takes out: named as quantum and lines, and no
-  // question of whiteness any more.
-  d_.before = adequacy(budget_of_one, naming.square_before(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_before(),
-                       naming.map_before(), alpha, d_.calibration.moored);
-  const bool nothing_found = naming.chosen().empty() && naming.walks().empty();
-  d_.after = adequacy(budget_of_one, naming.square_after(), naming.rows(), beats_ ? 0.0 : naming.log_p_white_after(),
-                      after, nothing_found ? alpha : std::max(alpha, remainder_rate), d_.calibration.moored, alpha);
-  if (!nothing_found || !d_.before.accepted) {
-    const Naming::ByQuantity by = naming.locate_by_quantities();
+void Diagnoser::decide(const RecordingContext& context, const SearchResult& found) {
+  const Judgement judgement = judge(found, rules());
+  if (!found.empty() || !judgement.before.accepted) {
+    const ByQuantity by = locate_by_quantities(context, found.stage);
     d_.located_by = by.before;
     d_.remaining_by = by.after;
   }
-  std::vector<Finding> named;
-  for (const Chosen& c : naming.chosen()) {
-    named.push_back(describe(c, naming.rows()));
-    named.back().share = naming.share_of_misfit(c.gain);
-    d_.model.push_back({c.candidate.effect, c.candidate.constant, c.size, c.covariance});
-  }
-  bool jumps = false;
-  for (const WalkTest& w : naming.walks()) {
-    const bool real = walks_inside_dwells(data_, d_.calibration.noise, w);
-    jumps = jumps || !real;
-    (real ? named : d_.rejected).push_back(describe(w, naming.rows()));
-  }
-  std::stable_sort(named.begin(), named.end(), [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
-  // What was named must explain: where it makes most of what is seen it is held to more than a recording in which nothing
-  // was found. What it has no part in speaks neither for it nor against it.
-  if (!d_.calibration.moored) {
-    const Naming::Structure left = naming.structure();
-    d_.after.log_p_structure = left.log_p();
-    d_.after.accepted = d_.after.accepted && left.log_p_named > std::log(rejection_rate) &&
-                        left.log_p_elsewhere > std::log(budget_of_one.structure * alpha);
-  }
-  // Beside an effect of hundreds of sigma the linearisation, and an equation that is right to 3 % of the amplitude, leave a
-  // thousandth of its square, in one place or in all: not worth a verdict.
-  constexpr double worth_a_verdict = 1e-3;
-  const double least = std::max(16.0, worth_a_verdict * d_.before.misfit);
-  if (!named.empty() && d_.after.misfit < worth_a_verdict * d_.before.misfit &&
-      d_.after.largest_sigma * d_.after.largest_sigma < least) {
-    d_.after.accepted = true;
-  }
-  const bool itself = naming.log_p_likeness() > std::log(rejection_rate);
-  d_.after.accepted = d_.after.accepted && !jumps && itself && !naming.entangled();
+  write_down(found, judgement, d_);
   // A fault of the data ends the diagnosis only where it explains what is seen: a name that the remainder rejects is none.
-  for (const Chosen& c : naming.chosen()) {
-    if (c.candidate.effect->data_fault != nullptr && d_.after.accepted) {
+  for (const NamedTerm& term : found.named) {
+    if (term.effect->data_fault != nullptr && judgement.after.accepted) {
       d_.model.clear();
-      d_.rejected.clear();
-      d_.faults.push_back(fault_of(c, data_));
+      d_.findings.clear();
+      d_.faults.push_back(fault_of(term, data_));
       leave_unjudged();
       return;
     }
   }
-  d_.unexplained = !d_.after.accepted;
-  d_.remainder = d_.after.accepted ? remainder_of(naming) : std::nullopt;
-  if (d_.unexplained) {
-    d_.model.clear();  // rejected names are no equations of a model: nothing is carried over or taken out
-  }
-  // A name that leaves something behind is the best fitting, not the truth.
-  std::vector<Finding>& destination = d_.after.accepted ? d_.findings : d_.rejected;
-  destination.insert(destination.end(), named.begin(), named.end());
-  std::vector<Finding> noise =
-      noise_findings(d_.calibration, naming.noise(), d_.noise, options_.assumed, std::log(budget_of_one.noise * alpha));
+  d_.remainder = judgement.after.accepted ? remainder_of(found) : std::nullopt;
+  const std::vector<Finding> noise = noise_findings(d_.calibration, found.noise, d_.noise, options_.assumed,
+                                                    std::log(budget_of_one.noise * options_.false_alarm_rate));
   d_.findings.insert(d_.findings.end(), noise.begin(), noise.end());
-  d_.value = naming.value();
-  d_.value_as_named = naming.value_as_named();
-  d_.covariance = naming.covariance();
-  d_.sigma = d_.covariance.diagonal().cwiseSqrt();
-
-  for (const Suspect& s : naming.prospects()) {
+  for (const Suspect& s : found.prospects) {
     (s.expected_z < seen_z ? d_.undetectable : d_.detectable).push_back({s.effect, s.expected_z});
   }
-  for (const Suspect& s : naming.suspects()) {
+  for (const Suspect& s : found.suspects) {
     if (s.log_p < std::log(suspicion)) {
       d_.suspected.push_back(describe(s));
     }
@@ -286,14 +142,17 @@ void Diagnoser::decide(const Naming& naming) {
       d_.calibration.moored && std::all_of(d_.findings.begin(), d_.findings.end(), [](const Finding& f) {
         return f.source != nullptr && f.source->motion_of_moored_base;
       });
-  d_.mismatch = (!d_.findings.empty() && !only_motion) || d_.unexplained;
-  if (!d_.findings.empty() && !only_motion) {
-    d_.verdict = DiagnosisVerdict::named;
-  } else if (d_.unexplained) {
-    d_.verdict = DiagnosisVerdict::none_of_the_above;
-  } else if (!d_.suspected.empty()) {
-    d_.verdict = DiagnosisVerdict::not_enough_information;
-  }
+  const bool named = !d_.findings.empty() && !only_motion;
+  d_.mismatch = named || d_.unexplained;
+  d_.verdict = verdict_of(named, d_.unexplained, !d_.suspected.empty());
+}
+
+Rules Diagnoser::rules() const {
+  return {.budget = budget_of_one,
+          .alpha = options_.false_alarm_rate,
+          .motion_fitted = d_.calibration.moored,
+          .coloured = beats_,
+          .goes_on = [this](const RandomWalk& walk) { return walks_inside_dwells(data_, d_.calibration.noise, walk); }};
 }
 
 // What faulty data do to the filter looks like anything: nothing else is concluded from them.

@@ -26,6 +26,17 @@ void Evidence::restore(const std::vector<int>& at, const Eigen::VectorXd& size) 
   score += information(Eigen::all, at) * size;
 }
 
+void Evidence::append(const Eigen::MatrixXd& with_others, const Eigen::MatrixXd& own,
+                      const Eigen::VectorXd& own_score) {
+  const Eigen::Index at = score.size(), count = own_score.size();
+  information.conservativeResize(at + count, at + count);
+  information.topRightCorner(at, count) = with_others;
+  information.bottomLeftCorner(count, at) = with_others.transpose();
+  information.bottomRightCorner(count, count) = own;
+  score.conservativeResize(at + count);
+  score.tail(count) = own_score;
+}
+
 // Woodbury: (I + Z C Z^T)^-1 = I - Z (C^-1 + Z^T Z)^-1 Z^T = I - Z C (I + J C)^-1 Z^T.
 void Evidence::marginalise(const std::vector<int>& at, const Eigen::MatrixXd& covariance) {
   const Eigen::MatrixXd J = information(at, at);
@@ -42,16 +53,20 @@ Fit Evidence::fit(const std::vector<int>& columns) const {
   return fit_columns(information(columns, columns), score(columns));
 }
 
-GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std::vector<int>& others) {
-  Eigen::MatrixXd G = e.information(group, group);
-  Eigen::VectorXd b = e.score(group);
+Normal Evidence::given(const std::vector<int>& columns, const std::vector<int>& others) const {
+  Normal left{information(columns, columns), score(columns)};
   if (!others.empty()) {
-    const Eigen::MatrixXd X = e.information(others, group);
-    const Eigen::VectorXd s = e.score(others);
-    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(others, others));
-    G -= X.transpose() * solver.solve(X);
-    b -= X.transpose() * solver.solve(s);
+    const Eigen::MatrixXd X = information(others, columns);
+    const Eigen::VectorXd s = score(others);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(information(others, others));
+    left.information -= X.transpose() * solver.solve(X);
+    left.score -= X.transpose() * solver.solve(s);
   }
+  return left;
+}
+
+GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std::vector<int>& others) {
+  const auto [G, b] = e.given(group, others);
   GroupTest test;
   const Fit fit = fit_columns(G, b);
   test.gain = fit.gain;
@@ -77,9 +92,9 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   return test;
 }
 
-WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
-                   const std::vector<int>& others) {
-  WalkTest test;
+RandomWalk test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
+                     const std::vector<int>& others) {
+  RandomWalk test;
   test.axis = axis;
   std::vector<double> time_h;
   std::vector<int> columns;
@@ -91,14 +106,7 @@ WalkTest test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int
       time_h.push_back(0.5 * (map[k].start_s + map[k].end_s) / 3600.0);
     }
   }
-  Eigen::MatrixXd J = e.information(columns, columns);
-  Eigen::VectorXd b = e.score(columns);
-  if (!others.empty()) {
-    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(others, others));
-    const Eigen::MatrixXd X = e.information(others, columns);
-    J -= X.transpose() * solver.solve(X);
-    b -= X.transpose() * solver.solve(Eigen::VectorXd(e.score(others)));
-  }
+  const auto [J, b] = e.given(columns, others);
   const auto n = static_cast<Eigen::Index>(time_h.size());
   Eigen::MatrixXd K(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {

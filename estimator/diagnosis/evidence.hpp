@@ -11,6 +11,12 @@
 
 namespace selfcal::diagnosis {
 
+// Of some columns only.
+struct Normal {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd score;
+};
+
 // Normal equations of residual = columns * size + unit noise.
 struct Evidence {
   Eigen::MatrixXd information;
@@ -22,10 +28,14 @@ struct Evidence {
   explicit Evidence(const SignatureRows& rows);
   // Adds back what a correction had already taken out: columns `at`, sizes in typical sizes.
   void restore(const std::vector<int>& at, const Eigen::VectorXd& size);
+  // Further columns N: Z^T N, N^T N and N^T times the residuals.
+  void append(const Eigen::MatrixXd& with_others, const Eigen::MatrixXd& own, const Eigen::VectorXd& own_score);
   // Columns `at` become random, ~ N(0, covariance), and are integrated out.
   void marginalise(const std::vector<int>& at, const Eigen::MatrixXd& covariance);
 
   Fit fit(const std::vector<int>& columns) const;
+  // `columns` with those of `others` projected out.
+  Normal given(const std::vector<int>& columns, const std::vector<int>& others) const;
 };
 
 // A coefficient with less information than this per typical size squared is not seen.
@@ -42,7 +52,7 @@ struct GroupTest {
 GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, const std::vector<int>& others);
 
 // Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
-struct WalkTest {
+struct RandomWalk {
   int axis = 0;                // 0..2 gyro, 3..5 accelerometer
   double gain = 0.0;           // twice the log-likelihood gained
   double rate = 0.0;           // map units per sqrt(h)
@@ -50,8 +60,8 @@ struct WalkTest {
   std::vector<int> places;     // of the map: the axis' dwells and rotations
   Eigen::MatrixXd covariance;  // of their columns at that rate
 };
-WalkTest test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
-                   const std::vector<int>& others);
+RandomWalk test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
+                     const std::vector<int>& others);
 
 // Cross-validated gain in log-likelihood: every fold's rows predicted by a fit to the rest, with `full` against
 // `reduced` columns. `fold` gives each row's number.

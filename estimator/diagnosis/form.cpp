@@ -79,28 +79,13 @@ constexpr std::array<double, 4> scales = {0.1, 0.3, 1.0, 3.0};  // of `most`
 // chi-squared of one degree: some fifteen families, one in thirty recordings opens one for nothing, and loses a little power.
 constexpr double worth_opening = 9.0;
 
-struct Normal {
-  Eigen::MatrixXd J;  // information of the forms, the named effects projected out
-  Eigen::VectorXd b;
-};
-
-Normal project(const Evidence& e, const std::vector<int>& columns, const std::vector<int>& named) {
-  Normal n{e.information(columns, columns), e.score(columns)};
-  if (!named.empty()) {
-    const Eigen::LDLT<Eigen::MatrixXd> solver = solver_beside(e.information(named, named));
-    const Eigen::MatrixXd X = e.information(named, columns);
-    n.J -= X.transpose() * solver.solve(X);
-    n.b -= X.transpose() * solver.solve(Eigen::VectorXd(e.score(named)));
-  }
-  return n;
-}
-
 // -2 log likelihood falls by b'S (I + SJS)^-1 S b - log|I + SJS| when columns ~ N(0, S^2) join.
 double fall(const Normal& n, const Eigen::VectorXd& sigma) {
   const auto size = sigma.size();
-  const Eigen::MatrixXd A = Eigen::MatrixXd::Identity(size, size) + sigma.asDiagonal() * n.J * sigma.asDiagonal();
+  const Eigen::MatrixXd A =
+      Eigen::MatrixXd::Identity(size, size) + sigma.asDiagonal() * n.information * sigma.asDiagonal();
   const Eigen::LLT<Eigen::MatrixXd> solver(A);
-  const Eigen::VectorXd c = sigma.cwiseProduct(n.b);
+  const Eigen::VectorXd c = sigma.cwiseProduct(n.score);
   const double log_det = 2.0 * Eigen::MatrixXd(solver.matrixL()).diagonal().array().log().sum();
   return c.dot(solver.solve(c)) - log_det;
 }
@@ -155,7 +140,7 @@ OpenForms open_forms(const Evidence& evidence, std::vector<FormFamily> families,
   if (families.empty()) {
     return open;
   }
-  const Normal all = project(evidence, columns_of(families), named);
+  const Normal all = evidence.given(columns_of(families), named);
   while (open_best(all, families)) {
   }
   std::erase_if(families, [](const FormFamily& f) { return f.scale == 0.0; });
@@ -164,14 +149,14 @@ OpenForms open_forms(const Evidence& evidence, std::vector<FormFamily> families,
   }
   open.columns = columns_of(families);
   open.sigma = sigmas(families);
-  const Normal n = project(evidence, open.columns, named);
+  const Normal n = evidence.given(open.columns, named);
   open.log_likelihood = 0.5 * fall(n, open.sigma);
   const auto size = open.sigma.size();
   const Eigen::MatrixXd A =
-      Eigen::MatrixXd::Identity(size, size) + open.sigma.asDiagonal() * n.J * open.sigma.asDiagonal();
+      Eigen::MatrixXd::Identity(size, size) + open.sigma.asDiagonal() * n.information * open.sigma.asDiagonal();
   open.covariance = open.sigma.asDiagonal() * A.inverse() * open.sigma.asDiagonal();
-  open.mean = open.covariance * n.b;
-  open.square = 2.0 * open.mean.dot(n.b) - open.mean.dot(n.J * open.mean);
+  open.mean = open.covariance * n.score;
+  open.square = 2.0 * open.mean.dot(n.score) - open.mean.dot(n.information * open.mean);
   open.families = std::move(families);
   return open;
 }
@@ -181,7 +166,7 @@ ParameterMatrix closed_forms(const Evidence& given, const std::vector<FormFamily
                              const std::vector<int>& named, const Eigen::MatrixXd& shift) {
   ParameterMatrix sum = ParameterMatrix::Zero();
   for (const FormFamily& f : closed) {
-    const Normal n = project(given, f.columns, named);
+    const Normal n = given.given(f.columns, named);
     const Eigen::MatrixXd S = shift(Eigen::all, f.columns);
     const auto size = static_cast<Eigen::Index>(f.columns.size());
     double weights = 1.0;
@@ -193,9 +178,9 @@ ParameterMatrix closed_forms(const Evidence& given, const std::vector<FormFamily
         continue;  // more than the usual only where the data ask for it; what they ask for is open, or was refused
       }
       const double weight = std::exp(0.5 * gained) / 3.0;
-      const Eigen::MatrixXd A = Eigen::MatrixXd::Identity(size, size) + v * v * n.J;
+      const Eigen::MatrixXd A = Eigen::MatrixXd::Identity(size, size) + v * v * n.information;
       const Eigen::MatrixXd covariance = v * v * A.inverse();
-      const Eigen::VectorXd mean = covariance * n.b;
+      const Eigen::VectorXd mean = covariance * n.score;
       weights += weight;
       spread += weight * S * (covariance + mean * mean.transpose()) * S.transpose();
     }

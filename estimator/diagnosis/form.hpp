@@ -24,7 +24,7 @@ std::vector<FormCandidate> forms_of(const Candidate& named);
 // Columns of one kind of form of one named effect.
 struct FormFamily {
   FormKind kind = FormKind::in_turns;
-  std::size_t chosen = 0;  // index of the named effect
+  std::size_t term = 0;  // of the hypothesis
   double most = 0.0;
   std::vector<int> columns;
   double square = 0.0;  // of the misfit that it takes up

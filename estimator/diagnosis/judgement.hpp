@@ -1,14 +1,17 @@
-// What turns test results into words and verdicts: shared by the diagnosis of one recording and of two.
+// What turns the search's results into words and verdicts: one judge, of one recording and of the difference of two.
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "estimator/diagnosis/diagnosis.hpp"
-#include "estimator/diagnosis/naming.hpp"
+#include "estimator/diagnosis/search/search.hpp"
 
 namespace selfcal::diagnosis {
 
 Finding describe(const Suspect& suspect);
-Finding describe(const Chosen& chosen, double rows);
-Finding describe(const WalkTest& walk, double rows);
+Finding describe(const NamedTerm& term, double rows);
+Finding describe(const RandomWalk& walk, double rows);
 
 // Of the false-alarm rate of a whole answer, what each kind of test may use up; together all of it.
 struct FalseAlarmBudget {
@@ -31,9 +34,33 @@ constexpr FalseAlarmBudget budget_of_two{
     .names = 0.5, .map = 0.1, .structure = 0.1, .whiteness = 0.1, .size = 0.1, .parameters = 0.1};
 static_assert(budget_of_one.adds_up() && budget_of_two.adds_up());
 
+// What differs between the cases that are judged.
+struct Rules {
+  FalseAlarmBudget budget;
+  double alpha = 0.005;        // false-alarm rate of the whole answer
+  bool motion_fitted = false;  // of a moored base
+  bool coloured = false;       // by beats of a quantum, which are named as such and are no question of whiteness
+  // Share of the misfit up to which what remains lets the names stand, though something else is there that has no name.
+  double tolerable_share = 0.0;
+  // Whether a walk goes on inside the dwells. What jumps between them is nothing that the catalogue holds.
+  std::function<bool(const RandomWalk&)> goes_on;
+};
+
+struct Judgement {
+  Adequacy before, after;      // after.accepted: the names explain what is seen, and nothing remains
+  std::vector<Finding> named;  // best first
+  std::vector<Finding> jumps;  // walks that are none
+  bool names_stand = false;
+};
+
+Judgement judge(const SearchResult& found, const Rules& rules);
+
+// What the search and the judge say, in the document: findings or rejected names, places, the model, the 24.
+void write_down(const SearchResult& found, const Judgement& judgement, Diagnosis& d);
+
+DiagnosisVerdict verdict_of(bool named, bool unexplained, bool suspected);
+
 // `alpha`: false-alarm rate of the whole recording; `alpha_elsewhere`: of places that the names have no part in, if less.
-// `motion_fitted`: of a moored base.
-Adequacy adequacy(const FalseAlarmBudget& budget, double square, double rows, double log_p_white, const Map& map,
-                  double alpha, bool motion_fitted, double alpha_elsewhere = 1.0);
+Adequacy adequacy(const Rules& rules, const Shown& shown, double rows, double alpha, double alpha_elsewhere);
 
 }  // namespace selfcal::diagnosis

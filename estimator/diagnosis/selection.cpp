@@ -34,21 +34,10 @@ double Significance::corrected(double log_p, const Effect& effect) const {
 
 double Significance::corrected(double log_p) const { return log_corrected(log_p, independent_tests); }
 
-std::vector<int> columns_of(const std::vector<Candidate>& terms, std::size_t without) {
-  std::vector<int> columns;
-  for (std::size_t i = 0; i < terms.size(); ++i) {
-    if (i != without) {
-      const std::vector<int> own = columns_of(terms[i]);
-      columns.insert(columns.end(), own.begin(), own.end());
-    }
-  }
-  return columns;
-}
-
 std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
-                                      const std::vector<Candidate>& alternatives, const std::vector<WalkTest>& walks,
+                                      const std::vector<Candidate>& alternatives, const std::vector<RandomWalk>& walks,
                                       const Significance& significance,
-                                      const std::function<bool(const WalkTest&)>& goes_on,
+                                      const std::function<bool(const RandomWalk&)>& goes_on,
                                       const std::function<bool(const Candidate&, const GroupTest&)>& immaterial) {
   double best_equation = 0.0, best_walk = 0.0, detected = 0.0;  // name by the former, presence by the last
   const Candidate* equation = nullptr;
@@ -65,8 +54,8 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
     }
   }
   // A walk has one coefficient, at the edge of its range (half a chi-squared).
-  const WalkTest* walk = nullptr;
-  for (const WalkTest& test : walks) {
+  const RandomWalk* walk = nullptr;
+  for (const RandomWalk& test : walks) {
     const double log_p = log_chi_squared_tail(test.gain, 1.0);
     detected = std::min(detected, significance.corrected(log_p));
     if (log_p < std::min(best_walk, best_equation)) {

@@ -21,13 +21,10 @@ struct Significance {
   bool holds(double corrected_log_p) const { return corrected_log_p <= log_threshold; }
 };
 
-// Columns of the terms, but of that number `without`.
-std::vector<int> columns_of(const std::vector<Candidate>& terms, std::size_t without = static_cast<std::size_t>(-1));
-
 // One of both.
 struct Addition {
   std::optional<Candidate> term;
-  std::optional<WalkTest> walk;
+  std::optional<RandomWalk> walk;
 };
 
 // What explains most beside what is fitted: among `alternatives`, best by the p of its whole group, and `walks`, tested on the
@@ -35,9 +32,9 @@ struct Addition {
 // equation by far, and by further where it does not go on inside the dwells (`goes_on`, asked when it matters).
 // What is `immaterial` though significant is passed over.
 std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
-                                      const std::vector<Candidate>& alternatives, const std::vector<WalkTest>& walks,
+                                      const std::vector<Candidate>& alternatives, const std::vector<RandomWalk>& walks,
                                       const Significance& significance,
-                                      const std::function<bool(const WalkTest&)>& goes_on,
+                                      const std::function<bool(const RandomWalk&)>& goes_on,
                                       const std::function<bool(const Candidate&, const GroupTest&)>& immaterial = {});
 
 // The first term that is no longer significant given the others.

@@ -239,12 +239,6 @@ SignaturePass::SignaturePass(const RecordingContext& context, std::vector<Candid
   }
 }
 
-void SignaturePass::set_constant(int first, double constant) {
-  for (Candidate& candidate : candidates_) {
-    candidate.constant = candidate.first == first ? constant : candidate.constant;
-  }
-}
-
 void Correction::add(const Effect& effect, double constant, const Eigen::VectorXd& own) {
   if (effect.sensor != nullptr) {
     const Eigen::Index first = size.size();
@@ -257,6 +251,17 @@ void Correction::add(const Effect& effect, double constant, const Eigen::VectorX
 std::vector<int> columns_of(const Candidate& candidate) {
   std::vector<int> columns(static_cast<std::size_t>(candidate.count));
   std::iota(columns.begin(), columns.end(), candidate.first);
+  return columns;
+}
+
+std::vector<int> columns_of(const std::vector<Candidate>& candidates, std::size_t without) {
+  std::vector<int> columns;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (i != without) {
+      const std::vector<int> own = columns_of(candidates[i]);
+      columns.insert(columns.end(), own.begin(), own.end());
+    }
+  }
   return columns;
 }
 

@@ -26,6 +26,9 @@ struct Candidate {
 };
 
 std::vector<int> columns_of(const Candidate& candidate);
+// Of all of them, but of that number `without`.
+std::vector<int> columns_of(const std::vector<Candidate>& candidates,
+                            std::size_t without = static_cast<std::size_t>(-1));
 
 // Where a sensor's bias is off, for the map: the columns behind those of the candidates.
 struct LocatedColumn {
@@ -62,8 +65,6 @@ class SignaturePass {
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
   const std::vector<LocatedColumn>& map() const { return map_; }
-  // Another value of the constant of the candidate whose columns begin at `first`.
-  void set_constant(int first, double constant);
   int first_map_column() const { return effect_columns_; }
   int count() const { return effect_columns_ + static_cast<int>(map_.size()); }
 

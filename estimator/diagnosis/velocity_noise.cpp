@@ -43,12 +43,11 @@ void climb(NoiseDensities& best, double& top, const std::array<double, N>& steps
 
 }  // namespace
 
-PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& d) {
-  PassInput changed = input;
-  changed.noise.gyro_arw = d[0];
-  changed.noise.accel_vrw = d[1];
-  changed.noise.observation.motion.fill(position_walk(d[2]));
-  return changed;
+NoiseModel with_velocity_noise(NoiseModel noise, const NoiseDensities& d) {
+  noise.gyro_arw = d[0];
+  noise.accel_vrw = d[1];
+  noise.observation.motion.fill(position_walk(d[2]));
+  return noise;
 }
 
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
@@ -65,7 +64,9 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
   }
   const double before = run_pass(input).log_likelihood;
   const auto log_likelihood = [&](const NoiseDensities& d) {
-    return run_pass(with_velocity_noise(input, d)).log_likelihood;
+    PassInput trial = input;
+    trial.noise = with_velocity_noise(input.noise, d);
+    return run_pass(trial).log_likelihood;
   };
   NoiseDensities best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
   double top = log_likelihood(best);
@@ -73,25 +74,25 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
   if (top < before + least_log_gain) {
     return false;
   }
-  input = with_velocity_noise(input, best);
+  input.noise = with_velocity_noise(input.noise, best);
   return true;
 }
 
-bool refit_velocity_noise(PassInput& input, const std::function<double(const PassInput&)>& log_likelihood) {
-  const double density = walk_density(input.noise.observation.motion.front());
+std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
+                                               const std::function<double(const NoiseModel&)>& log_likelihood) {
+  const double density = walk_density(noise.observation.motion.front());
   if (density == 0.0) {
-    return false;
+    return std::nullopt;
   }
-  const NoiseDensities before = {input.noise.gyro_arw, input.noise.accel_vrw, density};
-  const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(input, d)); };
+  const NoiseDensities before = {noise.gyro_arw, noise.accel_vrw, density};
+  const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(noise, d)); };
   NoiseDensities best = before;
   double top = of_densities(best);
   climb(best, top, std::array{1.25, 1.06}, of_densities);
   if (best == before) {
-    return false;
+    return std::nullopt;
   }
-  input = with_velocity_noise(input, best);
-  return true;
+  return with_velocity_noise(noise, best);
 }
 
 }  // namespace selfcal::diagnosis

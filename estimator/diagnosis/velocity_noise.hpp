@@ -4,6 +4,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 
 #include "estimator/diagnosis/noise_check.hpp"
 #include "estimator/passes/pass.hpp"
@@ -12,7 +13,7 @@ namespace selfcal::diagnosis {
 
 // Of angle (rad/sqrt(s)), of velocity (m/s/sqrt(s)), and of position, which walks with the integral's noise (m/sqrt(s)).
 using NoiseDensities = std::array<double, 3>;
-PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& densities);
+NoiseModel with_velocity_noise(NoiseModel noise, const NoiseDensities& densities);
 
 // Where it is large enough to colour the innovations it becomes a walk of the position observed (exactly its effect on
 // a filter that observes nothing else), and all densities those of the greatest likelihood, to 3 %. True where `input`
@@ -20,8 +21,9 @@ PassInput with_velocity_noise(const PassInput& input, const NoiseDensities& dens
 bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise);
 
 // The densities that were fitted before anything was named hold what was left out, shared among them as it fits best: beside
-// the names they are fitted again, from where they are, to `log_likelihood`. False where `input` has no such walk or is at
-// the top already: it stays as it was.
-bool refit_velocity_noise(PassInput& input, const std::function<double(const PassInput&)>& log_likelihood);
+// the names they are fitted again, from where they are, to `log_likelihood`. None where there is no such walk, or it is at the top
+// already.
+std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
+                                               const std::function<double(const NoiseModel&)>& log_likelihood);
 
 }  // namespace selfcal::diagnosis

@@ -9,7 +9,7 @@
 namespace selfcal::diagnosis {
 
 // Differences of the means of both halves of each dwell: white noise 4 N^2/T, and (2/3) q^2 T/2 of a walk.
-bool walks_inside_dwells(const ImuData& data, const NoiseModel& noise, const WalkTest& walk) {
+bool walks_inside_dwells(const ImuData& data, const NoiseModel& noise, const RandomWalk& walk) {
   const auto axis = static_cast<std::size_t>(walk.axis % 3);
   const double asd = walk.axis < 3 ? noise.gyro_arw : noise.accel_vrw;
   const double rate = walk.rate * map_unit(walk.axis) / std::sqrt(units::hour);

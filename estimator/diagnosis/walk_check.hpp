@@ -9,6 +9,6 @@ namespace selfcal::diagnosis {
 
 // A walk goes on inside the dwells; what only jumps between them is none. True also where a walk of this rate would be
 // too small to be seen there.
-bool walks_inside_dwells(const ImuData& data, const NoiseModel& noise, const WalkTest& walk);
+bool walks_inside_dwells(const ImuData& data, const NoiseModel& noise, const RandomWalk& walk);
 
 }  // namespace selfcal::diagnosis

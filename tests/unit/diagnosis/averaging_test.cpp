@@ -36,9 +36,9 @@ TEST(Average, OfTwoModelsIsTheClosedForm) {
   e.rows = 3000.0;
   Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(sensor_parameter_count, 2);
   shift.row(0) << 2.0, -3.0;
-  Chosen chosen;
-  chosen.candidate = column_a;
-  const Averages found = average_explanations(e, shift, {chosen}, {column_b});
+  PlacedTerm term;
+  term.candidate = column_a;
+  const Averages found = average_explanations(e, shift, {term}, {column_b});
 
   double all = 0.0, own = 0.0, size = 0.0, moved = 0.0, square = 0.0;
   for (const double s : scales) {
@@ -49,10 +49,10 @@ TEST(Average, OfTwoModelsIsTheClosedForm) {
     moved += p.weight * 2.0 * p.mean + q.weight * -3.0 * q.mean;
     square += p.weight * 4.0 * (p.variance + p.mean * p.mean) + q.weight * 9.0 * (q.variance + q.mean * q.mean);
   }
-  ASSERT_EQ(found.chosen.size(), 1U);
-  EXPECT_NEAR(found.chosen[0].probability.at(&a), own / all, 1e-9);
-  EXPECT_NEAR(found.chosen[0].probability.at(&b), 1.0 - own / all, 1e-9);
-  EXPECT_NEAR(found.chosen[0].size(0), size / own, 1e-9);
+  ASSERT_EQ(found.terms.size(), 1U);
+  EXPECT_NEAR(found.terms[0].probability.at(&a), own / all, 1e-9);
+  EXPECT_NEAR(found.terms[0].probability.at(&b), 1.0 - own / all, 1e-9);
+  EXPECT_NEAR(found.terms[0].amplitude(0), size / own, 1e-9);
   EXPECT_NEAR(found.shift(0), moved / all, 1e-9);
   EXPECT_NEAR(found.shift_covariance(0, 0), square / all - (moved / all) * (moved / all), 1e-9);
   EXPECT_EQ(found.shift(1), 0.0);
@@ -64,13 +64,12 @@ TEST(Average, LeavesOutWhatExplainsNothing) {
   e.information = 100.0 * Eigen::Matrix2d::Identity();
   e.score = Eigen::Vector2d(200.0, 0.0);
   e.rows = 3000.0;
-  Chosen chosen;
-  chosen.candidate = column_a;
-  const Averages found =
-      average_explanations(e, Eigen::MatrixXd::Zero(sensor_parameter_count, 2), {chosen}, {column_b});
-  EXPECT_EQ(found.chosen[0].probability.size(), 1U);
-  EXPECT_NEAR(found.chosen[0].probability.at(&a), 1.0, 1e-12);
-  EXPECT_TRUE(average_explanations(e, Eigen::MatrixXd(), {}, {column_b}).chosen.empty());
+  PlacedTerm term;
+  term.candidate = column_a;
+  const Averages found = average_explanations(e, Eigen::MatrixXd::Zero(sensor_parameter_count, 2), {term}, {column_b});
+  EXPECT_EQ(found.terms[0].probability.size(), 1U);
+  EXPECT_NEAR(found.terms[0].probability.at(&a), 1.0, 1e-12);
+  EXPECT_TRUE(average_explanations(e, Eigen::MatrixXd(), {}, {column_b}).terms.empty());
 }
 
 // A rival at cosine k leaves 1 - k^2 of the effect's square; of two variants the closer counts.

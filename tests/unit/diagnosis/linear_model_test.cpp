@@ -40,8 +40,8 @@ class CreepingRecording : public testing::Test {
   }
 
   LinearModel about(const RecordingContext& context, const OperatingPoint& point,
-                    const std::vector<WalkTest>& walks = {}) const {
-    return LinearModel::about(context, point, {{&creep(), tau_s, 0, 0}}, walks, true);
+                    const std::vector<RandomWalk>& walks = {}, double constant = tau_s) const {
+    return LinearModel::about(context, point, {{}, walks, input_.noise}, {{&creep(), constant, constant}}, true);
   }
 
   IdealRecording ideal_;
@@ -66,10 +66,12 @@ TEST_F(CreepingRecording, HasTheSizeThatWasPutIn) {
 // explains the rest is the other half.
 TEST_F(CreepingRecording, TakenOutOfTheIncrementsStaysInTheEquations) {
   const RecordingContext context(creeping_.data());
-  Correction half;
-  half.add(creep(), tau_s, 0.5 * size_);
+  Term half;
+  half.effect = &creep();
+  half.tried = half.constant = tau_s;
+  half.amplitude = 0.5 * size_;
   const OperatingPoint whole{input_, CorrectedRecording(creeping_.data())};
-  const OperatingPoint settled = settle(context, whole, half);
+  const OperatingPoint settled = settle(context, whole, {{half}, {}, input_.noise});
   const LinearModel model = about(context, settled);
   EXPECT_NEAR(model.evidence().fit({0, 1, 2}).value(2), 1.5, 1.5 * linear_to);
   // Beside what the recording made here leaves by itself (its velocity increments are those of each sample's middle).
@@ -79,8 +81,8 @@ TEST_F(CreepingRecording, TakenOutOfTheIncrementsStaysInTheEquations) {
   EXPECT_NEAR((model.rows().residual - own).norm() / all.norm(), 0.5, linear_to);
   EXPECT_NEAR((model.residual() - own).norm() / all.norm(), 1.0, linear_to);
   // Another constant's column is another column: what was taken out keeps its own.
-  const LinearModel beside = LinearModel::about(context, settled, {{&creep(), 2.0 * tau_s, 0, 0}}, {}, true);
-  EXPECT_EQ(beside.candidates().size(), 1U);
+  const LinearModel beside = about(context, settled, {}, 2.0 * tau_s);
+  EXPECT_EQ(beside.alternatives().size(), 1U);
   EXPECT_NEAR(beside.residual().norm(), model.residual().norm(), linear_to * model.residual().norm());
 }
 
@@ -89,7 +91,7 @@ TEST_F(CreepingRecording, WalksAreMarginalised) {
   const RecordingContext context(creeping_.data());
   const OperatingPoint point{input_, CorrectedRecording(creeping_.data())};
   const LinearModel without = about(context, point);
-  const WalkTest walk = test_walk(without.evidence(), without.map(), without.first_map_column(), 5, {});
+  const RandomWalk walk = test_walk(without.evidence(), without.map(), without.first_map_column(), 5, {});
   ASSERT_GT(walk.gain, 0.0);
   Evidence by_hand = without.evidence();
   std::vector<int> columns = walk.places;

@@ -12,16 +12,16 @@ namespace {
 
 constexpr NoiseDensities start = {1e-6, 4e-5, 3e-5};
 
-NoiseDensities densities(const PassInput& input, const NoiseDensities& of_walk) {
+NoiseDensities densities(const NoiseModel& noise, const NoiseDensities& of_walk) {
   // The walk's density is seen through the variance that it drives: linear in its sigma.
-  const double scale = input.noise.observation.motion.front().oscillations.front().sigma /
-                       with_velocity_noise(input, of_walk).noise.observation.motion.front().oscillations.front().sigma;
-  return {input.noise.gyro_arw, input.noise.accel_vrw, scale * of_walk[2]};
+  const double scale = noise.observation.motion.front().oscillations.front().sigma /
+                       with_velocity_noise(noise, of_walk).observation.motion.front().oscillations.front().sigma;
+  return {noise.gyro_arw, noise.accel_vrw, scale * of_walk[2]};
 }
 
 // Log likelihood with its top at `top`; the densities' logarithms are known to 1/100 and independent.
-double likelihood(const PassInput& input, const NoiseDensities& top) {
-  const NoiseDensities d = densities(input, start);
+double likelihood(const NoiseModel& noise, const NoiseDensities& top) {
+  const NoiseDensities d = densities(noise, start);
   double sum = 0.0;
   for (std::size_t k = 0; k < d.size(); ++k) {
     const double off = std::log(d[k] / top[k]) / 0.01;
@@ -33,30 +33,30 @@ double likelihood(const PassInput& input, const NoiseDensities& top) {
 // The last steps are of 6 %: half of one remains at most where the densities do not hang together.
 TEST(RefitVelocityNoise, GoesToTheTop) {
   const NoiseDensities top = {start[0] / 1.67, start[1] * 1.16, start[2] * 1.06};
-  PassInput input = with_velocity_noise({}, start);
-  ASSERT_TRUE(refit_velocity_noise(input, [&](const PassInput& trial) { return likelihood(trial, top); }));
-  const NoiseDensities found = densities(input, start);
+  const auto refitted = refit_velocity_noise(with_velocity_noise({}, start),
+                                             [&](const NoiseModel& trial) { return likelihood(trial, top); });
+  ASSERT_TRUE(refitted);
+  const NoiseDensities found = densities(*refitted, start);
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_LT(std::abs(std::log(found[k] / top[k])), 0.501 * std::log(1.06)) << k;
   }
 }
 
 TEST(RefitVelocityNoise, StaysAtTheTop) {
-  PassInput input = with_velocity_noise({}, start);
-  EXPECT_FALSE(refit_velocity_noise(input, [](const PassInput& trial) { return likelihood(trial, start); }));
-  EXPECT_EQ(input.noise.gyro_arw, start[0]);
+  EXPECT_FALSE(refit_velocity_noise(with_velocity_noise({}, start),
+                                    [](const NoiseModel& trial) { return likelihood(trial, start); }));
 }
 
 // A base that sways has oscillations of its own in the filter, a still one none: neither is the walk of a quantum.
 TEST(RefitVelocityNoise, LeavesOtherNoiseAlone) {
-  const auto never = [](const PassInput& /*trial*/) -> double {
+  const auto never = [](const NoiseModel& /*trial*/) -> double {
     ADD_FAILURE() << "asked";
     return 0.0;
   };
-  PassInput still;
+  const NoiseModel still;
   EXPECT_FALSE(refit_velocity_noise(still, never));
-  PassInput moored;
-  moored.noise.observation.motion.fill({{{0.6, 50.0, 1e-3}}});
+  NoiseModel moored;
+  moored.observation.motion.fill({{{0.6, 50.0, 1e-3}}});
   EXPECT_FALSE(refit_velocity_noise(moored, never));
 }
 

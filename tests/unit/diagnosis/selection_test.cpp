@@ -15,7 +15,7 @@ const Candidate column_a{&a, NAN, 0, 1}, column_b{&b, NAN, 1, 1}, column_c{&c, N
 const std::vector<Candidate> all = {column_a, column_b, column_c};
 constexpr double length = 10.0;
 
-bool never(const WalkTest& /*walk*/) {
+bool never(const RandomWalk& /*walk*/) {
   ADD_FAILURE() << "asked where nothing hangs on it";
   return false;
 }
@@ -62,14 +62,14 @@ TEST(BestAddition, OfASpectrumIsCorrectedForItsFrequencies) {
 // (0.85) and against jumps (0.6).
 TEST(BestAddition, IsAnEquationBeforeAWalkThatJumpsButNotBeforeOneThatWalks) {
   const Evidence e = evidence_of(length * Eigen::Matrix3d::Identity(), std::sqrt(50.0) * Eigen::Vector3d::UnitX());
-  WalkTest walk;
+  RandomWalk walk;
   walk.axis = 3;
   walk.gain = 70.0;
   const double share = log_chi_squared_tail(50.0, 1.0) / log_chi_squared_tail(70.0, 1.0);
   ASSERT_GT(share, 0.6);
   ASSERT_LT(share, 0.85);
   for (const bool walks : {true, false}) {
-    const auto goes_on = [&](const WalkTest&) { return walks; };
+    const auto goes_on = [&](const RandomWalk&) { return walks; };
     const auto found = best_addition(e, {}, all, {walk}, with_threshold(-10.0), goes_on);
     ASSERT_TRUE(found);
     EXPECT_EQ(found->walk.has_value(), walks);
@@ -128,7 +128,7 @@ TEST(WalkAgainstRamp, EachIsTakenForWhatItIs) {
   const auto decide = [&](const Eigen::VectorXd& biases) {
     const Evidence e = dwells.of(biases);
     return best_addition(e, {}, {column_a}, {test_walk(e, dwells.map, 1, 3, {})}, with_threshold(-10.0),
-                         [](const WalkTest&) { return true; });
+                         [](const RandomWalk&) { return true; });
   };
   const auto ramp = decide(dwells.time_h);
   ASSERT_TRUE(ramp);
