@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <numbers>
 
-#include "estimator/diagnosis/judgement.hpp"
+#include "estimator/diagnosis/noise/walk_check.hpp"
+#include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
-#include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

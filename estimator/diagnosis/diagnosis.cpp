@@ -4,12 +4,12 @@
 #include <cmath>
 #include <span>
 
-#include "estimator/diagnosis/dwell_lines.hpp"
-#include "estimator/diagnosis/judgement.hpp"
-#include "estimator/diagnosis/noise_findings.hpp"
+#include "estimator/diagnosis/noise/dwell_lines.hpp"
+#include "estimator/diagnosis/noise/noise_findings.hpp"
+#include "estimator/diagnosis/noise/velocity_noise.hpp"
+#include "estimator/diagnosis/noise/walk_check.hpp"
+#include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
-#include "estimator/diagnosis/velocity_noise.hpp"
-#include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

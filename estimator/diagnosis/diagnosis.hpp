@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "estimator/diagnosis/data_faults.hpp"
-#include "estimator/diagnosis/effect.hpp"
-#include "estimator/diagnosis/locate.hpp"
-#include "estimator/diagnosis/noise_check.hpp"
-#include "estimator/diagnosis/recording_context.hpp"
+#include "estimator/diagnosis/data/faults.hpp"
+#include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/noise/noise_check.hpp"
+#include "estimator/diagnosis/regression/recording_context.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/passes/calibration.hpp"
 
 namespace selfcal::diagnosis {

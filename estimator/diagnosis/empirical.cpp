@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/diagnosis/evidence.hpp"
-#include "estimator/diagnosis/locate.hpp"
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/regression/evidence.hpp"
+#include "estimator/diagnosis/regression/signature_pass.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 

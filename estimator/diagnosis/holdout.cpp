@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "estimator/diagnosis/corrected_recording.hpp"
+#include "estimator/diagnosis/regression/corrected_recording.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/statistics/whiteness.hpp"
 

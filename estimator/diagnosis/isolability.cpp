@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "estimator/diagnosis/ideal_recording.hpp"
-#include "estimator/diagnosis/regression.hpp"
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/regression/regression.hpp"
+#include "estimator/diagnosis/regression/signature_pass.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/regression/evidence.hpp"
 #include "estimator/discovery/pieces.hpp"
 
 namespace selfcal::discovery {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/diagnosis/corrected_recording.hpp"
+#include "estimator/diagnosis/regression/corrected_recording.hpp"
 #include "estimator/discovery/column_pass.hpp"
 #include "estimator/discovery/law_motion.hpp"
 #include "estimator/laws/expression.hpp"

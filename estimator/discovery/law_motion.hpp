@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/diagnosis/recording_context.hpp"
+#include "estimator/diagnosis/regression/recording_context.hpp"
 #include "estimator/laws/expression.hpp"
 
 namespace selfcal::discovery {

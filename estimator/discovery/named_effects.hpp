@@ -8,8 +8,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "estimator/diagnosis/corrected_recording.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/diagnosis/regression/corrected_recording.hpp"
 #include "estimator/discovery/discovery.hpp"
 
 namespace selfcal::discovery {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "estimator/diagnosis/recording_context.hpp"
+#include "estimator/diagnosis/regression/recording_context.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
 #include "estimator/discovery/law_fit.hpp"

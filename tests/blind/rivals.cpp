@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/diagnosis/catalogue.hpp"
-#include "estimator/diagnosis/evidence.hpp"
-#include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/regression/evidence.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::blind {

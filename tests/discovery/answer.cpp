@@ -13,7 +13,7 @@
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
-#include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
 #include "protocol/recording/recording_file.hpp"

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "daemon/estimate/quantity_text.hpp"
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/regression/signature_pass.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/cli/finding_text.hpp"

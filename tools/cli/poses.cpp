@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "estimator/diagnosis/poses.hpp"
+#include "estimator/diagnosis/poses/poses.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/document/document_head.hpp"
 #include "protocol/recording/atomic_file.hpp"

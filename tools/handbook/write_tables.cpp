@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/passes/calibration.hpp"
 #include "protocol/flash/page.hpp"

@@ -7,7 +7,7 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/result_json.hpp"
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/regression/signature_pass.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/report/noise_document.hpp"
 #include "tools/report/page.hpp"

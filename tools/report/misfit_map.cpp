@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "estimator/diagnosis/signature_pass.hpp"
+#include "estimator/diagnosis/regression/signature_pass.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tools/report/page.hpp"

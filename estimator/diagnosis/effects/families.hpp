@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "estimator/diagnosis/effect.hpp"
+#include "estimator/diagnosis/effects/effect.hpp"
 
 namespace selfcal::diagnosis {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "estimator/diagnosis/averaging.hpp"
+#include "estimator/diagnosis/search/averaging.hpp"
 #include "estimator/diagnosis/search/stage.hpp"
 
 namespace selfcal::diagnosis {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "estimator/diagnosis/quantities.hpp"
+#include "estimator/diagnosis/search/quantities.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

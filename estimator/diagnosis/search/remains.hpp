@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "estimator/diagnosis/locate.hpp"
 #include "estimator/diagnosis/search/constants.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 
 namespace selfcal::diagnosis {
 

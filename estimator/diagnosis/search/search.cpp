@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/diagnosis/averaging.hpp"
-#include "estimator/diagnosis/catalogue.hpp"
-#include "estimator/diagnosis/multiplicity.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/regression/multiplicity.hpp"
+#include "estimator/diagnosis/search/averaging.hpp"
 #include "estimator/diagnosis/search/steps.hpp"
 #include "estimator/statistics/whiteness.hpp"
 

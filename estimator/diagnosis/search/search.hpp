@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/diagnosis/locate.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/search/remains.hpp"
 
 namespace selfcal::diagnosis {

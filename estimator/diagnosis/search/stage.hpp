@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "estimator/diagnosis/form.hpp"
-#include "estimator/diagnosis/linear_model.hpp"
+#include "estimator/diagnosis/regression/linear_model.hpp"
+#include "estimator/diagnosis/search/form.hpp"
 
 namespace selfcal::diagnosis {
 

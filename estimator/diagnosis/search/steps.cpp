@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "estimator/diagnosis/noise/velocity_noise.hpp"
+#include "estimator/diagnosis/noise/walk_check.hpp"
 #include "estimator/diagnosis/search/constants.hpp"
-#include "estimator/diagnosis/velocity_noise.hpp"
-#include "estimator/diagnosis/walk_check.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

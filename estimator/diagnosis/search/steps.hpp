@@ -3,8 +3,8 @@
 
 #include <optional>
 
+#include "estimator/diagnosis/search/selection.hpp"
 #include "estimator/diagnosis/search/stage.hpp"
-#include "estimator/diagnosis/selection.hpp"
 
 namespace selfcal::diagnosis {
 

@@ -1,5 +1,5 @@
 // Averages over explanations in closed form, and what else two columns settle on paper: isolability, held-out gain, the budget.
-#include "estimator/diagnosis/averaging.hpp"
+#include "estimator/diagnosis/search/averaging.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/isolability.hpp"
-#include "estimator/diagnosis/judgement.hpp"
+#include "estimator/diagnosis/search/judgement.hpp"
 #include "tests/unit/diagnosis/linear.hpp"
 
 namespace selfcal::diagnosis {

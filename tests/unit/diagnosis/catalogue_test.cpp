@@ -1,5 +1,5 @@
 // What the catalogue says of its effects, and which of two variants a recording is asked about.
-#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/diagnosis/isolability.hpp"
-#include "estimator/diagnosis/judgement.hpp"
+#include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {

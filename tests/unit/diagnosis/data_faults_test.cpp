@@ -1,5 +1,5 @@
 // Clipping against a rate that is steady to below the quantum: only the first is a fault.
-#include "estimator/diagnosis/data_faults.hpp"
+#include "estimator/diagnosis/data/faults.hpp"
 
 #include <gtest/gtest.h>
 

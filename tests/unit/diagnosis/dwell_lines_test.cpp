@@ -1,4 +1,4 @@
-#include "estimator/diagnosis/dwell_lines.hpp"
+#include "estimator/diagnosis/noise/dwell_lines.hpp"
 
 #include <gtest/gtest.h>
 

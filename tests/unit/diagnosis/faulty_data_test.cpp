@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "estimator/diagnosis/data_faults.hpp"
+#include "estimator/diagnosis/data/faults.hpp"
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/geometry/schedule.hpp"
 #include "estimator/geometry/units.hpp"

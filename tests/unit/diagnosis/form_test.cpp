@@ -2,13 +2,13 @@
 //
 // One form of length |q| = L (sigmas, at its full size) and a misfit of s of it: b = q'r = s L^2, J = L^2. Marginalised with
 // sigma v it takes -2 log likelihood down by v^2 b^2 / (1 + v^2 J) - log(1 + v^2 J), and its mean is v^2 b / (1 + v^2 J).
-#include "estimator/diagnosis/form.hpp"
+#include "estimator/diagnosis/search/form.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

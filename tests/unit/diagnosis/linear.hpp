@@ -1,7 +1,7 @@
 // Linear models made by hand: a few columns whose answer can be worked out on paper.
 #pragma once
 
-#include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/regression/evidence.hpp"
 
 namespace selfcal::diagnosis {
 

@@ -1,11 +1,11 @@
 // A recording without noise in which an accelerometer creeps: linearised, corrected, linearised again.
-#include "estimator/diagnosis/linear_model.hpp"
+#include "estimator/diagnosis/regression/linear_model.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/passes/calibration.hpp"

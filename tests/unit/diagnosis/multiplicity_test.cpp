@@ -1,5 +1,5 @@
 // The catalogue's worth in tests, where theory knows it.
-#include "estimator/diagnosis/multiplicity.hpp"
+#include "estimator/diagnosis/regression/multiplicity.hpp"
 
 #include <gtest/gtest.h>
 

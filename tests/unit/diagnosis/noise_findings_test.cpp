@@ -1,5 +1,5 @@
 // The stochastic part against what was assumed, from a check of the noise made by hand.
-#include "estimator/diagnosis/noise_findings.hpp"
+#include "estimator/diagnosis/noise/noise_findings.hpp"
 
 #include <gtest/gtest.h>
 

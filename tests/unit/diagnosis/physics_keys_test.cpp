@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "estimator/diagnosis/catalogue.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
 #include "sim_ins/physics.hpp"
 
 namespace selfcal {

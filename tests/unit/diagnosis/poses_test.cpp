@@ -1,5 +1,5 @@
 // A hand-turned sensor made here with a known g-sensitivity.
-#include "estimator/diagnosis/poses.hpp"
+#include "estimator/diagnosis/poses/poses.hpp"
 
 #include <gtest/gtest.h>
 

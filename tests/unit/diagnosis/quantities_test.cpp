@@ -1,6 +1,6 @@
 // A bias that is there while one quantity lies in one bin is located there, with its size. Perfect sensors, and the bias in
 // their increments; where it is comes from the gimbal's read-out, from the increments themselves and the clock.
-#include "estimator/diagnosis/quantities.hpp"
+#include "estimator/diagnosis/search/quantities.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "estimator/diagnosis/regression.hpp"
+#include "estimator/diagnosis/regression/regression.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "estimator/diagnosis/catalogue.hpp"
-#include "estimator/diagnosis/evidence.hpp"
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/regression/evidence.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "estimator/diagnosis/locate.hpp"
-#include "estimator/diagnosis/velocity_noise.hpp"
+#include "estimator/diagnosis/noise/velocity_noise.hpp"
+#include "estimator/diagnosis/search/locate.hpp"
 
 namespace selfcal::diagnosis {
 namespace {

@@ -1,5 +1,5 @@
 // The search's decisions on models of a few columns.
-#include "estimator/diagnosis/selection.hpp"
+#include "estimator/diagnosis/search/selection.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,207 @@
+#include "estimator/diagnosis/data/faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/diagnosis/data/axes.hpp"
+#include "estimator/diagnosis/data/spikes.hpp"
+#include "estimator/models/segments.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+using Triple = std::array<double, 3>;
+
+std::string number(const char* format, double a, double b = 0.0, double c = 0.0) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
+void note(DataFault& fault, std::size_t sample) {
+  if (fault.count++ == 0) {
+    fault.first_sample = sample;
+  }
+}
+
+bool same(const ImuData& d, std::size_t i, std::size_t j) {
+  return d.delta_theta[i] == d.delta_theta[j] && d.delta_v[i] == d.delta_v[j];
+}
+
+double channel(const ImuData& d, std::size_t i, std::size_t axis) {
+  return axis < 3 ? d.delta_theta[i][axis] : d.delta_v[i][axis - 3];
+}
+
+// How many samples equal the one before where the quantum is coarse: of each sensor the share within a second that do,
+// their product over the six, for what repeats by chance repeats in one sensor at a time.
+double repeats_by_chance(const ImuData& data) {
+  const auto n = static_cast<std::size_t>(std::max(10.0, std::round(data.sample_rate_hz)));
+  double expected = 0.0;
+  for (std::size_t first = 1; first + n <= data.size(); first += n) {
+    double all = 1.0;
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      std::size_t equal = 0;
+      for (std::size_t i = first; i < first + n; ++i) {
+        equal += channel(data, i, axis) == channel(data, i - 1, axis) ? 1 : 0;
+      }
+      all *= static_cast<double>(equal) / static_cast<double>(n);
+    }
+    expected += all * static_cast<double>(n);
+  }
+  return expected;
+}
+
+// Zero increments never come by chance: gravity is always there. Repeated ones do, where the quantum is coarse: their
+// number is held against what the quantum and the correlation from sample to sample make likely, and so is the length of a
+// run.
+void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
+  constexpr Triple zero{};
+  DataFault zeros{"lost_samples", {}, 0, 0}, repeats{"lost_samples", {}, 0, 0}, gaps{"lost_samples", {}, 0, 0};
+  std::size_t by_chance = 0, run = 0, longest = 0, longest_first = 0;
+  double missing = 0.0;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    if (data.delta_v[i] == zero) {
+      note(zeros, i);
+    } else if (i > 0 && same(data, i, i - 1)) {
+      note(repeats, i);
+    } else if (i > 1 && same(data, i, i - 2)) {
+      ++by_chance;
+    }
+    run = i > 0 && same(data, i, i - 1) ? run + 1 : 0;
+    if (run > longest) {
+      longest = run;
+      longest_first = i + 1 - run;
+    }
+    const double steps = i > 0 ? (data.time_s[i] - data.time_s[i - 1]) * data.sample_rate_hz : 1.0;
+    if (steps > 1.5) {
+      note(gaps, i);
+      missing += steps - 1.0;
+    }
+  }
+  const double chance = std::max(static_cast<double>(by_chance), repeats_by_chance(data));
+  const double excess = static_cast<double>(repeats.count) - chance;
+  if (zeros.count > 0) {
+    zeros.words = number("%.0f samples have zero velocity increments", static_cast<double>(zeros.count));
+    faults.push_back(zeros);
+  }
+  // Difference of two counts, 5 sigma; sensors move together, and neighbours are alike by half more often than their product.
+  constexpr double moving_excess = 40.0, together = 0.5;
+  if (excess > std::max({moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0), together * chance})) {
+    repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
+                           static_cast<double>(repeats.count), chance);
+    faults.push_back(repeats);
+  } else if (zeros.count == 0) {
+    // Of n samples a run of r comes by chance n p^r times; where p is too small to be counted, 2 %.
+    const auto n = static_cast<double>(data.size());
+    constexpr double least_p = 0.02, never = 1e-4;
+    const double p = std::max(least_p, (chance + 3.0) / n);
+    if (p < 0.5 && n * std::pow(p, static_cast<double>(longest)) < never) {
+      faults.push_back({"lost_samples",
+                        number("%.0f samples in a row repeat the one before", static_cast<double>(longest)),
+                        longest_first, longest});
+    }
+  }
+  if (gaps.count > 0) {
+    gaps.words = number("%.0f gaps, %.0f samples missing", static_cast<double>(gaps.count), missing);
+    faults.push_back(gaps);
+  }
+}
+
+void time_base(const ImuData& data, std::vector<DataFault>& faults) {
+  std::vector<double> dt;
+  for (std::size_t i = 1; i < data.size(); ++i) {
+    dt.push_back(data.time_s[i] - data.time_s[i - 1]);
+  }
+  std::nth_element(dt.begin(), dt.begin() + static_cast<std::ptrdiff_t>(dt.size() / 2), dt.end());
+  const double rate = 1.0 / dt[dt.size() / 2];
+  if (std::abs(rate / data.sample_rate_hz - 1.0) > 1e-3) {
+    faults.push_back({"time_base",
+                      number("time stamps run at %.6g Hz, the rate is stated as %.6g Hz", rate, data.sample_rate_hz), 0,
+                      data.size()});
+  }
+}
+
+// Median of the changes from sample to sample: the quantum where it is coarse.
+template <typename Value>
+double usual_step(std::size_t samples, const Value& value) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < samples; ++i) {
+    if (value(i) != value(i - 1)) {
+      steps.push_back(std::abs(value(i) - value(i - 1)));
+    }
+  }
+  if (steps.empty()) {
+    return HUGE_VAL;
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+// An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds where they hardly turn; if the
+// rest of the dwell turns them by more than a few counts in that time, they were stuck. Accelerometers never rest.
+void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  constexpr double gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7;
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    const bool gyro = axis < 3;
+    const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
+    const double count = usual_step(data.size(), value);
+    const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
+    DataFault fault{"frozen_axis", {}, 0, 0};
+    const auto stuck = [&](std::size_t first, std::size_t last) {
+      fault.first_sample = fault.count == 0 ? first : fault.first_sample;
+      fault.count += last - first;
+    };
+    for (const Segment& s : segments) {
+      const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
+      double sum = 0.0;
+      for (std::size_t i = first; i < last; ++i) {
+        sum += value(i);
+      }
+      const auto n = static_cast<double>(last - first);
+      std::size_t start = first;
+      for (std::size_t i = first + 1; i <= last; ++i) {
+        if (i < last && value(i) == value(start)) {
+          continue;
+        }
+        const auto length = static_cast<double>(i - start);
+        const double length_s = length / data.sample_rate_hz;
+        const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
+        const bool left_behind = gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s &&
+                                 std::abs(turned) > counts * count;
+        if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
+          stuck(start, i);
+        }
+        start = i;
+      }
+    }
+    if (fault.count > 0) {
+      fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +
+                    number(" gives one value for %.1f s", static_cast<double>(fault.count) / data.sample_rate_hz);
+      faults.push_back(fault);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<DataFault> find_data_faults(const ImuData& data) {
+  std::vector<DataFault> faults;
+  ImuData sensors = data;
+  if (read_outs_in_degrees(data)) {
+    sensors.gimbal_outer = sensors.gimbal_inner = {};
+  }
+  const std::vector<Segment> segments = find_segments(sensors);
+  lost_samples(data, faults);
+  time_base(data, faults);
+  frozen_axes(data, segments, faults);
+  find_spikes(sensors, segments, faults);
+  find_saturation(data, faults);
+  if (faults.empty()) {  // else what a turn adds up to is no question of axes
+    find_wrong_axes(data, segments, faults);
+  }
+  return faults;
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,151 @@
+#include "estimator/diagnosis/data/spikes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr std::size_t axes = 6;
+
+double value_at(const ImuData& data, std::size_t i, std::size_t axis) {
+  return axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3];
+}
+
+std::string name_of(std::size_t axis) { return std::string(axis < 3 ? "gyro " : "accelerometer ") + "xyz"[axis % 3]; }
+
+// Samples at the extreme value in runs that are entered from a slope. A drive comes up to its rate smoothly, and where
+// the noise is below the quantum the rate is one count all along: no clipping. Over the last 0.05 s before a rate is
+// reached with continuous acceleration, ramps of a second and more change it by less than 0.7 %; a clipped ramp by 3 %.
+template <typename Value>
+std::size_t steeply_met(const ImuData& data, const Value& value, double largest) {
+  constexpr double steep = 0.01;
+  const auto back = static_cast<std::size_t>(std::max(1.0, std::round(0.05 * data.sample_rate_hz)));
+  std::size_t met = 0;
+  bool run = false, counts = false;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const bool extreme = std::abs(value(i)) == largest;
+    if (extreme && !run) {
+      counts = i > back && std::abs(value(i - 1) - value(i - 1 - back)) > steep * largest;
+    }
+    run = extreme;
+    met += extreme && counts ? 1 : 0;
+  }
+  return met;
+}
+
+// How far each sample in the dwells stands from what its neighbours make of it (fourth differences: a turn's smooth
+// beginning has none to speak of), in sigma; the samples in time's order.
+struct Departures {
+  std::vector<std::size_t> sample;
+  std::array<std::vector<double>, axes> sigmas;
+};
+
+Departures departures(const ImuData& data, const std::vector<Segment>& segments) {
+  // A dwell's edge may hold part of a turn, and by the gyros alone all of its beginning.
+  const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
+  const auto margin = static_cast<std::size_t>((gimbal ? 0.5 : 3.0) * data.sample_rate_hz);
+  Departures d;
+  for (const Segment& s : segments) {
+    for (std::size_t i = s.first + 2 + margin; !s.rotation && i + 2 + margin < s.last; ++i) {
+      d.sample.push_back(i);
+    }
+  }
+  constexpr std::size_t enough = 1000;
+  for (std::size_t axis = 0; axis < axes && d.sample.size() >= enough; ++axis) {
+    std::vector<double>& off = d.sigmas[axis];
+    for (const std::size_t i : d.sample) {
+      const auto value = [&](std::size_t k) { return value_at(data, k, axis); };
+      const double around = (4.0 * (value(i - 1) + value(i + 1)) - value(i - 2) - value(i + 2)) / 6.0;
+      off.push_back(std::abs(value(i) - around));
+    }
+    std::vector<double> sorted = off;
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
+    std::nth_element(sorted.begin(), at, sorted.end());
+    const double sigma = *at / 1.645;  // the 90 % point of normal noise
+    for (double& o : off) {
+      o = sigma > 0.0 ? o / sigma : 0.0;
+    }
+  }
+  return d;
+}
+
+constexpr double spike_sigmas = 12.0;
+
+// The largest within 0.25 s, but for the sample and the two on either side, which stand out with it by up to two thirds.
+double largest_nearby(const Departures& d, std::size_t axis, std::size_t k, std::size_t reach) {
+  const std::vector<double>& off = d.sigmas[axis];
+  double largest = 0.0;
+  for (std::size_t j = k - std::min(k, reach); j < std::min(off.size(), k + reach + 1); ++j) {
+    const bool own = j + 2 >= k && j <= k + 2;
+    const bool same_dwell = d.sample[std::max(j, k)] - d.sample[std::min(j, k)] == std::max(j, k) - std::min(j, k);
+    largest = !own && same_dwell ? std::max(largest, off[j]) : largest;
+  }
+  return largest;
+}
+
+bool is_motion(const Departures& d, std::size_t axis, std::size_t k, double rate_hz) {
+  constexpr double rings_s = 0.25, rings = 0.25, seen = 4.0;
+  const auto reach = static_cast<std::size_t>(std::max(5.0, std::round(rings_s * rate_hz)));
+  if (largest_nearby(d, axis, k, reach) > std::max(seen, rings * d.sigmas[axis][k])) {
+    return true;
+  }
+  const std::size_t other = axis < 3 ? 3 : 0;
+  double both = 0.0;
+  for (std::size_t a = other; a < other + 3; ++a) {
+    for (std::size_t j = k - std::min<std::size_t>(k, 2); j < std::min(d.sample.size(), k + 3); ++j) {
+      both = std::max(both, d.sigmas[a][j]);
+    }
+  }
+  return both > 2.0 * seen;
+}
+
+}  // namespace
+
+void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  const Departures d = departures(data, segments);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const std::vector<double>& off = d.sigmas[axis];
+    DataFault spike{"spike", {}, 0, 0};
+    for (std::size_t k = 2; k + 2 < off.size(); ++k) {
+      const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
+      if (off[k] > spike_sigmas && largest_around && !is_motion(d, axis, k, data.sample_rate_hz)) {
+        spike.first_sample = spike.count++ == 0 ? d.sample[k] : spike.first_sample;
+      }
+    }
+    if (spike.count > 0) {
+      spike.words =
+          name_of(axis) + ": " + std::to_string(spike.count) +
+          " samples in dwells stand more than 12 sigma from their neighbours, and no motion shows around them";
+      faults.push_back(spike);
+    }
+  }
+}
+
+void find_saturation(const ImuData& data, std::vector<DataFault>& faults) {
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const auto value = [&](std::size_t i) { return value_at(data, i, axis); };
+    double largest = 0.0;
+    std::size_t first_met = 0;
+    for (std::size_t i = 0; i < data.size(); ++i) {
+      if (std::abs(value(i)) > largest) {
+        largest = std::abs(value(i));
+        first_met = i;
+      }
+    }
+    const std::size_t met = steeply_met(data, value, largest);
+    constexpr std::size_t often = 100;
+    constexpr double rest_rate = 0.5 * units::degree;  // below it the largest count of a gyro is only noise
+    const bool loud = axis < 3 ? largest * data.sample_rate_hz > rest_rate : largest * data.sample_rate_hz > 11.0;
+    if (met > often && loud) {
+      faults.push_back(
+          {"saturation", name_of(axis) + " meets its extreme value " + std::to_string(met) + " times", first_met, met});
+    }
+  }
+}
+
+}  // namespace selfcal::diagnosis

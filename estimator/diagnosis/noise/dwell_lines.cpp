@@ -1,0 +1,130 @@
+#include "estimator/diagnosis/noise/dwell_lines.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr double lowest_hz = 0.1, highest_hz = 2.0;
+constexpr double least_dwell_s = 30.0;
+constexpr double log_false_lines = -4.6;  // one false line in a hundred recordings
+constexpr Eigen::Index neighbours = 12;   // bins to either side whose median is the background
+
+struct Line {
+  double frequency_hz = 0.0;
+  double log_p = 0.0;
+};
+
+// Peaks of the dwell's spectrum over its neighbourhood. What comes from white noise of the integral grows as f^2, so
+// bins are compared as densities of velocity or angle would be, divided by it.
+std::vector<Line> peaks(const Eigen::VectorXd& rate, double rate_hz, double bins_searched) {
+  const Eigen::Index n = rate.size();
+  Eigen::VectorXd windowed = rate.array() - rate.mean();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    windowed(i) *= 1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
+  }
+  Eigen::FFT<double> fft;
+  Eigen::VectorXcd transform;
+  fft.fwd(transform, windowed);
+  const double bin_hz = rate_hz / static_cast<double>(n);
+  const auto first = static_cast<Eigen::Index>(std::ceil(lowest_hz / bin_hz));
+  const Eigen::Index last = std::min(static_cast<Eigen::Index>(highest_hz / bin_hz), n / 2 - neighbours - 2);
+  std::vector<double> power(static_cast<std::size_t>(n / 2));
+  for (Eigen::Index b = 1; b < n / 2; ++b) {
+    power[static_cast<std::size_t>(b)] = std::norm(transform(b)) / static_cast<double>(b * b);
+  }
+  std::vector<Line> lines;
+  for (Eigen::Index b = first; b <= last; ++b) {
+    const auto at = power.begin() + b;
+    if (*at < *(at - 1) || *at <= *(at + 1)) {
+      continue;
+    }
+    std::vector<double> around(power.begin() + std::max<Eigen::Index>(first, b - neighbours), at + neighbours + 1);
+    std::nth_element(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
+    // Of noise a bin is exponential, and its median the mean's ln 2.
+    const double log_p = -*at / around[around.size() / 2] * std::numbers::ln2 + std::log(bins_searched);
+    if (log_p < log_false_lines) {
+      // Hann: the ratio of the neighbours tells where between two bins the peak lies.
+      const bool right = *(at + 1) > *(at - 1);
+      const double side = std::sqrt(std::max(*(at + 1), *(at - 1)) / *at);
+      const double offset = std::clamp((2.0 * side - 1.0) / (1.0 + side), 0.0, 0.5);
+      lines.push_back({(static_cast<double>(b) + (right ? offset : -offset)) * bin_hz, log_p});
+    }
+  }
+  return lines;
+}
+
+// Cosine and sine of every line, fitted with mean and slope.
+Eigen::MatrixXd fitted(const Eigen::VectorXd& rate, const std::vector<Line>& lines, double rate_hz,
+                       Eigen::VectorXd& size) {
+  const Eigen::Index n = rate.size();
+  const auto pairs = static_cast<Eigen::Index>(2 * lines.size());
+  Eigen::MatrixXd design(n, pairs + 2);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double t = static_cast<double>(i) / rate_hz;
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      const double phase = 2.0 * std::numbers::pi * lines[k].frequency_hz * t;
+      design(i, static_cast<Eigen::Index>(2 * k)) = std::cos(phase);
+      design(i, static_cast<Eigen::Index>(2 * k) + 1) = std::sin(phase);
+    }
+    design(i, pairs) = 1.0;
+    design(i, pairs + 1) = 2.0 * static_cast<double>(i) / static_cast<double>(n) - 1.0;
+  }
+  size = design.householderQr().solve(rate).head(pairs);
+  return design.leftCols(pairs);
+}
+
+void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, double resolution_hz) {
+  const auto same = std::find_if(all.begin(), all.end(), [&](const VibrationLine& l) {
+    return l.axis == line.axis && std::abs(l.frequency_hz - line.frequency_hz) < resolution_hz;
+  });
+  if (same == all.end()) {
+    all.push_back(line);
+  } else if (line.amplitude > same->amplitude) {
+    *same = line;
+  }
+}
+
+}  // namespace
+
+std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::vector<Segment>& segments,
+                                                AngleVelocity& delta_theta, AngleVelocity& delta_v) {
+  std::vector<VibrationLine> all;
+  const double fs = data.sample_rate_hz;
+  for (const Segment& s : segments) {
+    const double length = static_cast<double>(s.last - s.first) / fs;
+    if (s.rotation || length < least_dwell_s) {
+      continue;
+    }
+    const double searched = 6.0 * static_cast<double>(segments.size()) * highest_hz * length;
+    for (int axis = 0; axis < 6; ++axis) {
+      AngleVelocity& increments = axis < 3 ? delta_theta : delta_v;
+      const auto k = static_cast<std::size_t>(axis % 3);
+      Eigen::VectorXd rate(static_cast<Eigen::Index>(s.last - s.first));
+      for (Eigen::Index i = 0; i < rate.size(); ++i) {
+        rate(i) = increments[s.first + static_cast<std::size_t>(i)][k] * fs;
+      }
+      const std::vector<Line> lines = peaks(rate, fs, searched);
+      if (lines.empty()) {
+        continue;
+      }
+      Eigen::VectorXd size;
+      const Eigen::MatrixXd design = fitted(rate, lines, fs, size);
+      const Eigen::VectorXd taken = design * size;
+      for (Eigen::Index i = 0; i < rate.size(); ++i) {
+        increments[s.first + static_cast<std::size_t>(i)][k] -= taken(i) / fs;
+      }
+      for (std::size_t l = 0; l < lines.size(); ++l) {
+        const double amplitude = size.segment<2>(static_cast<Eigen::Index>(2 * l)).norm();
+        keep_strongest(all, {axis, lines[l].frequency_hz, amplitude, lines[l].log_p}, 2.0 / length);
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace selfcal::diagnosis

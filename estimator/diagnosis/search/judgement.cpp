@@ -1,0 +1,172 @@
+#include "estimator/diagnosis/search/judgement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr double rejection_rate = 0.01;  // of right names, by the biases that they leave
+constexpr double remainder_rate = 0.01;  // and by map, whiteness and size
+
+const std::array<const char*, 6> axis_letters = {"x", "y", "z", "x", "y", "z"};
+
+// Beside an effect of hundreds of sigma the linearisation, and an equation that is right to 3 % of the amplitude, leave a
+// thousandth of its square, in one place or in all: not worth a verdict.
+bool negligible(const Adequacy& after, const Adequacy& before) {
+  constexpr double worth_a_verdict = 1e-3, seen_anywhere = 16.0;  // 4 sigma, squared
+  const double square = worth_a_verdict * before.misfit;
+  return after.misfit < square && after.largest_sigma * after.largest_sigma < std::max(seen_anywhere, square);
+}
+
+// What was named must explain: where it makes most of what is seen it is held to more than a recording in which nothing was
+// found. What it has no part in speaks neither for it nor against it.
+bool structure_good(const Structure& left, const Rules& rules) {
+  return left.log_p_named > std::log(rejection_rate) &&
+         left.log_p_elsewhere > std::log(rules.budget.structure * rules.alpha);
+}
+
+// What is named, in words; walks that jump apart from it.
+void describe_all(const SearchResult& found, const Rules& rules, Judgement& j) {
+  for (const NamedTerm& term : found.named) {
+    j.named.push_back(describe(term, found.rows));
+    j.named.back().share = term.gain / found.misfit;
+  }
+  for (const RandomWalk& walk : found.walks) {
+    (rules.goes_on(walk) ? j.named : j.jumps).push_back(describe(walk, found.rows));
+  }
+  std::stable_sort(j.named.begin(), j.named.end(),
+                   [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
+}
+
+}  // namespace
+
+Finding describe(const Suspect& suspect) {
+  Finding f;
+  f.source = suspect.effect;
+  f.effect = suspect.effect->id;
+  f.equation = suspect.effect->equation;
+  f.experiment = suspect.effect->experiment;
+  f.log_p = suspect.log_p;
+  f.significance = sigma_from_log_p(suspect.log_p);
+  return f;
+}
+
+Finding describe(const NamedTerm& term, double rows) {
+  const Effect& effect = *term.effect;
+  Finding f;
+  f.source = &effect;
+  f.effect = effect.id;
+  f.equation = effect.equation;
+  f.excited = effect.excited;
+  f.experiment = effect.experiment;
+  for (Eigen::Index k = 0; k < term.amplitude.size(); ++k) {
+    const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
+    const double value = term.amplitude(k) * p.typical;
+    f.parameters.push_back(
+        {p.name, p.unit, value, std::sqrt(term.covariance(k, k)) * p.typical, effect.physics_prefix + p.name, value});
+  }
+  if (!std::isnan(term.constant)) {
+    f.parameters.push_back({std::string(effect.constant.name), std::string(effect.constant.unit), term.constant,
+                            term.constant_sigma, std::string(effect.constant.physics_key),
+                            term.constant * effect.constant.physics_per_unit});
+  }
+  f.equivalent = ids_of(term.equivalent);
+  f.rivals = term.equivalent;
+  for (const auto& [rival, p] : term.probability) {
+    f.probability[rival->id] = p;
+  }
+  f.log_p = term.log_p;
+  f.significance = sigma_from_log_p(term.log_p);
+  f.delta_bic = term.gain - term.rank * std::log(rows);
+  f.held_out_gain = term.held_out;
+  return f;
+}
+
+Finding describe(const RandomWalk& walk, double rows) {
+  Finding f;
+  f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
+  f.equation = "bias walks: variance grows with time";
+  f.excited = "whole recording";
+  f.experiment = "a longer recording";
+  const double unit = map_unit(walk.axis) / (walk.axis < 3 ? units::degree_per_hour : units::micro_g);
+  f.parameters.push_back({axis_letters[static_cast<std::size_t>(walk.axis)],
+                          walk.axis < 3 ? "deg/h/sqrt(h)" : "ug/sqrt(h)", walk.rate * unit, walk.sigma * unit});
+  f.log_p = log_normal_tail(std::sqrt(walk.gain));
+  f.significance = sigma_from_log_p(f.log_p);
+  f.delta_bic = walk.gain - std::log(rows);
+  f.stochastic = true;
+  return f;
+}
+
+Adequacy adequacy(const Rules& rules, const Shown& shown, double rows, double alpha, double alpha_elsewhere) {
+  Adequacy a;
+  a.nis = shown.square / rows;
+  a.log_p_white = rules.coloured ? 0.0 : shown.log_p_white;
+  a.largest_sigma = shown.map.largest_sigma;
+  a.misfit = std::max(0.0, shown.square - rows);
+  const auto good = [&](double sigma, double rate) {
+    return log_corrected(log_normal_tail(sigma), std::max(1, shown.map.tests)) > std::log(rules.budget.map * rate);
+  };
+  const bool map_good =
+      good(shown.map.largest_named_sigma, alpha) && good(shown.map.largest_sigma, std::min(alpha, alpha_elsewhere));
+  // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
+  const bool white = rules.motion_fitted || a.log_p_white > std::log(rules.budget.whiteness * alpha);
+  const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
+  const bool size_good = rules.motion_fitted ||
+                         log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) > std::log(rules.budget.size * alpha);
+  a.accepted = map_good && white && size_good;
+  return a;
+}
+
+Judgement judge(const SearchResult& found, const Rules& rules) {
+  Judgement j;
+  j.before = adequacy(rules, found.before, found.rows, rules.alpha, rules.alpha);
+  const double of_names = found.empty() ? rules.alpha : std::max(rules.alpha, remainder_rate);
+  j.after = adequacy(rules, found.after, found.rows, of_names, rules.alpha);
+  describe_all(found, rules, j);
+  if (!rules.motion_fitted) {
+    j.after.log_p_structure = found.structure.log_p();
+    j.after.accepted = j.after.accepted && structure_good(found.structure, rules);
+  }
+  j.after.accepted = j.after.accepted || (!j.named.empty() && negligible(j.after, j.before));
+  const bool itself = found.log_p_likeness > std::log(rejection_rate);
+  j.after.accepted = j.after.accepted && j.jumps.empty() && itself && !found.entangled;
+  j.names_stand = j.after.accepted || j.after.misfit < rules.tolerable_share * j.before.misfit;
+  return j;
+}
+
+void write_down(const SearchResult& found, const Judgement& j, Diagnosis& d) {
+  d.log_p_limit = found.log_p_limit;
+  d.located = found.before.map.places;
+  d.remaining = found.after.map.places;
+  d.before = j.before;
+  d.after = j.after;
+  d.unexplained = !j.after.accepted;
+  d.rejected = j.jumps;
+  // A name that leaves something behind is the best fitting, not the truth, and no equation of a model: nothing of it is
+  // carried over or taken out.
+  std::vector<Finding>& destination = j.names_stand ? d.findings : d.rejected;
+  destination.insert(destination.end(), j.named.begin(), j.named.end());
+  if (j.names_stand) {
+    for (const NamedTerm& term : found.named) {
+      d.model.push_back({term.effect, term.constant, term.amplitude, term.covariance});
+    }
+  }
+  d.value = found.value;
+  d.value_as_named = found.value_as_named;
+  d.covariance = found.covariance;
+  d.sigma = d.covariance.diagonal().cwiseSqrt();
+}
+
+DiagnosisVerdict verdict_of(bool named, bool unexplained, bool suspected) {
+  return named         ? DiagnosisVerdict::named
+         : unexplained ? DiagnosisVerdict::none_of_the_above
+         : suspected   ? DiagnosisVerdict::not_enough_information
+                       : DiagnosisVerdict::adequate;
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,131 @@
+#include "estimator/diagnosis/search/selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::diagnosis {
+namespace {
+
+// An equation comes before a walk that explains more where its log p is at least this share of the walk's: a walk follows any
+// slow curve, and so explains what an equation does and some of the noise with it. An equation whose constant still stands on
+// its grid explains a little less than it will: with neighbours a factor of 2 apart an exponential keeps 97 % of its square.
+// The rest of the 15 % is a choice.
+constexpr double equation_share = 0.85;
+// What jumps between dwells is no walk: it is taken only where no equation comes near. A choice.
+constexpr double jump_share = 0.6;
+// Effects whose odds against the best are better than 1:100 stay in its class.
+const double class_log_odds = std::log(100.0);
+// An effect that contains the term gains as much, but for rounding, the grid and a few refits, and keeps this share of its log p in
+// spite of its further coefficients. A choice: too small a share lists an effect more in the class, and names none.
+constexpr double contained_gain = 2.0, contained_share = 0.8;
+// What is to take a term's place must be better by a factor of e: else two that are alike would change places for ever.
+constexpr double least_improvement = 1.0;
+
+bool names(const std::vector<Candidate>& terms, const Effect* effect) {
+  return std::any_of(terms.begin(), terms.end(), [&](const Candidate& t) { return t.effect == effect; });
+}
+
+}  // namespace
+
+double Significance::corrected(double log_p, const Effect& effect) const {
+  const bool spectrum = effect.constant.kind == EffectConstant::Kind::spectrum;
+  return log_corrected(log_p, independent_tests * (spectrum ? searched_frequencies(rows) : 1.0));
+}
+
+double Significance::corrected(double log_p) const { return log_corrected(log_p, independent_tests); }
+
+std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
+                                      const std::vector<Candidate>& alternatives, const std::vector<RandomWalk>& walks,
+                                      const Significance& significance,
+                                      const std::function<bool(const RandomWalk&)>& goes_on,
+                                      const std::function<bool(const Candidate&, const GroupTest&)>& immaterial) {
+  double best_equation = 0.0, best_walk = 0.0, detected = 0.0;  // name by the former, presence by the last
+  const Candidate* equation = nullptr;
+  for (const Candidate& c : alternatives) {
+    const GroupTest test = test_group(evidence, columns_of(c), fitted);
+    const double log_p = significance.corrected(test.log_detection, *c.effect);
+    if (immaterial && significance.holds(log_p) && immaterial(c, test)) {
+      continue;
+    }
+    detected = std::min(detected, log_p);
+    if (test.log_p < best_equation) {
+      best_equation = test.log_p;
+      equation = &c;
+    }
+  }
+  // A walk has one coefficient, at the edge of its range (half a chi-squared).
+  const RandomWalk* walk = nullptr;
+  for (const RandomWalk& test : walks) {
+    const double log_p = log_chi_squared_tail(test.gain, 1.0);
+    detected = std::min(detected, significance.corrected(log_p));
+    if (log_p < std::min(best_walk, best_equation)) {
+      best_walk = log_p;
+      walk = &test;
+    }
+  }
+  if (!significance.holds(detected)) {
+    return std::nullopt;
+  }
+  if (walk != nullptr && equation != nullptr &&
+      best_equation < (goes_on(*walk) ? equation_share : jump_share) * best_walk) {
+    walk = nullptr;
+  }
+  if (walk != nullptr) {
+    return Addition{{}, *walk};
+  }
+  return Addition{*equation, {}};
+}
+
+std::optional<std::size_t> weak_term(const Evidence& evidence, const std::vector<Candidate>& terms,
+                                     const Significance& significance) {
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const GroupTest test = test_group(evidence, columns_of(terms[i]), columns_of(terms, i));
+    if (!significance.holds(significance.corrected(test.log_detection, *terms[i].effect))) {
+      return i;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<Exchange> better_exchange(const Evidence& evidence, const std::vector<Candidate>& terms,
+                                        const std::vector<Candidate>& alternatives) {
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const std::vector<int> others = columns_of(terms, i);
+    double best = test_group(evidence, columns_of(terms[i]), others).log_p - least_improvement;
+    const Candidate* winner = nullptr;
+    for (const Candidate& c : alternatives) {
+      if (names(terms, c.effect)) {  // its constant is refined already
+        continue;
+      }
+      const double log_p = test_group(evidence, columns_of(c), others).log_p;
+      if (log_p < best) {
+        best = log_p;
+        winner = &c;
+      }
+    }
+    if (winner != nullptr) {
+      return Exchange{i, *winner};
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<const Effect*> equivalents(const Evidence& evidence, const std::vector<Candidate>& terms, std::size_t i,
+                                       const std::vector<Candidate>& alternatives) {
+  const std::vector<int> others = columns_of(terms, i);
+  const GroupTest own = test_group(evidence, columns_of(terms[i]), others);
+  std::vector<const Effect*> all;
+  for (const Candidate& rival : alternatives) {
+    if (names(terms, rival.effect) || std::find(all.begin(), all.end(), rival.effect) != all.end()) {
+      continue;
+    }
+    const GroupTest test = test_group(evidence, columns_of(rival), others);
+    const bool contains = test.gain > own.gain - contained_gain && test.log_p < contained_share * own.log_p;
+    if (test.log_p < own.log_p + class_log_odds || contains) {
+      all.push_back(rival.effect);
+    }
+  }
+  return all;
+}
+
+}  // namespace selfcal::diagnosis
