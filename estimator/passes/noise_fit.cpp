@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/statistics/climb.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -13,12 +15,9 @@ constexpr double improbable = 30.7;  // chi-squared, 3 degrees, once in 10^6
 constexpr double most_disturbed = 0.1;
 constexpr int rounds = 4;
 
-using Logs = std::array<double, 6>;  // ln of ARW, VRW, white position, walk north, up, east
+using Sizes = std::array<double, 6>;  // ARW, VRW, white position, walk north, up, east
 
-StillNoise noise_of(const Logs& logs) {
-  return {std::exp(logs[0]), std::exp(logs[1]), std::exp(logs[2]),
-          Vector3(std::exp(logs[3]), std::exp(logs[4]), std::exp(logs[5]))};
-}
+StillNoise noise_of(const Sizes& s) { return {s[0], s[1], s[2], Vector3(s[3], s[4], s[5])}; }
 
 std::array<AxisInnovations, 3> innovations(const DriftSeries& series, const StillNoise& noise) {
   std::array<AxisInnovations, 3> out;
@@ -29,41 +28,18 @@ std::array<AxisInnovations, 3> innovations(const DriftSeries& series, const Stil
   return out;
 }
 
-double log_likelihood(const DriftSeries& series, const Logs& logs) {
+double log_likelihood(const DriftSeries& series, const Sizes& sizes) {
   double sum = 0.0;
-  for (const AxisInnovations& axis : innovations(series, noise_of(logs))) {
+  for (const AxisInnovations& axis : innovations(series, noise_of(sizes))) {
     sum += axis.log_likelihood;
   }
   return sum;
 }
 
-// Coordinate by coordinate, by ever smaller factors. What does not matter any more is not followed to zero: a density a
-// hundredth of its start is as good as none.
-Logs climb(const DriftSeries& series, const Logs& start) {
-  Logs best = start;
-  double top = log_likelihood(series, best);
-  constexpr double enough = 0.01;  // of the log likelihood
-  const double farthest = std::log(1e4);
-  for (const double step : {std::log(4.0), std::log(2.0), std::log(1.25), std::log(1.06), std::log(1.03)}) {
-    constexpr int most_rounds = 30;
-    double before = -HUGE_VAL;
-    for (int round = 0; round < most_rounds && top > before + enough; ++round) {
-      before = top;
-      for (std::size_t k = 0; k < best.size(); ++k) {
-        for (const double move : {step, -step}) {
-          Logs trial = best;
-          trial[k] += move;
-          const double found = std::abs(trial[k] - start[k]) > farthest ? -HUGE_VAL : log_likelihood(series, trial);
-          if (found > top) {
-            top = found;
-            best = trial;
-            break;
-          }
-        }
-      }
-    }
-  }
-  return best;
+// What does not matter any more is not followed to zero: a density a hundredth of its start is as good as none.
+Sizes climbed(const DriftSeries& series, const Sizes& start) {
+  const Climb how{.factors = {4.0, 2.0, 1.25, 1.06, 1.03}, .enough = 0.01, .farthest = 1e4};
+  return climb<6>(start, how, [&](const Sizes& s) { return log_likelihood(series, s); }).at;
 }
 
 // Sum of the squares of the three axes' innovations, each over its variance.
@@ -101,19 +77,13 @@ bool weigh(DriftSeries& series, const StillNoise& noise) {
 
 StillNoiseFit fit_still_noise(DriftSeries series, const StillNoise& start) {
   series.inflation.assign(series.size(), 1.0);
-  Logs logs{};
-  logs[0] = std::log(start.gyro_arw);
-  logs[1] = std::log(start.accel_vrw);
-  logs[2] = std::log(start.position_sigma);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    logs[3 + axis] = std::log(start.position_walk(static_cast<Eigen::Index>(axis)));
-  }
-  logs = climb(series, logs);
-  for (int round = 0; round < rounds && weigh(series, noise_of(logs)); ++round) {
-    logs = climb(series, logs);
+  const Vector3& walk = start.position_walk;
+  Sizes sizes = climbed(series, {start.gyro_arw, start.accel_vrw, start.position_sigma, walk(0), walk(1), walk(2)});
+  for (int round = 0; round < rounds && weigh(series, noise_of(sizes)); ++round) {
+    sizes = climbed(series, sizes);
   }
   StillNoiseFit fit;
-  fit.noise = noise_of(logs);
+  fit.noise = noise_of(sizes);
   for (std::size_t k = 0; k < series.size(); ++k) {
     if (series.inflation[k] > 1.0) {
       fit.disturbed.push_back({series.start_s[k], series.end_s[k], series.inflation[k]});

@@ -2,7 +2,10 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
+
+#include "estimator/statistics/climb.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -10,35 +13,11 @@ namespace {
 constexpr double colours = 0.1;          // share of an interval's position variance from which it is modelled
 constexpr double least_log_gain = 10.0;  // of the likelihood, for three densities more
 
-// Climbs from `best` along one density after the other, by ever smaller factors; `top` is the value there. Velocity and
-// position trade against each other along a ridge: that takes many rounds.
-template <std::size_t N>
-void climb(NoiseDensities& best, double& top, const std::array<double, N>& steps,
-           const std::function<double(const NoiseDensities&)>& log_likelihood) {
-  constexpr int most_rounds = 20;
-  for (const double step : steps) {
-    double before = -HUGE_VAL;
-    for (int round = 0; round < most_rounds && top > before; ++round) {
-      before = top;
-      for (double& value : best) {
-        for (const double factor : {1.0 / step, step}) {
-          const double start = value;
-          for (double last = value;; last = value) {
-            value *= factor;
-            const double found = log_likelihood(best);
-            if (found <= top) {
-              value = last;
-              break;
-            }
-            top = found;
-          }
-          if (value != start) {
-            break;  // the top lies on this side
-          }
-        }
-      }
-    }
-  }
+// Velocity and position trade against each other along a ridge: that takes many moves and rounds.
+Summit<3> top_of(const NoiseDensities& start, std::vector<double> factors,
+                 const std::function<double(const NoiseDensities&)>& log_likelihood) {
+  constexpr int many = 1000;
+  return climb<3>(start, {.factors = std::move(factors), .most_rounds = 20, .most_moves = many}, log_likelihood);
 }
 
 }  // namespace
@@ -68,13 +47,12 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
     trial.noise = with_velocity_noise(input.noise, d);
     return run_pass(trial).log_likelihood;
   };
-  NoiseDensities best = {input.noise.gyro_arw, input.noise.accel_vrw, density};
-  double top = log_likelihood(best);
-  climb(best, top, std::array{2.0, 1.25, 1.06}, log_likelihood);
-  if (top < before + least_log_gain) {
+  const Summit<3> top =
+      top_of({input.noise.gyro_arw, input.noise.accel_vrw, density}, {2.0, 1.25, 1.06}, log_likelihood);
+  if (top.log_likelihood < before + least_log_gain) {
     return false;
   }
-  input.noise = with_velocity_noise(input.noise, best);
+  input.noise = with_velocity_noise(input.noise, top.at);
   return true;
 }
 
@@ -86,9 +64,7 @@ std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
   }
   const NoiseDensities before = {noise.gyro_arw, noise.accel_vrw, density};
   const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(noise, d)); };
-  NoiseDensities best = before;
-  double top = of_densities(best);
-  climb(best, top, std::array{1.25, 1.06}, of_densities);
+  const NoiseDensities best = top_of(before, {1.25, 1.06}, of_densities).at;
   if (best == before) {
     return std::nullopt;
   }

@@ -1,9 +1,12 @@
 // Distributions and the test for whiteness, against closed forms.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <functional>
 #include <random>
 
+#include "estimator/statistics/climb.hpp"
 #include "estimator/statistics/distributions.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
@@ -84,6 +87,45 @@ TEST(Whiteness, OfWhiteNoiseIsUniform) {
     below += test_whiteness(x).log_p < std::log(0.05) ? 1 : 0;
   }
   EXPECT_NEAR(below, 0.05 * draws, 4.0 * std::sqrt(0.05 * 0.95 * draws)) << "seed 7";
+}
+
+// Log likelihood with its top at (5, 0.02), logarithms known to 1/10: found to half of the last factor. Where the farthest is a
+// factor of 3 from the start the climb ends there.
+TEST(Climb, GoesToTheTop) {
+  using Point = std::array<double, 2>;
+  const std::function<double(const Point&)> log_likelihood = [](const Point& p) {
+    const double x = std::log(p[0] / 5.0) / 0.1, y = std::log(p[1] / 0.02) / 0.1;
+    return -0.5 * (x * x + y * y);
+  };
+  const double half = 0.501 * std::log(1.05);
+  for (const int moves : {1, 1000}) {
+    const Climb how{.factors = {2.0, 1.3, 1.05}, .most_moves = moves};
+    const Summit<2> top = climb<2>({1.0, 1.0}, how, log_likelihood);
+    EXPECT_LT(std::abs(std::log(top.at[0] / 5.0)), half) << moves;
+    EXPECT_LT(std::abs(std::log(top.at[1] / 0.02)), half) << moves;
+    EXPECT_EQ(top.log_likelihood, log_likelihood(top.at));
+    Climb near = how;
+    near.farthest = 3.0;
+    const Summit<2> edge = climb<2>({1.0, 1.0}, near, log_likelihood);
+    EXPECT_LE(edge.at[0], 3.0);
+    EXPECT_GT(edge.at[0], 3.0 / 1.05);
+    EXPECT_GE(edge.at[1], 1.0 / 3.0);
+  }
+}
+
+// In one round a single move takes a quantity one factor further; many take it to the top: 1.3^6 is 4.83 of 5.
+TEST(Climb, MovesAsOftenAsItMay) {
+  const std::function<double(const std::array<double, 1>&)> log_likelihood = [](const std::array<double, 1>& p) {
+    return -std::abs(std::log(p[0] / 5.0));
+  };
+  Climb how{.factors = {1.3}, .most_rounds = 1};
+  EXPECT_NEAR(climb<1>({1.0}, how, log_likelihood).at[0], 1.3, 1e-12);
+  how.most_moves = 1000;
+  EXPECT_NEAR(climb<1>({1.0}, how, log_likelihood).at[0], std::pow(1.3, 6.0), 1e-12);
+  how.most_moves = 1;
+  how.most_rounds = 30;
+  how.enough = 1.0;  // no single move gains as much: the first round is the last
+  EXPECT_NEAR(climb<1>({1.0}, how, log_likelihood).at[0], 1.3, 1e-12);
 }
 
 }  // namespace
