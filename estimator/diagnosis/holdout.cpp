@@ -36,21 +36,26 @@ HeldOutState state_of(const Diagnosis& d, const ImuData& data, const Calibration
   state.log_likelihood = rows.pass.log_likelihood;
   state.nis = rows.residual.squaredNorm() / static_cast<double>(rows.residual.size());
   state.log_p_white = test_whiteness(rows.residual).log_p;
-  // Half of the first's own prior is shared by both where a parameter is not seen; those do not count.
-  int seen = 0;
-  for (int k = 0; k < sensor_parameter_count; ++k) {
-    if (d.calibration.determined[static_cast<std::size_t>(k)]) {
-      const double difference = calibration.value(k) - of_first(k);
-      state.parameter_disagreement +=
-          difference * difference / (calibration.sigma(k) * calibration.sigma(k) + first_sigma(k) * first_sigma(k));
-      ++seen;
-    }
-  }
-  state.parameter_disagreement /= std::max(1, seen);
+  state.parameter_disagreement =
+      disagreement(of_first, first_sigma, calibration.value, calibration.sigma, d.calibration.determined);
   return state;
 }
 
 }  // namespace
+
+double disagreement(const ParameterVector& first, const ParameterVector& first_sigma, const ParameterVector& second,
+                    const ParameterVector& second_sigma, const std::array<bool, sensor_parameter_count>& determined) {
+  double sum = 0.0;
+  int seen = 0;
+  for (int k = 0; k < sensor_parameter_count; ++k) {
+    if (determined[static_cast<std::size_t>(k)]) {
+      const double difference = second(k) - first(k);
+      sum += difference * difference / (second_sigma(k) * second_sigma(k) + first_sigma(k) * first_sigma(k));
+      ++seen;
+    }
+  }
+  return sum / std::max(1, seen);
+}
 
 HoldoutOutcome hold_out(const Diagnosis& d, const ImuData& second, const DiagnosisOptions& options) {
   if (second.size() < 2) {

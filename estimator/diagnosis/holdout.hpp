@@ -1,6 +1,8 @@
 // A model named on one recording, tried on another of the same unit that had no part in the fit.
 #pragma once
 
+#include <array>
+
 #include "estimator/diagnosis/diagnosis.hpp"
 
 namespace selfcal::diagnosis {
@@ -18,6 +20,11 @@ struct Holdout {
   double gain = 0.0;                     // in log likelihood
   std::vector<std::string> not_carried;  // findings that belong to one recording only: motion of the base, noise
 };
+
+// Mean square of the differences over their variances, of the parameters that the first `determined`: where one is not seen
+// half of its own prior is shared by both. 0 where none is.
+double disagreement(const ParameterVector& first, const ParameterVector& first_sigma, const ParameterVector& second,
+                    const ParameterVector& second_sigma, const std::array<bool, sensor_parameter_count>& determined);
 
 struct HoldoutOutcome {
   std::optional<Holdout> holdout;

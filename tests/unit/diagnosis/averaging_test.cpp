@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/diagnosis/holdout.hpp"
 #include "estimator/diagnosis/isolability.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "tests/unit/diagnosis/linear.hpp"
@@ -85,6 +86,36 @@ TEST(Separation, IsWhatTheProjectionLeaves) {
   EXPECT_EQ(found[0].closest, &b);
   EXPECT_NEAR(found[0].square, 900.0 * (1.0 - 0.64), 1e-3);  // the prior of 1000 typical sizes: 1e-6 of 900
   EXPECT_NEAR(found[0].share, 1.0 - 0.64, 1e-6);
+}
+
+// Of a rival that holds the effect as a special case nothing splits it: share 0. What is at right angles leaves all.
+TEST(Separation, OfARivalThatContainsTheEffectIsNone) {
+  Effect two = b;
+  two.parameters.push_back(b.parameters.front());
+  const Effect other = one_coefficient("c");
+  Eigen::MatrixXd Z = Eigen::MatrixXd::Zero(4, 4);
+  Z.col(0) << 10.0, 0.0, 0.0, 0.0;
+  Z.col(1) << 3.0, 4.0, 0.0, 0.0;  // with the next one it spans the effect's direction
+  Z.col(2) << -2.0, 5.0, 0.0, 0.0;
+  Z.col(3) << 0.0, 0.0, 0.0, 8.0;
+  const std::vector<Separation> found =
+      separations(Z.transpose() * Z, {column_a, {&two, NAN, 1, 2}, {&other, NAN, 3, 1}}, Eigen::VectorXd::Ones(1));
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_LT(found[0].share, 1e-6);
+  EXPECT_NEAR(found[1].share, 1.0, 1e-12);
+  EXPECT_NEAR(found[1].square, 100.0, 1e-9);
+}
+
+// Two of the 24 are determined and differ by 3 of sqrt(1 + 4) and by 1 of sqrt(1 + 1): (9/5 + 1/2)/2. The third does not count.
+TEST(Disagreement, IsTheMeanSquareOfWhatBothDetermine) {
+  const ParameterVector zero = ParameterVector::Zero();
+  ParameterVector second = zero, first_sigma = ParameterVector::Ones(), second_sigma = ParameterVector::Ones();
+  second.head<3>() << 3.0, -1.0, 100.0;
+  second_sigma(0) = 2.0;
+  std::array<bool, sensor_parameter_count> determined{};
+  EXPECT_EQ(disagreement(zero, first_sigma, second, second_sigma, determined), 0.0);
+  determined[0] = determined[1] = true;
+  EXPECT_NEAR(disagreement(zero, first_sigma, second, second_sigma, determined), (9.0 / 5.0 + 0.5) / 2.0, 1e-12);
 }
 
 // n rows in two halves and a column of ones. A bias m in both is predicted from the other half: n m^2 / 2. The opposite sign in
