@@ -148,6 +148,36 @@ bool sensible(const Fit& fit, const std::vector<int>& chosen) {
 
 }  // namespace
 
+namespace {
+
+// Significant columns that predict what was left out, and what each gained there, in the order in which they were taken.
+struct Taken {
+  std::vector<int> columns;
+  std::vector<double> held_out_gain;
+};
+
+Taken take_columns(const SignatureRows& rows, const Evidence& evidence, const std::vector<int>& fold, int count,
+                   double false_alarm_rate) {
+  Taken taken;
+  while (taken.columns.size() < most_terms) {
+    const int column = best_column(evidence, count, taken.columns, false_alarm_rate);
+    if (column < 0) {
+      break;
+    }
+    std::vector<int> with = taken.columns;
+    with.push_back(column);
+    const double gain = held_out_gain(rows.columns, rows.residual, fold, with, taken.columns);
+    if (gain <= 0.0 || !sensible(evidence.fit(with), with)) {
+      break;
+    }
+    taken.columns = std::move(with);
+    taken.held_out_gain.push_back(gain);
+  }
+  return taken;
+}
+
+}  // namespace
+
 EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& d, double false_alarm_rate) {
   const std::vector<Effect> all = functions(data);
   std::vector<Candidate> candidates;
@@ -163,35 +193,20 @@ EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& 
   for (const double t : rows.time_s) {
     fold.push_back(static_cast<int>(context.segment_at(t)));
   }
+  const Taken taken = take_columns(rows, evidence, fold, pass.count(), false_alarm_rate);
   EmpiricalDescription result;
-  std::vector<int> chosen;
-  while (chosen.size() < most_terms) {
-    const int column = best_column(evidence, pass.count(), chosen, false_alarm_rate);
-    if (column < 0) {
-      break;
-    }
-    std::vector<int> with = chosen;
-    with.push_back(column);
-    const double gain = held_out_gain(rows.columns, rows.residual, fold, with, chosen);
-    if (gain <= 0.0 || !sensible(evidence.fit(with), with)) {
-      break;
-    }
-    chosen = with;
-    const auto axis = static_cast<std::size_t>(column % axes);
-    const Effect& effect = all[static_cast<std::size_t>(column / axes)];
-    result.terms.push_back({axis_ids[axis], effect.id, effect.parameters[axis].unit, 0.0, 0.0, gain});
-    result.held_out_gain += gain;
-  }
-  if (chosen.empty()) {
+  if (taken.columns.empty()) {
     return result;
   }
-  const Fit fit = evidence.fit(chosen);
-  for (std::size_t k = 0; k < chosen.size(); ++k) {
+  const Fit fit = evidence.fit(taken.columns);
+  for (std::size_t k = 0; k < taken.columns.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    const EffectParameter& p =
-        all[static_cast<std::size_t>(chosen[k] / axes)].parameters[static_cast<std::size_t>(chosen[k] % axes)];
-    result.terms[k].value = fit.value(at) * p.typical;
-    result.terms[k].sigma = std::sqrt(fit.covariance(at, at)) * p.typical;
+    const auto axis = static_cast<std::size_t>(taken.columns[k] % axes);
+    const Effect& effect = all[static_cast<std::size_t>(taken.columns[k] / axes)];
+    const EffectParameter& p = effect.parameters[axis];
+    result.terms.push_back({axis_ids[axis], effect.id, p.unit, fit.value(at) * p.typical,
+                            std::sqrt(fit.covariance(at, at)) * p.typical, taken.held_out_gain[k]});
+    result.held_out_gain += taken.held_out_gain[k];
   }
   result.share = std::min(1.0, fit.gain / std::max(1.0, evidence.square - evidence.rows));
   return result;

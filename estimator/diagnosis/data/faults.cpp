@@ -55,30 +55,42 @@ double repeats_by_chance(const ImuData& data) {
 // Zero increments never come by chance: gravity is always there. Repeated ones do, where the quantum is coarse: their
 // number is held against what the quantum and the correlation from sample to sample make likely, and so is the length of a
 // run.
-void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
-  constexpr Triple zero{};
+// What a recording shows of samples that were lost.
+struct Losses {
   DataFault zeros{"lost_samples", {}, 0, 0}, repeats{"lost_samples", {}, 0, 0}, gaps{"lost_samples", {}, 0, 0};
-  std::size_t by_chance = 0, run = 0, longest = 0, longest_first = 0;
+  std::size_t by_chance = 0;                   // samples like the last but one
+  std::size_t longest = 0, longest_first = 0;  // samples in a row that repeat the one before
   double missing = 0.0;
+};
+
+Losses count_losses(const ImuData& data) {
+  constexpr Triple zero{};
+  Losses l;
+  std::size_t run = 0;
   for (std::size_t i = 0; i < data.size(); ++i) {
     if (data.delta_v[i] == zero) {
-      note(zeros, i);
+      note(l.zeros, i);
     } else if (i > 0 && same(data, i, i - 1)) {
-      note(repeats, i);
+      note(l.repeats, i);
     } else if (i > 1 && same(data, i, i - 2)) {
-      ++by_chance;
+      ++l.by_chance;
     }
     run = i > 0 && same(data, i, i - 1) ? run + 1 : 0;
-    if (run > longest) {
-      longest = run;
-      longest_first = i + 1 - run;
+    if (run > l.longest) {
+      l.longest = run;
+      l.longest_first = i + 1 - run;
     }
     const double steps = i > 0 ? (data.time_s[i] - data.time_s[i - 1]) * data.sample_rate_hz : 1.0;
     if (steps > 1.5) {
-      note(gaps, i);
-      missing += steps - 1.0;
+      note(l.gaps, i);
+      l.missing += steps - 1.0;
     }
   }
+  return l;
+}
+
+void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
+  auto [zeros, repeats, gaps, by_chance, longest, longest_first, missing] = count_losses(data);
   const double chance = std::max(static_cast<double>(by_chance), repeats_by_chance(data));
   const double excess = static_cast<double>(repeats.count) - chance;
   if (zeros.count > 0) {
@@ -141,40 +153,43 @@ double usual_step(std::size_t samples, const Value& value) {
 
 // An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds where they hardly turn; if the
 // rest of the dwell turns them by more than a few counts in that time, they were stuck. Accelerometers never rest.
-void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+// Adds the stretches of a segment in which an axis gives one value for longer than it can. `count`: its usual step.
+template <typename Value>
+void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, const Value& value, DataFault& fault) {
   constexpr double gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7;
+  const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
+  const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
+  double sum = 0.0;
+  for (std::size_t i = first; i < last; ++i) {
+    sum += value(i);
+  }
+  const auto n = static_cast<double>(last - first);
+  std::size_t start = first;
+  for (std::size_t i = first + 1; i <= last; ++i) {
+    if (i < last && value(i) == value(start)) {
+      continue;
+    }
+    const auto length = static_cast<double>(i - start);
+    const double length_s = length / data.sample_rate_hz;
+    const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
+    const bool left_behind =
+        gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s && std::abs(turned) > counts * count;
+    if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
+      fault.first_sample = fault.count == 0 ? start : fault.first_sample;
+      fault.count += i - start;
+    }
+    start = i;
+  }
+}
+
+void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const bool gyro = axis < 3;
     const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
     const double count = usual_step(data.size(), value);
-    const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
     DataFault fault{"frozen_axis", {}, 0, 0};
-    const auto stuck = [&](std::size_t first, std::size_t last) {
-      fault.first_sample = fault.count == 0 ? first : fault.first_sample;
-      fault.count += last - first;
-    };
     for (const Segment& s : segments) {
-      const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
-      double sum = 0.0;
-      for (std::size_t i = first; i < last; ++i) {
-        sum += value(i);
-      }
-      const auto n = static_cast<double>(last - first);
-      std::size_t start = first;
-      for (std::size_t i = first + 1; i <= last; ++i) {
-        if (i < last && value(i) == value(start)) {
-          continue;
-        }
-        const auto length = static_cast<double>(i - start);
-        const double length_s = length / data.sample_rate_hz;
-        const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
-        const bool left_behind = gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s &&
-                                 std::abs(turned) > counts * count;
-        if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
-          stuck(start, i);
-        }
-        start = i;
-      }
+      find_stuck(data, s, gyro, count, value, fault);
     }
     if (fault.count > 0) {
       fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +

@@ -277,6 +277,21 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool li
 
 }  // namespace
 
+namespace {
+
+// Names of the gyros' effects, one after the other; half of the false-alarm rate is theirs.
+void name_gyro_effects(Gyros& gyros, double alpha, PoseDiagnosis& d) {
+  d.gyro_held_out_rms = gyros.held_out_rms();
+  d.gyro_tried = gyros.try_all({});
+  for (std::vector<PoseEffect> left = d.gyro_tried; !left.empty() && left.front().log_p < std::log(0.5 * alpha);) {
+    gyros.keep(left.front());
+    d.gyro_named.push_back(left.front());
+    left = gyros.try_all(d.gyro_named);
+  }
+}
+
+}  // namespace
+
 PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   PoseDiagnosis d;
   if (input.time_s.size() < 100 || input.gyro.size() != input.time_s.size() ||
@@ -304,13 +319,7 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   judge_accelerometers(accel, poses, duration, 0.5 * alpha, d);
 
   Gyros gyros(poses, duration);
-  d.gyro_held_out_rms = gyros.held_out_rms();
-  d.gyro_tried = gyros.try_all({});
-  for (std::vector<PoseEffect> left = d.gyro_tried; !left.empty() && left.front().log_p < std::log(0.5 * alpha);) {
-    gyros.keep(left.front());
-    d.gyro_named.push_back(left.front());
-    left = gyros.try_all(d.gyro_named);
-  }
+  name_gyro_effects(gyros, alpha, d);
   judge_turns(input, poses, false, d.direction_before, d.direction_before_held_out);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });

@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "estimator/diagnosis/search/averaging.hpp"
 
@@ -154,28 +155,34 @@ class Averaging {
   }
 
   // `p` in the place of term i, the others as they are.
-  Explanation explain(std::size_t i, const Part& p, bool full) const {
+  Part design(std::size_t i, const Part& p) const {
     std::vector<const Part*> all = {&p};
     for (std::size_t j = 0; j < current_.size(); ++j) {
       if (j != i) {
         all.push_back(&current_[j]);
       }
     }
-    std::vector<int> columns;
+    Part whole;
     Eigen::Index size = 0;
     for (const Part* q : all) {
-      columns.insert(columns.end(), q->columns.begin(), q->columns.end());
+      whole.columns.insert(whole.columns.end(), q->columns.begin(), q->columns.end());
       size += q->T.cols();
     }
-    Eigen::MatrixXd T = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(columns.size()), size);
-    Eigen::VectorXd sigma(size);
+    whole.T = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(whole.columns.size()), size);
+    whole.sigma.resize(size);
     Eigen::Index row = 0, col = 0;
     for (const Part* q : all) {
-      T.block(row, col, q->T.rows(), q->T.cols()) = q->T;
-      sigma.segment(col, q->T.cols()) = q->sigma;
+      whole.T.block(row, col, q->T.rows(), q->T.cols()) = q->T;
+      whole.sigma.segment(col, q->T.cols()) = q->sigma;
       row += q->T.rows();
       col += q->T.cols();
     }
+    return whole;
+  }
+
+  Explanation explain(std::size_t i, const Part& p, bool full) const {
+    const Part whole = design(i, p);
+    const auto& [columns, T, sigma] = std::tie(whole.columns, whole.T, whole.sigma);
     // In units of the prior's sigma A is I + H. H has no negative eigenvalue but by rounding, which is large beside 1 where
     // some direction is known a billion times better than others.
     const Eigen::MatrixXd H =

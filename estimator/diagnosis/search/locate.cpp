@@ -110,6 +110,36 @@ double square_within(const Evidence& e, const std::vector<int>& place, const std
   return named.empty() ? 0.0 : fit_columns(e.information(place, place), e.information(place, named) * size).gain;
 }
 
+namespace {
+
+// Of a series less its mean, bins 1 to n/2 - 1: squares over n.
+std::vector<double> periodogram(const Eigen::VectorXd& series) {
+  Eigen::VectorXcd spectrum;
+  Eigen::FFT<double> fft;
+  fft.fwd(spectrum, series);
+  std::vector<double> power;
+  for (Eigen::Index k = 1; k <= series.size() / 2 - 1; ++k) {
+    power.push_back(std::norm(spectrum(k)) / static_cast<double>(series.size()));
+  }
+  return power;
+}
+
+// Mean of the bins around k but for k's own and its neighbours. Coloured misfit is no line: a peak stands against its neighbours.
+double around(const std::vector<double>& power, Eigen::Index k) {
+  constexpr Eigen::Index half = 24, own = 2;
+  double sum = 0.0;
+  int count = 0;
+  for (Eigen::Index j = std::max<Eigen::Index>(0, k - half); j <= std::min(std::ssize(power) - 1, k + half); ++j) {
+    if (std::abs(j - k) > own) {
+      sum += power[static_cast<std::size_t>(j)];
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+}  // namespace
+
 std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double interval_s) {
   std::vector<InnovationLine> lines;
   const Eigen::Index epochs = rows.residual.size() / 3;
@@ -120,28 +150,12 @@ std::vector<InnovationLine> innovation_lines(const SignatureRows& rows, double i
     }
     series.array() -= series.mean();
     const double variance = series.squaredNorm() / static_cast<double>(epochs);
-    Eigen::VectorXcd spectrum;
-    Eigen::FFT<double> fft;
-    fft.fwd(spectrum, series);
-    const Eigen::Index bins = epochs / 2 - 1;
-    std::vector<double> power;
-    for (Eigen::Index k = 1; k <= bins; ++k) {
-      power.push_back(std::norm(spectrum(k)) / static_cast<double>(epochs));
-    }
-    // Coloured misfit is no line: a peak stands against its neighbours.
-    const Eigen::Index half = 24;
+    const std::vector<double> power = periodogram(series);
+    const Eigen::Index bins = std::ssize(power);
     double best = 0.0;
     Eigen::Index at = 0;
     for (Eigen::Index k = 0; k < bins; ++k) {
-      double around = 0.0;
-      int count = 0;
-      for (Eigen::Index j = std::max<Eigen::Index>(0, k - half); j <= std::min(bins - 1, k + half); ++j) {
-        if (std::abs(j - k) > 2) {
-          around += power[static_cast<std::size_t>(j)];
-          ++count;
-        }
-      }
-      const double ratio = power[static_cast<std::size_t>(k)] / std::max(around / count, 0.05 * variance);
+      const double ratio = power[static_cast<std::size_t>(k)] / std::max(around(power, k), 0.05 * variance);
       if (ratio > best && k > 5) {  // slower than five periods is drift
         best = ratio;
         at = k;
