@@ -73,6 +73,7 @@ std::string byte_picture(const Layout& layout) {
   for (std::size_t k = 0; k < std::min(bytes, row_bytes); ++k) {
     text += fmt::format(" {:^{}}", fmt::format("+{}", k), cell - 1);
   }
+  text.erase(text.find_last_not_of(' ') + 1);
   text += '\n';
   std::string before;
   bool told = false;
