@@ -16,6 +16,8 @@
 #include "protocol/ins_interface/record_fields.hpp"
 #include "protocol/ins_interface/status.hpp"
 #include "protocol/isotp/transport.hpp"
+#include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/roles.hpp"
 #include "protocol/uds/client.hpp"
 #include "protocol/uds/server.hpp"
 #include "sim_ins/config.hpp"
@@ -239,6 +241,72 @@ parameter counts as determined where nothing else is configured. [Frames and sig
   return text;
 }
 
+std::string fields_table(const profile::RecordRole& role) {
+  std::string text = "| field | unit here | needed | meaning |\n|---|---|---|---|\n";
+  for (const profile::RoleField& f : role.fields) {
+    std::string meaning(f.meaning);
+    if (!f.words.empty()) {
+      meaning += fmt::format(": `codes` for {}", fmt::join(f.words, ", "));
+    }
+    text += fmt::format("| {}`{}`{} | {} | {} | {} |\n", f.repeated ? "each: " : "", f.name,
+                        f.count > 1 ? fmt::format(" x {}", f.count) : "", f.text ? "text" : f.unit,
+                        f.needed ? "yes" : "", meaning);
+  }
+  return text + "\n";
+}
+
+std::string profile_page() {
+  std::string text = "# Profile\n\n" + made_from("protocol/profile/roles");
+  text +=
+      R"(What an INS speaks, in TOML. [Your INS in an hour](your-ins.md) shows how one is made, `selfcal device lint` tells what is wrong with
+it, and `config/profiles` holds two. Unknown keys are faults.
+
+| table | keys |
+|---|---|
+| | `name`; `byte_order` big or little, of every number that says nothing else |
+| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
+| `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
+| `session` | `calibration`: the session in which it writes, 3 where it is left out |
+| `security` | `method` aes-cmac or none; `level` of requestSeed, odd |
+| `identity` | `serial`, `software`: data identifiers of ASCII |
+| `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
+| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record |
+| `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
+| `upload` | `address` page or byte; `address_bytes`, `size_bytes` |
+| `page` | a record |
+| `axes` | `imu`, `gimbal`: ours, in the INS's words, `-` for the other way round |
+
+## A record
+
+| key | is |
+|---|---|
+| `bytes` | of the whole record; left out where it is as long as its repetitions |
+| `fill` | bytes that no field has, 0 where it is left out |
+| `fields.NAME` | one field |
+| `each.at`, `each.stride`, `each.count`, `each.most` | what is repeated: its first byte, its length, the field that counts it, how many there can be |
+| `each.fields.NAME` | a field of each repetition, `at` from its beginning |
+| `checksum` | `at`, `type`, `algorithm` crc32c, crc32 or crc16, `from`, `to`: bytes from `from` to `to` - 1, its own as 0 |
+| `given` | numbers that the INS does not tell because they are always the same |
+
+A field: `at` (byte, from 0), `type` (u8 u16 u24 u32 u64 i8 i16 i24 i32 i64 f32 f64, ascii with `length`), `count` (elements, one behind
+the other), `byte_order`, `first_bit` and `bits` (part of an unsigned integer, 0 the lowest), `scale`, `offset` (value = number times
+`scale` plus `offset`, in `unit`), `codes` (words to numbers), `constant` (always this; then any name will do).
+
+)";
+  std::string known;
+  for (const profile::Unit& unit : profile::units()) {
+    if (!unit.name.empty()) {
+      known += fmt::format("{}{}", known.empty() ? "" : ", ", unit.name);
+    }
+  }
+  text += fmt::format("Units: {}. A field without one has the unit of its role.\n\n", known);
+  for (const profile::RecordRole& role : profile::record_roles()) {
+    text += fmt::format("## {}\n\n{}{}.\n\n", role.table, role.meaning, role.needed ? "" : "; may be left out");
+    text += fields_table(role.table == profile::set_role().table ? profile::set_role() : role);
+  }
+  return text.substr(0, text.size() - 1);
+}
+
 bool write(const std::string& folder, const char* file, const std::string& text) {
   std::ofstream out(folder + "/" + file);
   out << text;
@@ -258,6 +326,6 @@ int main(int argc, char** argv) {
   }
   const bool well = write(argv[1], "effects.md", effects_page()) &&
                     write(argv[1], "ins-interface.md", interface_page()) &&
-                    write(argv[1], "parameters.md", parameters_page());
+                    write(argv[1], "parameters.md", parameters_page()) && write(argv[1], "profile.md", profile_page());
   return well ? 0 : 3;
 }
