@@ -109,6 +109,7 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
     StartRequest request;
     request.ins = ins;
     request.schedule = take<std::string>(options, "schedule", "");
+    request.schedule_toml = take<std::string>(options, "schedule_toml", "");
     request.dry_run = take(options, "dry_run", false);
     request.stop_when_met = take(options, "stop_when_met", false);
     request.force_reason = take<std::string>(options, "force", "");
@@ -120,6 +121,9 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
     Entries options = given;
     AmendRequest request;
     request.run = static_cast<RunId>(run);
+    for (const std::uint64_t other : take(options, "with", std::vector<std::uint64_t>())) {
+      request.with.push_back(static_cast<RunId>(other));
+    }
     request.dry_run = take(options, "dry_run", false);
     request.force_reason = take<std::string>(options, "force", "");
     refuse_others(options);

@@ -15,6 +15,7 @@ namespace selfcal {
 // A run's recording is to be estimated again, with the physics that the diagnosis names in it.
 struct AmendRequest {
   RunId run = 0;
+  std::vector<RunId> with;  // runs of the same INS whose recordings are looked at together with it
   bool dry_run = false;
   std::string force_reason;
   std::string user;
@@ -22,7 +23,8 @@ struct AmendRequest {
 
 struct StartRequest {
   std::string ins;
-  std::string schedule;  // empty: the configured one
+  std::string schedule;       // empty: the configured one
+  std::string schedule_toml;  // instead: the text of a schedule file, which the service keeps
   bool dry_run = false;
   bool stop_when_met = false;
   std::string force_reason;

@@ -61,6 +61,9 @@ class Service : public Operations, public RunObserver {
   Granted<RunId> launch(Session& session, RunRecord record, const std::string& schedule_name);
   Expected<void> attach(Session& session, RunRecord record, const std::string& schedule_name);
   std::filesystem::path run_folder(RunId run) const;
+  Granted<RunRecord> recorded_run(RunId id) const;
+  Granted<Done> check_together(const RunRecord& amended, const std::vector<RunId>& with) const;
+  Granted<std::filesystem::path> keep_schedule(const std::string& toml) const;
   Session* session(const std::string& ins);
   const Session* session(const std::string& ins) const;
 

@@ -1,6 +1,8 @@
 // What operators may ask of the service (operator_service.hpp).
 #include <fmt/format.h>
 
+#include <set>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -13,8 +15,10 @@
 #include "daemon/store/recording_store.hpp"
 #include "daemon/store/run_documents.hpp"
 #include "protocol/can/link.hpp"
+#include "protocol/flash/crc32c.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/operator_api/names.hpp"
+#include "protocol/recording/atomic_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
 
 namespace selfcal {
@@ -23,6 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t mebibyte = 1 << 20;
+constexpr std::size_t longest_schedule = 64 * 1024;  // bytes; 255 positions are some 10 KiB
+constexpr std::size_t most_together =
+    7;  // beside the one amended: time and memory of the search grow with their number
 // A request keeps a session alive for S3, 5 s: one that a run or another tester left behind must be able to end.
 constexpr auto between_questions = std::chrono::seconds(6);
 
@@ -124,24 +131,88 @@ Granted<RunId> Service::start(const StartRequest& request) {
   record.dry_run = request.dry_run;
   record.force_reason = request.force_reason;
   record.stop_when_met = request.stop_when_met;
+  if (!request.schedule_toml.empty()) {
+    const auto kept = keep_schedule(request.schedule_toml);
+    return kept ? launch(*chosen, record, kept->string()) : Granted<RunId>(tl::unexpected(kept.error()));
+  }
   return launch(*chosen, record, request.schedule.empty() ? chosen->config.schedule : request.schedule);
 }
 
-Granted<RunId> Service::amend(const AmendRequest& request) {
-  const auto found = store_->run(request.run);
+// Named by what is in it, so that a run which is taken up again after a restart finds its own.
+Granted<fs::path> Service::keep_schedule(const std::string& toml) const {
+  if (toml.size() > longest_schedule) {
+    return refuse(operator_api::error_unknown,
+                  fmt::format("schedule_toml: {} bytes, {} at most", toml.size(), longest_schedule));
+  }
+  if (const auto schedule = parse_schedule(toml, "schedule_toml"); !schedule) {
+    return refuse(operator_api::error_unknown, schedule.error().message);
+  }
+  const fs::path folder = fs::path(config_.state_directory) / "schedules";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    return refuse(operator_api::error_unavailable, fmt::format("{}: {}", folder.string(), error.message()));
+  }
+  const auto bytes = std::span(reinterpret_cast<const std::uint8_t*>(toml.data()), toml.size());
+  fs::path file = folder / fmt::format("{:08x}-{}.toml", flash::crc32c(bytes), toml.size());
+  if (const auto written = write_file_atomically(file.string(), toml); !written) {
+    return unavailable(written.error());
+  }
+  return file;
+}
+
+// A run that is over and has its recording.
+Granted<RunRecord> Service::recorded_run(RunId id) const {
+  const auto found = store_->run(id);
   if (!found) {
     return unavailable(found.error());
   }
   if (!*found) {
-    return refuse(operator_api::error_unknown, fmt::format("no run {}", request.run));
+    return refuse(operator_api::error_unknown, fmt::format("no run {}", id));
   }
-  const RunRecord& amended = **found;
-  if (!is_final(amended.state)) {
-    return refuse(operator_api::error_nothing,
-                  fmt::format("run {} has not ended: {}", amended.id, words(amended.state)));
+  if (!is_final((*found)->state)) {
+    return refuse(operator_api::error_nothing, fmt::format("run {} has not ended: {}", id, words((*found)->state)));
   }
-  if (amended.recording.empty()) {
-    return refuse(operator_api::error_nothing, fmt::format("run {} has no recording (any more)", amended.id));
+  if ((*found)->recording.empty()) {
+    return refuse(operator_api::error_nothing, fmt::format("run {} has no recording (any more)", id));
+  }
+  return **found;
+}
+
+// The same recording twice would count its noise as a second witness: an amendment's is that of the run that it amends.
+Granted<Done> Service::check_together(const RunRecord& amended, const std::vector<RunId>& with) const {
+  if (with.size() > most_together) {
+    return refuse(operator_api::error_unknown, fmt::format("{} further runs, {} at most", with.size(), most_together));
+  }
+  std::set<RunId> known = {amended.id};
+  for (const RunId id : with) {
+    const auto other = recorded_run(id);
+    if (!other) {
+      return tl::unexpected(other.error());
+    }
+    if (other->serial != amended.serial) {
+      return refuse(operator_api::error_unknown, fmt::format("run {} is of INS {}, run {} of INS {}", id, other->serial,
+                                                             amended.id, amended.serial));
+    }
+    if (other->amends != 0 || other->rollback) {
+      return refuse(operator_api::error_nothing,
+                    fmt::format("run {} turned no gimbal: it has no recording of its own", id));
+    }
+    if (!known.insert(id).second) {
+      return refuse(operator_api::error_unknown, fmt::format("run {} is given twice", id));
+    }
+  }
+  return Done{};
+}
+
+Granted<RunId> Service::amend(const AmendRequest& request) {
+  const auto found = recorded_run(request.run);
+  if (!found) {
+    return tl::unexpected(found.error());
+  }
+  const RunRecord& amended = *found;
+  if (const auto together = check_together(amended, request.with); !together) {
+    return tl::unexpected(together.error());
   }
   const auto runs = store_->runs_of_serial(amended.serial);
   if (!runs) {
@@ -162,6 +233,7 @@ Granted<RunId> Service::amend(const AmendRequest& request) {
   record.user = request.user;
   record.serial = amended.serial;
   record.amends = amended.id;
+  record.amends_with = request.with;
   record.dry_run = request.dry_run;
   record.force_reason = request.force_reason;
   return launch(*chosen, record, chosen->config.schedule);

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
@@ -12,6 +14,7 @@
 #include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/result_json.hpp"
+#include "daemon/estimate/showing_schedule.hpp"
 #include "estimator/passes/consistency.hpp"
 
 namespace selfcal {
@@ -69,54 +72,154 @@ std::string story(const diagnosis::Finding& finding) {
   return text;
 }
 
-Expected<Estimate> run_amendment(const AmendmentRequest& request, const EstimateProgress& progress,
-                                 const std::stop_token& stop) {
-  const auto begun = std::chrono::steady_clock::now();
-  const auto loaded = read_kept_recording(request.recording);
+// The 24 with laws that several recordings confirm.
+CalibrationResult result_with_laws(const diagnosis::Diagnosis& diagnosis, const BeyondAnswer& beyond,
+                                   const CalibrationOptions& options) {
+  CalibrationResult result = diagnosis.calibration;
+  result.value = beyond.average.parameters.front();
+  result.covariance = beyond.average.covariance.front();
+  result.sigma = result.covariance.diagonal().cwiseSqrt();
+  judge_parameters(result, options.tolerance);
+  Consistency& consistency = result.consistency;
+  consistency.verdict = Verdict::consistent;
+  consistency.nis_mean = 1.0 + beyond.found.misfit_after / std::max(1.0, beyond.found.rows);
+  consistency.words =
+      fmt::format("With what {} recordings show beyond the catalogue fitted too they and the model agree: {}.",
+                  beyond.found.fit.recordings.size(), discovered_figures(beyond.found));
+  return result;
+}
+
+// A recording with all that is made of it; stays where it is, for the view points into it.
+struct Taken {
+  document::InputFile file;
+  LoadedRecording loaded;
+  std::vector<double> first_temperature;
+  ImuData data;
+  diagnosis::Diagnosis diagnosis;
+};
+
+Expected<std::unique_ptr<Taken>> take(const KeptRecording& kept, const diagnosis::DiagnosisOptions& options,
+                                      const std::function<void()>& progress) {
+  auto loaded = read_kept_recording(kept.file);
   if (!loaded) {
     return tl::unexpected(loaded.error());
   }
-  if (auto kept = keep_copy(request.recording, recording_path(request.folder)); !kept) {
-    return tl::unexpected(kept.error());
+  auto file = document::identify_file(kept.file.string());
+  if (!file) {
+    return tl::unexpected(file.error());
   }
-  std::vector<double> first_temperature;
-  const ImuData data = imu_view(loaded->recording, first_temperature);
+  auto taken = std::make_unique<Taken>();
+  taken->file = std::move(*file);
+  taken->loaded = std::move(*loaded);
+  taken->data = imu_view(taken->loaded.recording, taken->first_temperature);
+  diagnosis::DiagnosisOutcome outcome =
+      diagnosis::diagnose(taken->data, options, [&](const std::string&) { progress(); });
+  if (!outcome.diagnosis) {
+    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", kept.run, outcome.failure));
+  }
+  taken->diagnosis = std::move(*outcome.diagnosis);
+  return taken;
+}
+
+// A second recording where the first shows something and no law to be told from others: between the positions of the first, in
+// about its time.
+discovery::NextExperiment second_look(const Schedule& done) {
+  constexpr double least_dwell_s = 40.0;
+  discovery::NextExperiment next;
+  next.schedule = dwells_between(done).schedule;
+  const double shorter = done.duration_s() / next.schedule.duration_s();
+  for (double& dwell : next.schedule.dwell_s) {
+    dwell = std::max(least_dwell_s, std::round(shorter * dwell));
+  }
+  return next;
+}
+
+// Nothing where there is one recording and the catalogue explains it.
+Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& request,
+                                                  const std::vector<std::unique_ptr<Taken>>& taken,
+                                                  const std::function<void()>& progress, const std::stop_token& stop) {
+  if (!taken.front()->diagnosis.faults.empty() || (taken.size() == 1 && !taken.front()->diagnosis.unexplained)) {
+    return std::nullopt;
+  }
+  std::vector<DiagnosedFile> files;
+  for (const auto& t : taken) {
+    files.push_back({t->file, t->data, t->diagnosis});
+  }
+  const auto rest = discovery::UnexplainedRest::of(recordings_of(files), stop);
+  if (!rest) {
+    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, rest.error()));
+  }
+  discovery::DiscoveryOptions options;
+  options.stop = stop;
+  BeyondAnswer answer;
+  answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
+  if (files.size() > 1) {
+    answer.together = put_together(files, *rest, answer.found);
+  }
+  answer.average = discovery::average_over_classes(rest->recordings(), answer.found, 8, stop);
+  progress();
+  discovery::ExperimentLimits limits;
+  limits.rotation_s = request.config.rotation_s;
+  answer.next = plan_next(rest->recordings(), answer.found, limits, stop);
+  if (!answer.next && taken.size() == 1) {
+    answer.next = second_look(schedule_of(taken.front()->loaded.recording, taken.front()->data));
+  }
+  return answer;
+}
+
+Expected<Estimate> run_amendment(const AmendmentRequest& request, const EstimateProgress& progress,
+                                 const std::stop_token& stop) {
+  const auto begun = std::chrono::steady_clock::now();
   diagnosis::DiagnosisOptions options;
   options.calibration = calibration_options(request.config);
   options.stop = stop;
   CalibrationProgress step;
   step.value.setZero();  // the diagnosis has no estimate to show on its way
   step.sigma.setZero();
-  diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, options, [&](const std::string&) {
+  const auto report = [&] {
     ++step.pass;
     progress(step);
-  });
-  if (!outcome.diagnosis) {
-    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends, outcome.failure));
+  };
+  std::vector<std::unique_ptr<Taken>> taken;
+  std::vector<KeptRecording> all = {request.amends};
+  all.insert(all.end(), request.with.begin(), request.with.end());
+  for (const KeptRecording& kept : all) {
+    auto one = take(kept, options, report);
+    if (!one) {
+      return tl::unexpected(one.error());
+    }
+    if (!taken.empty() && !(*one)->diagnosis.faults.empty()) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("data fault in run {}: {}", kept.run, (*one)->diagnosis.faults.front().words));
+    }
+    taken.push_back(std::move(*one));
   }
-  outcome.diagnosis->calibration.elapsed_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  std::optional<discovery::Discovery> beyond;
-  if (outcome.diagnosis->unexplained) {
-    beyond = search_beyond(data, *outcome.diagnosis, {}, stop);
+  if (auto kept = keep_copy(request.amends.file, recording_path(request.folder)); !kept) {
+    return tl::unexpected(kept.error());
   }
-  Estimate estimate = amended_estimate(*outcome.diagnosis, request, loaded->recording, std::move(beyond));
-  estimate.warnings = loaded->warnings;
+  diagnosis::Diagnosis& diagnosis = taken.front()->diagnosis;
+  auto beyond = look_beyond(request, taken, report, stop);
+  if (!beyond) {
+    return tl::unexpected(beyond.error());
+  }
+  diagnosis.calibration.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  Estimate estimate = amended_estimate(diagnosis, request, taken.front()->loaded.recording, std::move(*beyond));
+  estimate.warnings = taken.front()->loaded.warnings;
   return estimate;
 }
 
 }  // namespace
 
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording, std::optional<discovery::Discovery> beyond) {
+                          const Recording& recording, std::optional<BeyondAnswer> beyond) {
   const CalibrationOptions options = calibration_options(request.config);
+  const discovery::Discovery* found = beyond ? &beyond->found : nullptr;
   Estimate estimate;
   JudgedResult judged;
-  judged.result = amended_result(diagnosis, options);
+  judged.result = confirmed(found) ? result_with_laws(diagnosis, *beyond, options) : amended_result(diagnosis, options);
   judged.diagnosis = diagnosis;
-  judged.beyond = std::move(beyond);
-  const discovery::Discovery* found = judged.beyond ? &*judged.beyond : nullptr;
-  judged.gate = judge_amended(judged.result, options.tolerance, request.config.limit, diagnosis, request.amends, found);
+  judged.gate =
+      judge_amended(judged.result, options.tolerance, request.config.limit, diagnosis, request.amends.run, found);
   estimate.recording = recording_path(request.folder).string();
   judged.summary = summary_of_amended(judged.result, judged.gate, {estimate.recording, 0}, diagnosis, found);
   estimate.result = judged.result;
@@ -124,8 +227,20 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
   for (const diagnosis::Finding& finding : diagnosis.findings) {
     estimate.notes.push_back(story(finding));
   }
+  if (explains(found)) {
+    estimate.notes.push_back(discovered_figures(*found));
+  }
+  if (beyond) {
+    judged.beyond = beyond->found;
+  }
   nlohmann::ordered_json document = result_json(judged, options, recording, {});
-  document["amends"] = request.amends;
+  document["amends"] = request.amends.run;
+  if (beyond && beyond->together) {
+    document["together"] = together_json(*beyond->together);
+  }
+  if (beyond) {
+    add_next_experiment(document, beyond->next);
+  }
   estimate.result_json = document.dump();
   return estimate;
 }

@@ -3,29 +3,48 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "daemon/estimate/estimate_worker.hpp"
+#include "daemon/estimate/unit_answer.hpp"
 #include "daemon/store/run_store.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/discovery.hpp"
 
 namespace selfcal {
 
+// A run's recording.
+struct KeptRecording {
+  RunId run = 0;
+  std::filesystem::path file;
+};
+
 struct AmendmentRequest {
-  RunId amends = 0;                 // the run whose recording it is
-  std::filesystem::path recording;  // of that run
+  KeptRecording amends;
+  std::vector<KeptRecording> with;  // of further runs of the same INS: the search for laws looks at all of them
   std::filesystem::path folder;     // of this run; gets a recording of its own (a link, where the disk can)
   InsConfig config;
 };
 
+// What the search for laws says, in one recording or in several of the unit.
+struct BeyondAnswer {
+  discovery::Discovery found;
+  std::optional<Together> together;  // several
+  discovery::ClassAverage average;   // the 24 over all laws that the recordings leave open
+  std::optional<discovery::NextExperiment> next;
+};
+
 // The answer holds the 24 as fitted together with what was named, with their sigma; it is consistent where what
-// remains passes the diagnosis's tests. Its document is that of `selfcal estimate --json` with "amends" (the run) and
-// "diagnosis" (as `selfcal diagnose --json`).
+// remains passes the diagnosis's tests. Where the catalogue leaves something, in this recording or in one of `with`, laws are
+// searched for; those that hold in two recordings and more and leave noise (`confirmed`) are fitted too, and sigma holds what the 24
+// differ by between all laws that are left open. Its document is that of `selfcal estimate --json` with "amends" (the run),
+// "diagnosis" (as `selfcal diagnose --json`), "together" and "next_experiment".
 EstimateJob amendment_job(AmendmentRequest request);
 
 // The same without files: what an amendment may not be written for comes first among the objections.
-// `beyond`: what was found where the catalogue explains nothing.
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording, std::optional<discovery::Discovery> beyond = std::nullopt);
+                          const Recording& recording, std::optional<BeyondAnswer> beyond = std::nullopt);
 
 }  // namespace selfcal

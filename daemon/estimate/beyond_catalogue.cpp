@@ -72,6 +72,21 @@ bool explains(const Discovery* found) {
   return any && (leaves_noise(*found) || explained_share(*found) >= most);
 }
 
+bool confirmed(const Discovery* found) {
+  return found != nullptr && found->fit.recordings.size() > 1 && !found->laws.empty() && found->processes.empty() &&
+         leaves_noise(*found);
+}
+
+diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
+  if (diagnosis.unexplained && explains(found) && !found->laws.empty() && found->processes.empty()) {
+    const discovery::FittedRecording& fitted = found->fit.recordings.front();
+    diagnosis.value = diagnosis.value_as_named = fitted.parameters;
+    diagnosis.covariance = fitted.covariance;
+    diagnosis.sigma = fitted.covariance.diagonal().cwiseSqrt();
+  }
+  return diagnosis;
+}
+
 std::string discovered_words(const Discovery& found) {
   std::vector<std::string> all;
   for (const DiscoveredLaw& law : found.laws) {

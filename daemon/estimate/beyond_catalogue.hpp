@@ -23,6 +23,14 @@ double explained_share(const discovery::Discovery& found);
 // Laws or processes were found that take away all but a tenth of the misfit, or leave noise.
 bool explains(const discovery::Discovery* found);
 
+// Laws that hold in two recordings and more of a unit, with one coefficient and one set of constants, and leave noise: what may
+// stand behind a set that is written.
+bool confirmed(const discovery::Discovery* found);
+
+// The diagnosis with the 24 as fitted with the laws, where laws explain what the catalogue leaves: those of the catalogue's
+// rejected names correct nothing.
+diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
+
 // "accel_y and accel_z take a new offset at each turn"; empty where nothing was found.
 std::string discovered_words(const discovery::Discovery& found);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"

@@ -101,8 +101,9 @@ std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
   return {};
 }
 
-ordered_json diagnosis_json(const diagnosis::Diagnosis& d, double false_alarm_rate, const document::InputFile& input,
-                            const discovery::Discovery* beyond) {
+ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_alarm_rate,
+                            const document::InputFile& input, const discovery::Discovery* beyond) {
+  const auto d = with_laws(diagnosis, beyond);
   ordered_json j = document::head(document::diagnosis, input);
   if (!input.name.empty()) {
     j["summary"] = summary_json(summary_of(d, {input.name, 0}, beyond));

@@ -93,6 +93,9 @@ Gate judge_amended(const CalibrationResult& result, const ParameterVector& toler
   for (const diagnosis::DataFault& fault : diagnosis.faults) {
     found.push_back({ObjectionKind::data_fault, fmt::format("data fault in run {}: {}", amends, fault.words)});
   }
+  if (confirmed(beyond)) {
+    return in_order(std::move(found));
+  }
   if (diagnosis.unexplained && explains(beyond)) {
     found.push_back({ObjectionKind::unexplained,
                      fmt::format("run {} holds what no catalogue does: {}", amends, discovered_words(*beyond))});

@@ -54,7 +54,7 @@ struct Gate {
 Gate judge(const CalibrationResult& result, const ParameterVector& tolerance, const Limits& limits);
 
 // Of the 24 as fitted together with what a diagnosis named in the recording of run `amends`. `beyond`: what was found where the
-// catalogue explains nothing.
+// catalogue explains nothing; where several recordings confirm it, `result` holds it too.
 Gate judge_amended(const CalibrationResult& result, const ParameterVector& tolerance, const Limits& limits,
                    const diagnosis::Diagnosis& diagnosis, long long amends,
                    const discovery::Discovery* beyond = nullptr);

@@ -1,5 +1,10 @@
 #include "daemon/estimate/showing_schedule.hpp"
 
+#include <cmath>
+
+#include "estimator/geometry/units.hpp"
+#include "estimator/models/segments.hpp"
+
 namespace selfcal {
 namespace {
 
@@ -58,6 +63,38 @@ std::optional<ShowingSchedule> showing_schedule(const std::string& experiment, c
     return longer(done);
   }
   return std::nullopt;
+}
+
+Schedule schedule_of(const Recording& recording, const ImuData& data) {
+  Schedule schedule;
+  double turning = 0.0;
+  std::size_t turns = 0;
+  GimbalPosition last;
+  const auto nearest = [](double angle_deg, double to_deg) {
+    return to_deg + std::remainder(angle_deg - to_deg, 360.0);
+  };
+  for (const Segment& s : find_segments(data)) {
+    if (s.rotation) {
+      turning += s.end_s - s.start_s;
+      ++turns;
+      continue;
+    }
+    // A read-out may be folded into one turn; a move is less than half of one.
+    last = {nearest(s.outer / units::degree, last.outer_deg), nearest(s.inner / units::degree, last.inner_deg)};
+    schedule.positions.push_back(last);
+    schedule.dwell_s.push_back(s.end_s - s.start_s);
+  }
+  schedule.rotation_s = turns > 0 ? turning / static_cast<double>(turns) : schedule.rotation_s;
+  const std::size_t stated = recording.schedule_deg.size();
+  if (stated == schedule.positions.size() && recording.dwell_s && recording.rotation_s) {
+    schedule.rotation_s = *recording.rotation_s;
+    for (std::size_t k = 0; k < stated; ++k) {
+      schedule.positions[k] = {nearest(schedule.positions[k].outer_deg, recording.schedule_deg[k][0]),
+                               nearest(schedule.positions[k].inner_deg, recording.schedule_deg[k][1])};
+      schedule.dwell_s[k] = *recording.dwell_s;
+    }
+  }
+  return schedule;
 }
 
 }  // namespace selfcal

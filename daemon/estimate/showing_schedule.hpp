@@ -5,6 +5,8 @@
 #include <string>
 
 #include "estimator/geometry/schedule.hpp"
+#include "estimator/passes/calibration.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace selfcal {
 
@@ -19,5 +21,8 @@ std::optional<ShowingSchedule> showing_schedule(const std::string& experiment, c
 
 // The same positions and one half way through each turn: what is not in the catalogue shows there as anywhere new.
 ShowingSchedule dwells_between(const Schedule& done);
+
+// The schedule that the recording followed, at the angles that the gimbal reached (its read-outs).
+Schedule schedule_of(const Recording& recording, const ImuData& data);
 
 }  // namespace selfcal

@@ -269,6 +269,13 @@ Summary summary_of(const CalibrationResult& result, const Gate& gate, const Subj
 
 Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, const Subject& subject,
                            const Diagnosis& d, const discovery::Discovery* beyond) {
+  if (gate.acceptable() && confirmed(beyond)) {
+    return {SummaryStanding::good,
+            fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.",
+                        discovered_words(*beyond)),
+            fmt::format("{}, in {} recordings.", discovered_figures(*beyond), beyond->fit.recordings.size()),
+            command("report", subject, "-o report.html")};
+  }
   if (gate.acceptable()) {
     return {SummaryStanding::good,
             fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d)),

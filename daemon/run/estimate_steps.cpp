@@ -5,7 +5,6 @@
 
 #include <ctime>
 
-#include "daemon/estimate/amendment_job.hpp"
 #include "daemon/estimate/coefficient_set.hpp"
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/host/wall_clock.hpp"
@@ -20,15 +19,23 @@ void EstimateSteps::estimate() {
       journal_.record.amends == 0
           ? estimate_job({data_.folder, journal_.record.rotation, journal_.record.serial, journal_.record.started_utc,
                           data_.schedule, data_.config})
-          : amendment_job({journal_.record.amends, amended_recording(), data_.folder, data_.config}),
+          : amendment_job({kept_recording(journal_.record.amends), further_recordings(), data_.folder, data_.config}),
       [this](const CalibrationProgress& progress) { on_estimate_progress(progress); },
       [this](Expected<Estimate> answer) { on_estimate(std::move(answer)); });
 }
 
-// Empty where the store cannot say: the job's error names the file then.
-std::filesystem::path EstimateSteps::amended_recording() const {
-  const auto amended = store_.run(journal_.record.amends);
-  return amended && *amended ? std::filesystem::path((*amended)->recording) : std::filesystem::path();
+// An empty path where the store cannot say: the job's error names the run then.
+KeptRecording EstimateSteps::kept_recording(RunId run) const {
+  const auto found = store_.run(run);
+  return {run, found && *found ? std::filesystem::path((*found)->recording) : std::filesystem::path()};
+}
+
+std::vector<KeptRecording> EstimateSteps::further_recordings() const {
+  std::vector<KeptRecording> all;
+  for (const RunId run : journal_.record.amends_with) {
+    all.push_back(kept_recording(run));
+  }
+  return all;
 }
 
 void EstimateSteps::on_estimate_progress(const CalibrationProgress& progress) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
+#include "daemon/estimate/amendment_job.hpp"
 #include "daemon/run/run_steps.hpp"
 #include "daemon/run/running_steps.hpp"
 
@@ -19,7 +21,8 @@ class EstimateSteps : public RunSteps {
   void judge();
 
  private:
-  std::filesystem::path amended_recording() const;
+  KeptRecording kept_recording(RunId run) const;
+  std::vector<KeptRecording> further_recordings() const;
   void on_estimate_progress(const CalibrationProgress& progress);
   void on_estimate(Expected<Estimate> answer);
   Expected<void> store_result();

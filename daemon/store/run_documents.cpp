@@ -33,6 +33,7 @@ Expected<ordered_json> heading(const RunStore& store, const RunRecord& run) {
                : run.amends != 0 ? "amendment"
                                  : "calibration"},
       {"amends", run.amends == 0 ? ordered_json() : ordered_json(run.amends)},
+      {"amends_with", run.amends_with},
       {"rolls_back", *undone == 0 ? ordered_json() : ordered_json(*undone)},
       // Only a calibration turns the gimbal.
       {"schedule", run.rollback || run.amends != 0 ? std::string() : run.schedule},

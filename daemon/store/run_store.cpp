@@ -40,13 +40,16 @@ ALTER TABLE runs ADD COLUMN early_end_s REAL NOT NULL DEFAULT -1;
 )sql",
                                   R"sql(
 ALTER TABLE runs ADD COLUMN amends INTEGER NOT NULL DEFAULT 0;
+)sql",
+                                  R"sql(
+ALTER TABLE runs ADD COLUMN amends_with TEXT NOT NULL DEFAULT '';
 )sql"};
 constexpr auto schema_version = static_cast<std::int64_t>(schema_steps.size());
 
 constexpr std::string_view run_columns =
     "id, ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, started_utc, ended_utc, "
     "software, exit_status, reason, abort_wanted, rotation, recording, result_json, drift_old_m, drift_new_m, "
-    "stop_when_met, early_end_s, amends";
+    "stop_when_met, early_end_s, amends, amends_with";
 
 constexpr const char* final_states = "('completed','refused','failed','aborted')";
 
@@ -64,6 +67,14 @@ Expected<std::int64_t> single_integer(sqlite3* database, std::string_view sql) {
     return tl::unexpected(row.error());
   }
   return *row ? statement.integer() : 0;
+}
+
+// "3 7": numbers of runs as they are kept.
+std::string text_of(const std::vector<RunId>& runs) { return fmt::format("{}", fmt::join(runs, " ")); }
+
+std::vector<RunId> numbers_of(const std::string& text) {
+  std::istringstream words(text);
+  return {std::istream_iterator<RunId>(words), std::istream_iterator<RunId>()};
 }
 
 RunRecord read_run(Statement& row) {
@@ -92,6 +103,7 @@ RunRecord read_run(Statement& row) {
   run.stop_when_met = row.integer() != 0;
   run.early_end_s = row.real();
   run.amends = row.integer();
+  run.amends_with = numbers_of(row.text());
   return run;
 }
 
@@ -189,12 +201,12 @@ Expected<RunId> RunStore::create_run(const RunRecord& run) {
       database_,
       "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
       "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
-      "result_json, drift_old_m, drift_new_m, stop_when_met, amends) "
-      "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?)");
+      "result_json, drift_old_m, drift_new_m, stop_when_met, amends, amends_with) "
+      "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?,?)");
   insert.bind(run.ins).bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.user);
   insert.bind(run.schedule).bind(std::int64_t{run.dry_run}).bind(run.force_reason).bind(std::int64_t{run.rollback});
   insert.bind(run.started_utc).bind(run.software).bind(std::int64_t{run.stop_when_met});
-  insert.bind(run.amends);
+  insert.bind(run.amends).bind(text_of(run.amends_with));
   if (auto ok = insert.run(); !ok) {
     return tl::unexpected(ok.error());
   }

@@ -29,10 +29,11 @@ struct RunRecord {
   std::string user;
   std::string schedule;  // as asked for: name or file
   bool dry_run = false;
-  std::string force_reason;    // empty: not forced
-  bool rollback = false;       // writes a former set instead of calibrating
-  RunId amends = 0;            // estimates this run's recording again, with the physics named in it; 0: none
-  bool stop_when_met = false;  // the rotation may end as soon as every tolerance is met
+  std::string force_reason;        // empty: not forced
+  bool rollback = false;           // writes a former set instead of calibrating
+  RunId amends = 0;                // estimates this run's recording again, with the physics named in it; 0: none
+  std::vector<RunId> amends_with;  // further runs of the same INS whose recordings are looked at together with it
+  bool stop_when_met = false;      // the rotation may end as soon as every tolerance is met
   std::string started_utc, ended_utc;
   std::string software;  // of the daemon
   int exit_status = -1;  // -1: not ended

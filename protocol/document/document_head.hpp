@@ -27,6 +27,7 @@ inline constexpr Schema history{"selfcal.history"};
 inline constexpr Schema status{"selfcal.status"};
 inline constexpr Schema request{
     "selfcal.request"};  // what a request to the service led to: a run begun, an abort asked
+inline constexpr Schema investigation{"selfcal.investigation"};
 inline constexpr Schema bus{"selfcal.bus"};
 inline constexpr Schema database{"selfcal.database"};  // answer of `selfcal db`
 

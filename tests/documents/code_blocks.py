@@ -50,7 +50,7 @@ def manual_examples():
     page = ROOT / "tools" / "package" / "man" / "selfcal.1"
     roff = page.read_text(encoding="ascii")
     lines = re.search(r"^\.SH EXAMPLES\n\.nf\n(.*?)^\.fi", roff, re.M | re.S)[1].replace("\\-", "-").splitlines()
-    online = re.compile(r"selfcal (run|amend|rollback|abort|status|show|history|monitor|db)\b")
+    online = re.compile(r"selfcal (run|amend|investigate|rollback|abort|status|show|history|monitor|db)\b")
     return [Block(page, roff[:roff.index(".SH EXAMPLES")].count("\n") + 1, "sh service" if online.match(line) else "sh", [line])
             for line in lines]
 

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "estimator/diagnosis/diagnosis.hpp"
-#include "estimator/geometry/schedule.hpp"
 #include "protocol/error.hpp"
 #include "protocol/recording/recording.hpp"
 
@@ -19,9 +18,6 @@ std::string physics_text(const diagnosis::Diagnosis& diagnosis, const diagnosis:
 // sim.toml: site, attitude, rate, noise, and the 24 as fitted together with the physics.
 std::string sim_config_text(const diagnosis::Diagnosis& diagnosis, const diagnosis::AssumedNoise& assumed,
                             const Recording& recording);
-
-// The schedule that the recording followed, at the angles that the gimbal reached (its read-outs).
-Schedule schedule_of(const Recording& recording, const ImuData& data);
 
 // physics.toml with `laws` behind what was named, sim.toml and schedule.toml in `folder`, which is made where it is not there.
 Expected<void> write_amendment(const std::filesystem::path& folder, const diagnosis::Diagnosis& diagnosis,

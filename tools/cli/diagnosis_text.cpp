@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/summary.hpp"
@@ -159,7 +160,10 @@ std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colo
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
   text += remainder_text(d);
-  text += corrections_text(d);
+  // Where nothing explains the recording, nothing corrects the 24.
+  if (!d.unexplained || explains(beyond)) {
+    text += corrections_text(with_laws(d, beyond));
+  }
   if (!d.before.accepted) {
     text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);
   }

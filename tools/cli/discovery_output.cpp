@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
 namespace selfcal::cli {
@@ -126,43 +125,6 @@ std::string together_text(const Together& together) {
   return text;
 }
 
-ordered_json together_json(const Together& together) {
-  ordered_json recordings = ordered_json::array();
-  const discovery::SharedParameters& shared = together.shared;
-  for (std::size_t k = 0; k < together.recordings.size(); ++k) {
-    const Together::Recording& r = together.recordings[k];
-    ordered_json parameters = ordered_json::array();
-    for (std::size_t p = 0; p < sensor_parameters.size(); ++p) {
-      const auto at = static_cast<Eigen::Index>(p);
-      parameters.push_back({{"name", sensor_parameters[p].name},
-                            {"unit", sensor_parameters[p].unit},
-                            {"value", shared.parameters[k](at) / sensor_parameters[p].si_per_unit},
-                            {"sigma", std::sqrt(shared.covariance[k](at, at)) / sensor_parameters[p].si_per_unit}});
-    }
-    recordings.push_back({{"input", {{"name", r.file.name}, {"sha256", r.file.sha256}}},
-                          {"verdict", verdict_name(r.verdict)},
-                          {"findings", r.names},
-                          {"parameters", parameters}});
-  }
-  ordered_json differing = ordered_json::array();
-  for (const discovery::UnsharedParameter& d : shared.differing) {
-    const SensorParameter& parameter = sensor_parameters.at(static_cast<std::size_t>(d.parameter));
-    differing.push_back({{"name", parameter.name},
-                         {"unit", parameter.unit},
-                         {"recording", d.recording},
-                         {"difference", d.difference / parameter.si_per_unit},
-                         {"sigma", d.sigma / parameter.si_per_unit}});
-  }
-  return {{"recordings", recordings},
-          {"taken_out", together.taken_out},
-          {"shared",
-           {{"scale_factors_and_misalignments", shared.lasting_shared},
-            {"log_p_scale_factors_and_misalignments", shared.log_p_lasting},
-            {"biases", shared.biases_shared},
-            {"log_p_biases", shared.log_p_biases},
-            {"differing", differing}}}};
-}
-
 std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
   if (found.laws.empty() && found.processes.empty()) {
     return fmt::format("discovery: no equation among {} explains what remains\n", found.functions_tried) +
@@ -191,21 +153,6 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
         next->separation_now);
   }
   return text;
-}
-
-void add_next_experiment(ordered_json& document, const std::optional<discovery::NextExperiment>& next) {
-  if (next) {
-    ordered_json positions = ordered_json::array();
-    for (const GimbalPosition& p : next->schedule.positions) {
-      positions.push_back({p.outer_deg, p.inner_deg});
-    }
-    document["next_experiment"] = {
-        {"schedule",
-         {{"positions", positions}, {"dwell_s", next->schedule.dwell_s}, {"rotation_s", next->schedule.rotation_s}}},
-        {"splits", {next->closest}},
-        {"separation_sigma", next->separation},
-        {"expected_odds", std::exp(std::min(next->log_odds, 700.0))}};
-  }
 }
 
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {

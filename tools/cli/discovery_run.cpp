@@ -62,14 +62,9 @@ Expected<void> try_them(const std::string& file, std::span<const discovery::Unit
   return {};
 }
 
-Expected<void> plan_next(const std::string& file, std::span<const discovery::UnitRecording> unit,
-                         BeyondCatalogue& result) {
-  for (const discovery::DiscoveredLaw& law : result.found->laws) {
-    const auto next = discovery::plan_experiment(unit, law, {});
-    if (next && (!result.next || next->separation_now < result.next->separation_now)) {
-      result.next = next;
-    }
-  }
+Expected<void> plan_and_write(const std::string& file, std::span<const discovery::UnitRecording> unit,
+                              BeyondCatalogue& result) {
+  result.next = plan_next(unit, *result.found, {});
   if (file.empty()) {
     return {};
   }
@@ -81,22 +76,6 @@ Expected<void> plan_next(const std::string& file, std::span<const discovery::Uni
   return write_file_atomically(
       file, fmt::format("# Tells the equation found from {}: {:.1f} sigma, {:.1f} now.\n{}", result.next->closest,
                         result.next->separation, result.next->separation_now, format_schedule(result.next->schedule)));
-}
-
-Together join(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
-              const discovery::Discovery& found) {
-  Together together;
-  for (const DiagnosedFile& r : recordings) {
-    together.recordings.push_back({r.file, r.diagnosis.verdict, {}});
-    for (const diagnosis::Finding& finding : r.diagnosis.findings) {
-      together.recordings.back().names.push_back(finding.effect);
-    }
-  }
-  for (const diagnosis::Effect* effect : rest.taken_out()) {
-    together.taken_out.emplace_back(effect->id);
-  }
-  together.shared = discovery::share_parameters(found.fit);
-  return together;
 }
 
 }  // namespace
@@ -136,11 +115,7 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   if (!discover && arguments.laws.empty()) {
     return result;
   }
-  std::vector<discovery::DiagnosedRecording> diagnosed;
-  for (const DiagnosedFile& r : recordings) {
-    diagnosed.push_back({r.data, r.diagnosis});
-  }
-  const auto rest = discovery::UnexplainedRest::of(diagnosed);
+  const auto rest = discovery::UnexplainedRest::of(recordings_of(recordings));
   if (!rest) {
     return fail(ErrorKind::bad_input, rest.error());
   }
@@ -153,9 +128,9 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
     ProgressLine line;
     result.found = discovery::discover(rest->recordings(), {}, [&line](const std::string& words) { line.show(words); });
     if (recordings.size() > 1) {
-      result.together = join(recordings, *rest, *result.found);
+      result.together = put_together(recordings, *rest, *result.found);
     }
-    if (const auto planned = plan_next(arguments.next_experiment, rest->recordings(), result); !planned) {
+    if (const auto planned = plan_and_write(arguments.next_experiment, rest->recordings(), result); !planned) {
       return tl::unexpected(planned.error());
     }
   }

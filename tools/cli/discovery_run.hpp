@@ -42,13 +42,6 @@ struct BeyondCatalogue {
   void add_to(nlohmann::ordered_json& document) const;
 };
 
-// A recording with its diagnosis. All must outlive it.
-struct DiagnosedFile {
-  const document::InputFile& file;
-  const ImuData& data;
-  const diagnosis::Diagnosis& diagnosis;
-};
-
 // Looks where the diagnosis of a recording left something unexplained, where there are several, or where asked to; in all of them
 // together. Errors: a file of laws that is wrong (file, law, column), a schedule that cannot be written.
 Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings);

@@ -6,6 +6,7 @@
 #include <operator_api/manager1_proxy.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 
 #include "protocol/operator_api/names.hpp"
@@ -204,6 +205,19 @@ Expected<std::string> choose_ins(ManagerClient& manager, const std::string& give
   return fail(ErrorKind::usage,
               fmt::format("{}; configured: {}", given.empty() ? "which INS?" : fmt::format("no INS \"{}\"", given),
                           fmt::join(*instruments, ", ")));
+}
+
+Expected<std::vector<std::uint64_t>> run_numbers(const std::vector<std::string>& texts) {
+  std::vector<std::uint64_t> runs;
+  for (const std::string& text : texts) {
+    std::uint64_t run = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), run);
+    if (error != std::errc{} || end != text.data() + text.size() || run == 0) {
+      return fail(ErrorKind::usage, fmt::format("--with {}: the number of a run is expected", text));
+    }
+    runs.push_back(run);
+  }
+  return runs;
 }
 
 }  // namespace selfcal::cli

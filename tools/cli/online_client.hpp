@@ -80,6 +80,9 @@ class InsWatch {
 // Serves the connection until something arrives or the time is over; a caught signal ends the wait too.
 Expected<void> wait_for_news(sdbus::IConnection& connection, int timeout_ms);
 
+// Of `--with RUN`, repeated. An error (usage) where one is no number of a run.
+Expected<std::vector<std::uint64_t>> run_numbers(const std::vector<std::string>& texts);
+
 // The name of the INS meant: `given`, or the only one configured.
 Expected<std::string> choose_ins(ManagerClient& manager, const std::string& given);
 

@@ -40,11 +40,57 @@ class AmendmentJobTest : public testing::Test {
     diagnosis_.model = {diagnosis::ModelEffect{}};
     recording_.sample_rate_hz = 200.0;
   }
-  Estimate estimate() { return amended_estimate(diagnosis_, {7, "seven.h5", "folder", {}}, recording_); }
+  Estimate estimate() { return amended_estimate(diagnosis_, {{7, "seven.h5"}, {}, "folder", {}}, recording_); }
+
+  // Nothing in the catalogue explains the recording, and a law of `recordings` of them leaves this many squares beyond noise.
+  Estimate estimate_with_law(std::size_t recordings, double misfit_after) {
+    diagnosis_.unexplained = true;
+    diagnosis_.after.accepted = false;
+    BeyondAnswer beyond;
+    discovery::DiscoveredLaw law;
+    law.term = {5, *laws::Expression::parse("fx*sin(outer)"), {}};
+    law.expression = "fx*sin(outer)";
+    law.coefficient = 30.0;
+    law.sigma = 1.0;
+    beyond.found.laws = {law};
+    beyond.found.rows = 10000.0;
+    beyond.found.misfit_before = 20000.0;
+    beyond.found.misfit_after = misfit_after;
+    beyond.found.fit.recordings.resize(recordings);
+    for (discovery::FittedRecording& r : beyond.found.fit.recordings) {
+      r.parameters = diagnosis_.value;
+      r.covariance = diagnosis_.covariance;
+    }
+    beyond.average.parameters.assign(recordings, 3.0 * diagnosis_.value);
+    beyond.average.covariance.assign(recordings, 4.0 * diagnosis_.covariance);
+    return amended_estimate(diagnosis_, {{7, "seven.h5"}, {{3, "three.h5"}}, "folder", {}}, recording_, beyond);
+  }
 
   diagnosis::Diagnosis diagnosis_;
   Recording recording_;
 };
+
+// Its 24 are the mean over all laws that are left, with the spread between them.
+TEST_F(AmendmentJobTest, ALawThatTwoRecordingsHoldIsFittedToo) {
+  const Estimate answer = estimate_with_law(2, 100.0);
+  EXPECT_THAT(answer.objections, IsEmpty());
+  EXPECT_EQ(answer.result.consistency.verdict, Verdict::consistent);
+  EXPECT_TRUE(answer.result.value.isApprox(3.0 * diagnosis_.value));
+  EXPECT_TRUE(answer.result.sigma.isApprox(2.0 * diagnosis_.sigma));
+  EXPECT_THAT(answer.notes, testing::Contains(HasSubstr("fx*sin(outer)")));
+}
+
+TEST_F(AmendmentJobTest, ALawOfOneRecordingAloneIsNotWritten) {
+  EXPECT_THAT(estimate_with_law(1, 100.0).objections,
+              testing::Contains(HasSubstr("run 7 holds what no catalogue does")));
+}
+
+// sqrt(2 * 10000) = 141 is what the square of noise scatters by.
+TEST_F(AmendmentJobTest, ALawThatLeavesMoreThanNoiseIsNotWritten) {
+  const Estimate answer = estimate_with_law(2, 1500.0);
+  EXPECT_THAT(answer.objections, testing::Contains(HasSubstr("run 7 holds what no catalogue does")));
+  EXPECT_EQ(nlohmann::json::parse(answer.result_json).at("acceptable"), false);
+}
 
 TEST_F(AmendmentJobTest, TheJointFitIsTheAnswer) {
   const Estimate answer = estimate();

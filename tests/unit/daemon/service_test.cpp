@@ -13,6 +13,7 @@
 
 #include "daemon/store/database_copies.hpp"
 #include "protocol/operator_api/names.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
 #include "tests/unit/daemon/scratch_folder.hpp"
 
 namespace selfcal {
@@ -122,12 +123,12 @@ TEST_F(ServiceTest, AReloadTakesUpTheNewAndLeavesRunsAlone) {
 TEST_F(ServiceTest, OnlyTheLatestRunThatKeptARecordingIsAmended) {
   configure("", section("a"));
   start();
-  const auto unknown = operations().amend({5, false, "", "ann"});
+  const auto unknown = operations().amend({5, {}, false, "", "ann"});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().name, operator_api::error_unknown);
   EXPECT_EQ(unknown.error().message, "no run 5");
   ASSERT_TRUE(run("a"));
-  const auto unended = operations().amend({1, false, "", "ann"});
+  const auto unended = operations().amend({1, {}, false, "", "ann"});
   ASSERT_FALSE(unended);
   EXPECT_THAT(unended.error().message, HasSubstr("run 1 has not ended"));
 
@@ -144,20 +145,49 @@ TEST_F(ServiceTest, OnlyTheLatestRunThatKeptARecordingIsAmended) {
   ASSERT_TRUE(store->update_run(later));
   store.reset();
   start();
-  const auto none = operations().amend({1, false, "", "ann"});
+  const auto none = operations().amend({1, {}, false, "", "ann"});
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error().message, HasSubstr("run 1 has no recording"));
 
   older.recording = "older.h5";
   ASSERT_TRUE((*RunStore::open(database_path(folder_ / "state")))->update_run(older));
-  const auto overtaken = operations().amend({1, false, "", "ann"});
+  const auto overtaken = operations().amend({1, {}, false, "", "ann"});
   ASSERT_FALSE(overtaken);
   EXPECT_EQ(overtaken.error().name, operator_api::error_nothing);
   EXPECT_THAT(overtaken.error().message, HasSubstr("run 2 of"));
-  const auto amendment = operations().amend({2, true, "", "ann"});
+  EXPECT_THAT(operations().amend({2, {9}, true, "", "ann"}).error().message, HasSubstr("no run 9"));
+  EXPECT_THAT(operations().amend({2, {2}, true, "", "ann"}).error().message, HasSubstr("run 2 is given twice"));
+  EXPECT_THAT(operations().amend({2, {1, 1}, true, "", "ann"}).error().message, HasSubstr("run 1 is given twice"));
+  EXPECT_THAT(operations().amend({2, std::vector<RunId>(8, 1), true, "", "ann"}).error().message,
+              HasSubstr("8 further runs, 7 at most"));
+  const auto amendment = operations().amend({2, {1}, true, "", "ann"});
   ASSERT_TRUE(amendment) << amendment.error().message;
   EXPECT_EQ(operations().record("a")->amends, 2);
+  EXPECT_THAT(operations().record("a")->amends_with, ElementsAre(1));
+  EXPECT_THAT((**(*RunStore::open(database_path(folder_ / "state")))->run(3)).amends_with, ElementsAre(1));  // kept
   EXPECT_TRUE(operations().record("a")->dry_run);
+}
+
+// The text of a schedule is kept as a file, which a run that is taken up again reads.
+TEST_F(ServiceTest, AScheduleGivenAsTextIsCheckedAndKept) {
+  configure("", section("a"));
+  start();
+  StartRequest request;
+  request.ins = "a";
+  request.user = "ann";
+  request.schedule_toml = "positions = [[0, 0], [400, 0]]";
+  const auto wrong = operations().start(request);
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().name, operator_api::error_unknown);
+  EXPECT_THAT(wrong.error().message, HasSubstr("schedule_toml"));
+  request.schedule_toml = std::string(100000, ' ');
+  EXPECT_THAT(operations().start(request).error().message, HasSubstr("100000 bytes, 65536 at most"));
+  request.schedule_toml = "positions = [[0, 0], [90, 0]]\ndwell_s = 50\n";
+  const auto begun = operations().start(request);
+  ASSERT_TRUE(begun) << begun.error().message;
+  const std::filesystem::path kept = operations().record("a")->schedule;
+  EXPECT_EQ(kept.parent_path(), folder_ / "state" / "schedules");
+  EXPECT_EQ(read_schedule(kept)->dwell_s.front(), 50.0);
 }
 
 TEST_F(ServiceTest, AReloadOfAFaultyFileChangesNothing) {

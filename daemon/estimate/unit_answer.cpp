@@ -1,0 +1,103 @@
+#include "daemon/estimate/unit_answer.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "daemon/estimate/diagnosis_json.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
+
+namespace selfcal {
+
+using nlohmann::ordered_json;
+
+std::vector<discovery::DiagnosedRecording> recordings_of(std::span<const DiagnosedFile> files) {
+  std::vector<discovery::DiagnosedRecording> all;
+  for (const DiagnosedFile& file : files) {
+    all.push_back({file.data, file.diagnosis});
+  }
+  return all;
+}
+
+Together put_together(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
+                      const discovery::Discovery& found) {
+  Together together;
+  for (const DiagnosedFile& r : recordings) {
+    together.recordings.push_back({r.file, r.diagnosis.verdict, {}});
+    for (const diagnosis::Finding& finding : r.diagnosis.findings) {
+      together.recordings.back().names.push_back(finding.effect);
+    }
+  }
+  for (const diagnosis::Effect* effect : rest.taken_out()) {
+    together.taken_out.emplace_back(effect->id);
+  }
+  together.shared = discovery::share_parameters(found.fit);
+  return together;
+}
+
+std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::UnitRecording> unit,
+                                                   const discovery::Discovery& found,
+                                                   const discovery::ExperimentLimits& limits,
+                                                   const std::stop_token& stop) {
+  std::optional<discovery::NextExperiment> next;
+  for (const discovery::DiscoveredLaw& law : found.laws) {
+    auto planned = discovery::plan_experiment(unit, law, limits, stop);
+    if (planned && (!next || planned->separation_now < next->separation_now)) {
+      next = std::move(planned);
+    }
+  }
+  return next;
+}
+
+ordered_json together_json(const Together& together) {
+  ordered_json recordings = ordered_json::array();
+  const discovery::SharedParameters& shared = together.shared;
+  for (std::size_t k = 0; k < together.recordings.size(); ++k) {
+    const Together::Recording& r = together.recordings[k];
+    ordered_json parameters = ordered_json::array();
+    for (std::size_t p = 0; p < sensor_parameters.size(); ++p) {
+      const auto at = static_cast<Eigen::Index>(p);
+      parameters.push_back({{"name", sensor_parameters[p].name},
+                            {"unit", sensor_parameters[p].unit},
+                            {"value", shared.parameters[k](at) / sensor_parameters[p].si_per_unit},
+                            {"sigma", std::sqrt(shared.covariance[k](at, at)) / sensor_parameters[p].si_per_unit}});
+    }
+    recordings.push_back({{"input", {{"name", r.file.name}, {"sha256", r.file.sha256}}},
+                          {"verdict", verdict_name(r.verdict)},
+                          {"findings", r.names},
+                          {"parameters", parameters}});
+  }
+  ordered_json differing = ordered_json::array();
+  for (const discovery::UnsharedParameter& d : shared.differing) {
+    const SensorParameter& parameter = sensor_parameters.at(static_cast<std::size_t>(d.parameter));
+    differing.push_back({{"name", parameter.name},
+                         {"unit", parameter.unit},
+                         {"recording", d.recording},
+                         {"difference", d.difference / parameter.si_per_unit},
+                         {"sigma", d.sigma / parameter.si_per_unit}});
+  }
+  return {{"recordings", recordings},
+          {"taken_out", together.taken_out},
+          {"shared",
+           {{"scale_factors_and_misalignments", shared.lasting_shared},
+            {"log_p_scale_factors_and_misalignments", shared.log_p_lasting},
+            {"biases", shared.biases_shared},
+            {"log_p_biases", shared.log_p_biases},
+            {"differing", differing}}}};
+}
+
+void add_next_experiment(ordered_json& document, const std::optional<discovery::NextExperiment>& next) {
+  if (next) {
+    ordered_json positions = ordered_json::array();
+    for (const GimbalPosition& p : next->schedule.positions) {
+      positions.push_back({p.outer_deg, p.inner_deg});
+    }
+    document["next_experiment"] = {
+        {"schedule",
+         {{"positions", positions}, {"dwell_s", next->schedule.dwell_s}, {"rotation_s", next->schedule.rotation_s}}},
+        {"splits", next->closest.empty() ? ordered_json::array() : ordered_json{next->closest}},
+        {"separation_sigma", next->separation},
+        {"expected_odds", std::exp(std::min(next->log_odds, 700.0))}};
+  }
+}
+
+}  // namespace selfcal

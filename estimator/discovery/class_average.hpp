@@ -1,0 +1,25 @@
+// The 24 of each recording over all equations that the recordings leave open.
+//
+// Where a class has several members, each of them in the law's place leads to its own 24. Their mean, weighted by the odds, and
+// their spread are the answer; that of several laws adds up, as if the choices were independent.
+#pragma once
+
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/shared_parameters.hpp"
+
+namespace selfcal::discovery {
+
+struct ClassAverage {
+  std::vector<ParameterVector> parameters;  // [recordings] SI, what is shared imposed
+  std::vector<ParameterMatrix> covariance;  // [recordings], with the spread between the members
+};
+
+// `found` of these recordings. `members` of a class at most, the most probable ones: one pass over each recording for each.
+ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
+                                  std::size_t members = 8, const std::stop_token& stop = {});
+
+}  // namespace selfcal::discovery
