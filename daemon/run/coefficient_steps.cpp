@@ -48,6 +48,17 @@ Task<Step> CoefficientSteps::erase_inactive_slot() {
   if (!held) {
     co_return tl::unexpected(held.error());
   }
+  const auto held_set = ins::decode_coefficients(*held);
+  if (!held_set) {
+    co_return local_trouble(held_set.error());
+  }
+  if (const Complaint lost = check_held(wanted->value, held_set->value, journal_.progress.tolerance)) {
+    co_return protocol_error(*lost);
+  }
+  if (const std::string lost = words_of_loss(wanted->value, held_set->value, journal_.progress.tolerance);
+      !lost.empty()) {
+    journal_.remember("ins", lost);
+  }
   data_.new_set = std::move(*held);
   if (auto stored = store_.store_set(journal_.record.id, SetRole::written, data_.new_set); !stored) {
     co_return local_trouble(stored.error());

@@ -24,6 +24,24 @@ constexpr double make_room_s = 10.0;
 // Free fall, which no platform at rest exceeds.
 constexpr double gravity_mps2 = 9.81;
 
+using Set = std::array<double, sensor_parameter_count>;
+
+// In the parameter's unit.
+double lost_of(const Set& wanted, const Set& held, std::size_t k) {
+  return std::abs(held[k] - wanted[k]) / sensor_parameters[k].si_per_unit;
+}
+
+// The one that is lost by most of its tolerance.
+std::size_t most_lost(const Set& wanted, const Set& held, const Set& tolerance) {
+  std::size_t worst = 0;
+  for (std::size_t k = 1; k < wanted.size(); ++k) {
+    if (lost_of(wanted, held, k) * tolerance[worst] > lost_of(wanted, held, worst) * tolerance[k]) {
+      worst = k;
+    }
+  }
+  return worst;
+}
+
 }  // namespace
 
 double pages_of(const Schedule& schedule, const ins::SampleFormatRecord& format) {
@@ -85,6 +103,34 @@ Complaint check_coefficients(const std::array<double, sensor_parameter_count>& v
     }
   }
   return std::nullopt;
+}
+
+std::string words_of_loss(const std::array<double, sensor_parameter_count>& wanted,
+                          const std::array<double, sensor_parameter_count>& held,
+                          const std::array<double, sensor_parameter_count>& tolerance) {
+  constexpr double worth_saying = 1e-3;
+  const std::size_t worst = most_lost(wanted, held, tolerance);
+  const double lost = lost_of(wanted, held, worst);
+  if (!(lost > worth_saying * tolerance[worst])) {
+    return {};
+  }
+  const SensorParameter& parameter = sensor_parameters[worst];
+  // A scale factor of so many ppm is so many millionths of g at 1 g.
+  const bool of_accel_scale = parameter.name.starts_with("accel_scale");
+  return fmt::format("{}: {:.6g} {} were found, the INS holds {:.6g}{}", parameter.name,
+                     wanted[worst] / parameter.si_per_unit, parameter.unit, held[worst] / parameter.si_per_unit,
+                     of_accel_scale ? fmt::format(": {:.3g} ug are lost at 1 g", lost) : std::string());
+}
+
+Complaint check_held(const std::array<double, sensor_parameter_count>& wanted,
+                     const std::array<double, sensor_parameter_count>& held,
+                     const std::array<double, sensor_parameter_count>& tolerance) {
+  const std::size_t worst = most_lost(wanted, held, tolerance);
+  if (lost_of(wanted, held, worst) <= tolerance[worst]) {
+    return std::nullopt;
+  }
+  return fmt::format("{}, and {:.3g} {} are tolerated: nothing is written", words_of_loss(wanted, held, tolerance),
+                     tolerance[worst], sensor_parameters[worst].unit);
 }
 
 Complaint check_navigation(const ins::NavigationCheckRecord& answer, double asked_s) {

@@ -37,6 +37,17 @@ Complaint check_rotation_time(const ins::DirectoryRecord& directory, const ins::
 // The first value (SI, order of sensor_parameters) outside what is physically possible.
 Complaint check_coefficients(const std::array<double, sensor_parameter_count>& value, std::string_view whose);
 
+// What becomes of a set in an INS whose record has fewer bits than ours, or one scale factor in place of K+ and K-. `wanted` and
+// `held` are SI, `tolerance` in the parameters' units. Refused where a value is lost beyond its tolerance.
+Complaint check_held(const std::array<double, sensor_parameter_count>& wanted,
+                     const std::array<double, sensor_parameter_count>& held,
+                     const std::array<double, sensor_parameter_count>& tolerance);
+// The largest loss, in tolerances, in a sentence: "accel_scale_pos_x: 162 ppm were found, the INS holds 156.5: 5.5 ug are lost at
+// 1 g". Empty where all are lost by less than a thousandth of their tolerance.
+std::string words_of_loss(const std::array<double, sensor_parameter_count>& wanted,
+                          const std::array<double, sensor_parameter_count>& held,
+                          const std::array<double, sensor_parameter_count>& tolerance);
+
 // The answer about a navigation check of `asked_s` seconds, done or under way.
 Complaint check_navigation(const ins::NavigationCheckRecord& answer, double asked_s);
 
