@@ -73,10 +73,11 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   }
   sqlite3* raw = nullptr;
   ASSERT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(raw,
-                         "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
-                         "ALTER TABLE runs DROP COLUMN amends; PRAGMA user_version=1",
-                         nullptr, nullptr, nullptr),
+  EXPECT_EQ(sqlite3_exec(
+                raw,
+                "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
+                "ALTER TABLE runs DROP COLUMN amends; ALTER TABLE runs DROP COLUMN amends_with; PRAGMA user_version=1",
+                nullptr, nullptr, nullptr),
             SQLITE_OK);
   sqlite3_close(raw);
   auto store = open();
@@ -86,6 +87,7 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   EXPECT_FALSE(found->stop_when_met);
   EXPECT_EQ(found->early_end_s, -1.0);
   EXPECT_EQ(found->amends, 0);
+  EXPECT_TRUE(found->amends_with.empty());
   run.stop_when_met = true;
   EXPECT_TRUE(store->run(*store->create_run(run)).value()->stop_when_met);
 }
