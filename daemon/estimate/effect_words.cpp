@@ -4,40 +4,21 @@
 #include <cctype>
 #include <utility>
 
+#include "estimator/diagnosis/effects/catalogue.hpp"
+
 namespace selfcal {
 namespace {
 
 using Words = std::pair<std::string_view, std::string_view>;
 
-constexpr std::array effects = {
-    Words{"gyro_g_sensitivity", "gyro drift proportional to specific force (g-sensitivity)"},
-    Words{"gyro_magnetic_sensitivity", "gyro drift proportional to the magnetic field"},
-    Words{"gyro_scale_asymmetry", "gyro scale factor that differs between the two senses of turning"},
-    Words{"gyro_scale_nonlinearity", "gyro scale factor that depends on the rate"},
-    Words{"gyro_temperature", "gyro drift that follows temperature"},
-    Words{"accel_temperature", "accelerometer bias that follows temperature"},
-    Words{"gyro_drift_ramp", "gyro drift that changes steadily with time"},
-    Words{"accel_bias_ramp", "accelerometer bias that changes steadily with time"},
-    Words{"gyro_scale_temperature", "gyro scale factor that follows temperature"},
-    Words{"accel_scale_temperature", "accelerometer scale factor that follows temperature"},
-    Words{"gyro_dead_zone", "dead zone (lock-in) of the gyros at low rate"},
-    Words{"accel_quadratic", "accelerometer error quadratic in its input"},
-    Words{"accel_cubic", "accelerometer error cubic in its input"},
-    Words{"accel_cross_coupling", "accelerometer error from products of two axes (cross-coupling)"},
-    Words{"accel_relaxation", "creep of the accelerometers after each turn"},
-    Words{"accel_size_effect", "accelerometers that do not sit at one point (size effect)"},
-    Words{"imu_lever_arm", "IMU centre that is off the gimbal's centre (lever arm)"},
-    Words{"accel_gyro_time_offset", "accelerometers sampled at another time than the gyros"},
-    Words{"triad_flexure", "accelerometer triad that bends under gravity"},
-    Words{"base_sway", "sway of the base"},
-    Words{"base_settling", "base that settles during the recording"},
+// Of what is no equation of the catalogue, whose effects have their own words.
+constexpr std::array noise = {
     Words{"gyro_noise_level", "gyro noise (ARW) of another size than assumed"},
     Words{"accel_noise_level", "accelerometer noise (VRW) of another size than assumed"},
     Words{"gyro_random_walk", "random walk of the gyro drift (rate random walk)"},
     Words{"accel_random_walk", "random walk of the accelerometer bias"},
     Words{"quantisation", "coarser quantisation than assumed"},
     Words{"vibration_line", "vibration at a single frequency"},
-    Words{"wrong_site", "latitude of the site that is not the true one"},
 };
 
 constexpr std::array symbols = {
@@ -89,7 +70,12 @@ bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 |
 }  // namespace
 
 std::string effect_words(std::string_view id) {
-  const std::string_view words = look_up(effects, id);
+  for (const diagnosis::Effect& effect : diagnosis::catalogue()) {
+    if (effect.id == id) {
+      return effect.words;
+    }
+  }
+  const std::string_view words = look_up(noise, id);
   return std::string(words.empty() ? id : words);
 }
 

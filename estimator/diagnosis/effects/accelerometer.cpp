@@ -52,6 +52,7 @@ void cross_coupling(const EffectContext& c, double /*constant*/, Columns velocit
 std::vector<Effect> accelerometer_effects() {
   std::vector<Effect> all;
   all.push_back({.id = "accel_relaxation",
+                 .words = "creep of the accelerometers after each turn",
                  .place = 30,
                  .equation = "df_i = r_i exp(-s/tau), s since the turn",
                  .excited = "first minutes of the dwells after a turn",
@@ -62,6 +63,7 @@ std::vector<Effect> accelerometer_effects() {
                  .sensor = relaxation,
                  .since_turns = true});
   all.push_back({.id = "accel_bias_ramp",
+                 .words = "accelerometer bias that changes steadily with time",
                  .place = 40,
                  .equation = "df_i = c_i t",
                  .excited = "whole recording",
@@ -71,6 +73,7 @@ std::vector<Effect> accelerometer_effects() {
                  .sensor = ramp,
                  .lack_of_fit = std::make_shared<const Effect>(accel_warm_up())});
   all.push_back({.id = "accel_quadratic",
+                 .words = "accelerometer error quadratic in its input",
                  .place = 90,
                  .equation = "df_i = k_i u_i^2",
                  .excited = "rotations",
@@ -79,6 +82,7 @@ std::vector<Effect> accelerometer_effects() {
                  .triad = Triad::accelerometer,
                  .sensor = quadratic});
   all.push_back({.id = "accel_cubic",
+                 .words = "accelerometer error cubic in its input",
                  .place = 100,
                  .equation = "df_i = k_i u_i^3",
                  .excited = "rotations",
@@ -87,6 +91,7 @@ std::vector<Effect> accelerometer_effects() {
                  .triad = Triad::accelerometer,
                  .sensor = cubic});
   all.push_back({.id = "accel_cross_coupling",
+                 .words = "accelerometer error from products of two axes (cross-coupling)",
                  .place = 230,
                  .equation = "df_i = k u_j u_k, j != i or k != i",
                  .excited = "rotations, tilted dwells",

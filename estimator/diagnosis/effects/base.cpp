@@ -49,6 +49,7 @@ std::string wrong_latitude(const Eigen::VectorXd& value, const Eigen::VectorXd& 
 std::vector<Effect> base_effects() {
   std::vector<Effect> all;
   all.push_back({.id = "base_settling",
+                 .words = "base that settles during the recording",
                  .place = 240,
                  .equation = "d = a exp(-t/tau) along north, up, east",
                  .excited = "whole recording, mostly its start",
@@ -57,6 +58,7 @@ std::vector<Effect> base_effects() {
                  .constant = time_constant(settling_tau_s),
                  .displacement = settling});
   all.push_back({.id = "base_sway",
+                 .words = "sway of the base",
                  .place = 250,
                  .equation = "d = a sin(2 pi f t) + b cos(2 pi f t) along north, up, east",
                  .excited = "everywhere, at its own frequency",
@@ -66,6 +68,7 @@ std::vector<Effect> base_effects() {
                  .displacement = sway,
                  .motion_of_moored_base = true});
   all.push_back({.id = "wrong_site",
+                 .words = "latitude of the site that is not the true one",
                  .place = 260,
                  .equation = "dw = dOmega/dlatitude * (latitude - the site's)",
                  .excited = "dwells, by the Earth rate's angle to gravity",

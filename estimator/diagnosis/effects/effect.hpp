@@ -69,8 +69,9 @@ enum class Triad { none, gyro, accelerometer };
 enum class TemperatureUse { none, warm_up, measured };
 
 struct Effect {
-  std::string id = {};  // as in the catalogue
-  int place = 0;        // in the catalogue: simpler effects before those that contain them
+  std::string id = {};     // as in the catalogue
+  std::string words = {};  // what it is, for people: "creep of the accelerometers after each turn"
+  int place = 0;           // in the catalogue: simpler effects before those that contain them
   std::string equation = {};
   std::string excited = {};     // where it shows, in words
   std::string experiment = {};  // what would tell it from its rivals

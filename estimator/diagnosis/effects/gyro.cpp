@@ -67,6 +67,7 @@ std::shared_ptr<const Effect> attitude_functions() {
 std::vector<Effect> gyro_effects() {
   std::vector<Effect> all;
   all.push_back({.id = "gyro_scale_asymmetry",
+                 .words = "gyro scale factor that differs between the two senses of turning",
                  .place = 110,
                  .equation = "dw_i = a_i |w_i|",
                  .excited = "rotations",
@@ -75,6 +76,7 @@ std::vector<Effect> gyro_effects() {
                  .triad = Triad::gyro,
                  .sensor = scale_asymmetry});
   all.push_back({.id = "gyro_scale_nonlinearity",
+                 .words = "gyro scale factor that depends on the rate",
                  .place = 120,
                  .equation = "dw_i = c_i w_i |w_i|",
                  .excited = "rotations, by the change of rate within them",
@@ -83,6 +85,7 @@ std::vector<Effect> gyro_effects() {
                  .triad = Triad::gyro,
                  .sensor = scale_nonlinearity});
   all.push_back({.id = "gyro_drift_ramp",
+                 .words = "gyro drift that changes steadily with time",
                  .place = 130,
                  .equation = "dw_i = c_i t",
                  .excited = "whole recording",
@@ -92,6 +95,7 @@ std::vector<Effect> gyro_effects() {
                  .sensor = ramp,
                  .lack_of_fit = std::make_shared<const Effect>(gyro_warm_up())});
   all.push_back({.id = "gyro_dead_zone",
+                 .words = "dead zone (lock-in) of the gyros at low rate",
                  .place = 180,
                  .equation = "dw_i = -a_i tanh(w_i/w0)",
                  .excited = "dwells, by the sign of the Earth rate on the axis",
@@ -102,6 +106,7 @@ std::vector<Effect> gyro_effects() {
                  .sensor = dead_zone,
                  .lack_of_fit = attitude_functions()});
   all.push_back({.id = "gyro_g_sensitivity",
+                 .words = "gyro drift proportional to specific force (g-sensitivity)",
                  .place = 190,
                  .equation = "dw_i = sum_j G_ij u_j",
                  .excited = "dwells",
@@ -112,6 +117,7 @@ std::vector<Effect> gyro_effects() {
                  .lack_of_fit = attitude_functions(),
                  .linear_in_force = true});
   all.push_back({.id = "gyro_magnetic_sensitivity",
+                 .words = "gyro drift proportional to the magnetic field",
                  .place = 200,
                  .equation = "dw_i = sum_j M_ij B_j",
                  .excited = "dwells",

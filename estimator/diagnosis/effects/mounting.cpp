@@ -46,6 +46,7 @@ void flexure(const EffectContext& c, double /*constant*/, Columns velocity, Colu
 std::vector<Effect> mounting_effects() {
   std::vector<Effect> all;
   all.push_back({.id = "imu_lever_arm",
+                 .words = "IMU centre that is off the gimbal's centre (lever arm)",
                  .place = 10,
                  .equation = "df = dw/dt x r + w x (w x r)",
                  .excited = "rotations",
@@ -53,6 +54,7 @@ std::vector<Effect> mounting_effects() {
                  .parameters = axis_parameters("cm", 0.01, 1.0),
                  .sensor = lever_arm});
   all.push_back({.id = "accel_gyro_time_offset",
+                 .words = "accelerometers sampled at another time than the gyros",
                  .place = 20,
                  .equation = "df = f(t - tau) - f(t) = tau w x f",
                  .excited = "rotations",
@@ -60,6 +62,7 @@ std::vector<Effect> mounting_effects() {
                  .parameters = {{"tau", "ms", 1e-3, 0.3}},
                  .sensor = time_offset});
   all.push_back({.id = "accel_size_effect",
+                 .words = "accelerometers that do not sit at one point (size effect)",
                  .place = 210,
                  .equation = "df_i = [dw/dt x r_i + w x (w x r_i)]_i",
                  .excited = "rotations",
@@ -67,6 +70,7 @@ std::vector<Effect> mounting_effects() {
                  .parameters = matrix_parameters("cm", 0.01, 1.0),
                  .sensor = size_effect});
   all.push_back({.id = "triad_flexure",
+                 .words = "accelerometer triad that bends under gravity",
                  .place = 220,
                  .equation = "df = (K u) x f",
                  .excited = "dwells and rotations",

@@ -39,6 +39,7 @@ constexpr std::array scale_tau_s = {120.0, 480.0, 1920.0, 30000.0};
 
 Effect accel_scale_warm_up() {
   return {.id = "accel_scale_temperature",
+          .words = "accelerometer scale factor that follows temperature",
           .place = 70,
           .equation = "df_i = k_i (1 - exp(-t/tau)) f_i",
           .excited = "dwells, by axis along gravity",
@@ -53,6 +54,7 @@ Effect accel_scale_warm_up() {
 
 Effect gyro_scale_warm_up() {
   return {.id = "gyro_scale_temperature",
+          .words = "gyro scale factor that follows temperature",
           .place = 160,
           .equation = "dw_i = k_i (1 - exp(-t/tau)) w_i",
           .excited = "rotations, early against late",
@@ -75,6 +77,7 @@ Effect leaving(const Effect& warm_up, Effect effect) {
 
 Effect accel_warm_up() {
   return {.id = "accel_temperature",
+          .words = "accelerometer bias that follows temperature",
           .place = 50,
           .equation = "df_i = b_i (1 - exp(-t/tau))",
           .excited = "whole recording, mostly its start",
@@ -89,6 +92,7 @@ Effect accel_warm_up() {
 
 Effect gyro_warm_up() {
   return {.id = "gyro_temperature",
+          .words = "gyro drift that follows temperature",
           .place = 140,
           .equation = "dw_i = b_i (1 - exp(-t/tau))",
           .excited = "whole recording, mostly its start",
@@ -105,6 +109,7 @@ std::vector<Effect> thermal_effects() {
   std::vector<Effect> all;
   all.push_back(leaving(accel_warm_up(), accel_warm_up()));
   all.push_back(leaving(accel_warm_up(), {.id = "accel_temperature",
+                                          .words = "accelerometer bias that follows temperature",
                                           .place = 60,
                                           .equation = "df_i = b_i (T - mean T)",
                                           .excited = "whole recording",
@@ -115,6 +120,7 @@ std::vector<Effect> thermal_effects() {
                                           .sensor = accel_bias_follows}));
   all.push_back(leaving(accel_scale_warm_up(), accel_scale_warm_up()));
   all.push_back(leaving(accel_scale_warm_up(), {.id = "accel_scale_temperature",
+                                                .words = "accelerometer scale factor that follows temperature",
                                                 .place = 80,
                                                 .equation = "df_i = k_i (T - mean T) f_i",
                                                 .excited = "dwells, by axis along gravity",
@@ -125,6 +131,7 @@ std::vector<Effect> thermal_effects() {
                                                 .sensor = accel_scale_follows}));
   all.push_back(leaving(gyro_warm_up(), gyro_warm_up()));
   all.push_back(leaving(gyro_warm_up(), {.id = "gyro_temperature",
+                                         .words = "gyro drift that follows temperature",
                                          .place = 150,
                                          .equation = "dw_i = b_i (T - mean T)",
                                          .excited = "whole recording",
@@ -135,6 +142,7 @@ std::vector<Effect> thermal_effects() {
                                          .sensor = gyro_drift_follows}));
   all.push_back(leaving(gyro_scale_warm_up(), gyro_scale_warm_up()));
   all.push_back(leaving(gyro_scale_warm_up(), {.id = "gyro_scale_temperature",
+                                               .words = "gyro scale factor that follows temperature",
                                                .place = 170,
                                                .equation = "dw_i = k_i (T - mean T) w_i",
                                                .excited = "rotations",
