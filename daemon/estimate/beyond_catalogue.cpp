@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "daemon/estimate/quantity_text.hpp"
-#include "estimator/discovery/named_effects.hpp"
 #include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
@@ -46,18 +45,6 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
 }
 
 }  // namespace
-
-std::optional<Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
-                                       const discovery::Progress& progress, const std::stop_token& stop) {
-  const discovery::DiagnosedRecording recording{data, diagnosis};
-  const auto rest = discovery::UnexplainedRest::of({&recording, 1}, stop);
-  if (!rest) {
-    return std::nullopt;
-  }
-  discovery::DiscoveryOptions options;
-  options.stop = stop;
-  return discovery::discover(rest->recordings(), options, progress);
-}
 
 double explained_share(const Discovery& found) {
   if (found.laws.empty() && found.processes.empty()) {

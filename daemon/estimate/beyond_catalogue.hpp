@@ -2,21 +2,13 @@
 // people and as JSON.
 #pragma once
 
-#include <functional>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
-#include <stop_token>
 #include <string>
 
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/discovery/discovery.hpp"
 
 namespace selfcal {
-
-// The search, on the recording less what was named. None where its calibration fails.
-std::optional<discovery::Discovery> search_beyond(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
-                                                  const discovery::Progress& progress = {},
-                                                  const std::stop_token& stop = {});
 
 // Of the misfit that the catalogue leaves, the share that laws and processes take away; 0 where none was found.
 double explained_share(const discovery::Discovery& found);

@@ -4,7 +4,7 @@
 #include <cctype>
 #include <utility>
 
-#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "daemon/estimate/analysis.hpp"
 
 namespace selfcal {
 namespace {
@@ -70,13 +70,11 @@ bool in_name(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 |
 }  // namespace
 
 std::string effect_words(std::string_view id) {
-  for (const diagnosis::Effect& effect : diagnosis::catalogue()) {
-    if (effect.id == id) {
-      return effect.words;
-    }
+  std::string words = words_in_catalogue(id);
+  if (words.empty()) {
+    words = look_up(noise, id);
   }
-  const std::string_view words = look_up(noise, id);
-  return std::string(words.empty() ? id : words);
+  return words.empty() ? std::string(id) : words;
 }
 
 std::vector<Symbol> symbols_of(std::string_view equation) {

@@ -2,33 +2,10 @@
 
 #include <chrono>
 
-#include "daemon/estimate/beyond_catalogue.hpp"
+#include "daemon/estimate/analysis.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 
 namespace selfcal {
-namespace {
-
-struct Cause {
-  std::optional<diagnosis::Diagnosis> diagnosis;
-  std::optional<discovery::Discovery> beyond;
-};
-
-Cause cause_of(const Recording& recording, const CalibrationOptions& calibration,
-               const std::function<void(const std::string&)>& progress, const std::stop_token& stop) {
-  std::vector<double> first_temperature;
-  const ImuData data = imu_view(recording, first_temperature);
-  diagnosis::DiagnosisOptions options;
-  options.calibration = calibration;
-  options.stop = stop;
-  Cause cause{diagnosis::diagnose(data, options, progress).diagnosis, std::nullopt};
-  if (cause.diagnosis && cause.diagnosis->unexplained) {
-    cause.beyond = search_beyond(data, *cause.diagnosis, progress, stop);
-  }
-  return cause;
-}
-
-}  // namespace
-
 JudgedResult judged(CalibrationResult result, const ParameterVector& tolerance, const Limits& limits,
                     const Subject& subject, std::optional<diagnosis::Diagnosis> diagnosis,
                     std::optional<discovery::Discovery> beyond) {
@@ -51,7 +28,11 @@ Expected<JudgedResult> judged_calibration(const Recording& recording, const Cali
   }
   Cause cause;
   if (find_cause && result->consistency.verdict == Verdict::inconsistent) {
-    cause = cause_of(recording, options, progress.diagnosis, stop);
+    std::vector<double> first_temperature;
+    diagnosis::DiagnosisOptions of_catalogue;
+    of_catalogue.calibration = options;
+    of_catalogue.stop = stop;
+    cause = cause_of(imu_view(recording, first_temperature), of_catalogue, progress.diagnosis);
     result->elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   }
   return judged(std::move(*result), options.tolerance, limits, subject, std::move(cause.diagnosis),

@@ -39,10 +39,6 @@ Eigen::MatrixXd increments(const PieceSums& sums) {
 
 }  // namespace
 
-std::string_view name_of(ProcessKind kind) {
-  return kind == ProcessKind::jump_per_turn ? "jump per turn" : "random walk";
-}
-
 ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKind kind, int axis) {
   ProcessFit fit;
   fit.kind = kind;

@@ -9,7 +9,10 @@
 namespace selfcal::discovery {
 
 enum class ProcessKind { jump_per_turn, random_walk };
-std::string_view name_of(ProcessKind kind);  // as in a law's `process`
+// As in a law's `process`.
+constexpr std::string_view name_of(ProcessKind kind) {
+  return kind == ProcessKind::jump_per_turn ? "jump per turn" : "random walk";
+}
 
 struct ProcessFit {
   ProcessKind kind = ProcessKind::jump_per_turn;

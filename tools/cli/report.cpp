@@ -7,12 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "daemon/estimate/beyond_catalogue.hpp"
+#include "daemon/estimate/analysis.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/judged_result.hpp"
 #include "daemon/host/wall_clock.hpp"
-#include "estimator/diagnosis/diagnosis.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/file_hash.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -61,28 +60,24 @@ Expected<CalibrationOptions> options_from(const ReportArguments& arguments) {
 
 // Adds the diagnosis, and to the summary the cause that it names.
 Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recording& recording,
-                             const std::string& name, double false_alarm_rate) {
+                             const std::string& name, const CalibrationOptions& calibration, double false_alarm_rate) {
   std::vector<double> first_temperature;
   const ImuData data = imu_view(recording, first_temperature);
   diagnosis::DiagnosisOptions options;
+  options.calibration = calibration;
   options.false_alarm_rate = false_alarm_rate;
   ProgressLine line;
-  const diagnosis::DiagnosisOutcome outcome =
-      diagnosis::diagnose(data, options, [&line](const std::string& words) { line.show("diagnosis: " + words); });
-  if (!outcome.diagnosis) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, outcome.failure));
+  const Cause cause = cause_of(data, options, [&line](const std::string& words) { line.show("diagnosis: " + words); });
+  if (!cause.diagnosis) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, cause.failure));
   }
-  std::optional<discovery::Discovery> beyond;
-  if (outcome.diagnosis->unexplained) {
-    beyond = search_beyond(data, *outcome.diagnosis, [&line](const std::string& words) { line.show(words); });
-  }
-  const discovery::Discovery* found = beyond ? &*beyond : nullptr;
-  Json document = diagnosis_json(*outcome.diagnosis, false_alarm_rate, {}, found);
-  if (outcome.diagnosis->faults.empty()) {
-    document["map"] = report::misfit_map(data, *outcome.diagnosis);
+  const discovery::Discovery* found = cause.beyond ? &*cause.beyond : nullptr;
+  Json document = diagnosis_json(*cause.diagnosis, false_alarm_rate, {}, found);
+  if (cause.diagnosis->faults.empty()) {
+    document["map"] = report::misfit_map(data, *cause.diagnosis);
   }
   page["diagnosis"] = std::move(document);
-  page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*outcome.diagnosis, found));
+  page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*cause.diagnosis, found));
   return {};
 }
 
@@ -101,7 +96,7 @@ Expected<Json> recording_document(const std::string& file, const ReportArguments
   }
   Json document = report::calibration_document(*judged, *options, loaded->recording, loaded->warnings);
   if (!arguments.no_diagnosis) {
-    const auto added = add_diagnosis(document, *judged, loaded->recording, file, arguments.false_alarm_rate);
+    const auto added = add_diagnosis(document, *judged, loaded->recording, file, *options, arguments.false_alarm_rate);
     if (!added) {
       return tl::unexpected(added.error());
     }
