@@ -121,18 +121,18 @@ bool visible(double sigma, int column) {
 int best_column(const Evidence& evidence, int columns, const std::vector<int>& chosen, double alpha) {
   const SingleTest test(evidence, chosen);
   int best = -1;
-  double gain = 0.0;
+  double delta_chi2 = 0.0;
   for (int k = 0; k < columns; ++k) {
     const bool taken = std::find(chosen.begin(), chosen.end(), k) != chosen.end();
     const auto found = taken ? std::nullopt : test(k);
-    if (!found || found->z * found->z <= gain || !visible(std::abs(found->size / found->z), k) ||
+    if (!found || found->z * found->z <= delta_chi2 || !visible(std::abs(found->size / found->z), k) ||
         std::abs(found->size) > possible(k)) {
       continue;
     }
-    gain = found->z * found->z;
+    delta_chi2 = found->z * found->z;
     best = k;
   }
-  return log_corrected(log_chi_squared_tail(gain, 1.0), columns) < std::log(alpha) ? best : -1;
+  return log_corrected(log_chi_squared_tail(delta_chi2, 1.0), columns) < std::log(alpha) ? best : -1;
 }
 
 // Whether each coefficient is still one that a sensor can have: what is taken later may be nearly collinear with it.
@@ -208,7 +208,7 @@ EmpiricalDescription describe_empirically(const ImuData& data, const Diagnosis& 
                             std::sqrt(fit.covariance(at, at)) * p.typical, taken.held_out_gain[k]});
     result.held_out_gain += taken.held_out_gain[k];
   }
-  result.share = std::min(1.0, fit.gain / std::max(1.0, evidence.square - evidence.rows));
+  result.share = std::min(1.0, fit.delta_chi2 / std::max(1.0, evidence.square - evidence.rows));
   return result;
 }
 

@@ -59,7 +59,7 @@ class Search {
   }
 
   // Laws first, for a random process can stand for any of them. Where they leave something that a process takes up, or one
-  // process explains far more than the best law, processes first; the way of the greater posterior probability is told.
+  // process explains far more than the best law, processes first; the way of the greater posterior probability is reported.
   Discovery run() {
     constexpr double far_more = 1.5;
     const ProcessFit process = best_process();

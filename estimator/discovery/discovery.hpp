@@ -27,7 +27,7 @@ struct DiscoveryOptions {
 struct ClassMember {
   std::string expression;
   int axis = 0;
-  double odds = 0.0;  // against the law that is told, 1 for itself
+  double odds = 0.0;  // against the law that is reported, 1 for itself
 };
 
 struct Constant {

@@ -50,7 +50,7 @@ std::vector<std::string> by_bic(const diagnosis::SignaturePass& pass, const diag
       std::vector<int> columns = taken;
       const std::vector<int> own = columns_of(c);
       columns.insert(columns.end(), own.begin(), own.end());
-      const double gain = evidence.fit(columns).gain;
+      const double gain = evidence.fit(columns).delta_chi2;
       const double fall = gain - before - c.count * std::log(evidence.rows);
       if (fall > best) {
         best = fall;

@@ -69,7 +69,7 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   const auto [G, b] = e.given(group, others);
   GroupTest test;
   const Fit fit = fit_columns(G, b);
-  test.gain = fit.gain;
+  test.delta_chi2 = fit.delta_chi2;
   test.rank = fit.rank;
   if (fit.rank == 0) {
     return test;
@@ -84,7 +84,7 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   }
   const double alone = log_chi_squared_tail(best, 1.0);
   const double single = log_corrected(alone, static_cast<double>(b.size()));
-  test.log_p = log_chi_squared_tail(fit.gain, fit.rank);
+  test.log_p = log_chi_squared_tail(fit.delta_chi2, fit.rank);
   test.log_detection = std::min(test.log_p, alone);
   if (b.size() > 1) {
     test.log_p = log_corrected(std::min(test.log_p, single), 2.0);
@@ -124,8 +124,8 @@ RandomWalk test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, i
   for (int step = first_decade * steps_per_decade; step <= last_decade * steps_per_decade; ++step) {
     const double q = std::pow(10.0, static_cast<double>(step) / steps_per_decade);
     const double value = twice_log_likelihood(q);
-    if (value > test.gain) {
-      test.gain = value;
+    if (value > test.delta_chi2) {
+      test.delta_chi2 = value;
       best_q = q;
     }
   }
@@ -133,7 +133,7 @@ RandomWalk test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, i
   if (best_q > 0.0) {  // curvature in the logarithm of the rate
     const double h = 0.1;
     const double around = twice_log_likelihood(best_q * std::exp(2.0 * h)) +
-                          twice_log_likelihood(best_q * std::exp(-2.0 * h)) - 2.0 * test.gain;
+                          twice_log_likelihood(best_q * std::exp(-2.0 * h)) - 2.0 * test.delta_chi2;
     test.sigma = test.rate / std::sqrt(std::max(-0.5 * around / (h * h), 1.0));
   }
   test.covariance = best_q * K;

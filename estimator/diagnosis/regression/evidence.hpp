@@ -42,7 +42,7 @@ struct Evidence {
 constexpr double least_information = 1e-5;
 
 struct GroupTest {
-  double gain = 0.0;  // fall of the residuals' square
+  double delta_chi2 = 0.0;  // fall of the residuals' square
   int rank = 0;
   double log_p = 0.0;          // of the group: whole group and best single column, corrected for looking at both
   double log_detection = 0.0;  // the smaller of both, not corrected: for effective_tests, and for rivals the above
@@ -54,7 +54,7 @@ GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, co
 // Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
 struct RandomWalk {
   int axis = 0;                // 0..2 gyro, 3..5 accelerometer
-  double gain = 0.0;           // twice the log-likelihood gained
+  double delta_chi2 = 0.0;     // twice the log-likelihood gained
   double rate = 0.0;           // map units per sqrt(h)
   double sigma = 0.0;          // of the rate, from the curvature
   std::vector<int> places;     // of the map: the axis' dwells and rotations

@@ -137,7 +137,7 @@ Hypothesis LinearModel::fitted(Hypothesis h) const {
 
 double LinearModel::log_likelihood() const {
   return rows_->pass.log_likelihood +
-         0.5 * (rows_->residual.squaredNorm() - evidence_.square + evidence_.fit(columns_of(terms_)).gain);
+         0.5 * (rows_->residual.squaredNorm() - evidence_.square + evidence_.fit(columns_of(terms_)).delta_chi2);
 }
 
 Eigen::VectorXd LinearModel::residual() const {

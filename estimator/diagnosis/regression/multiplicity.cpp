@@ -35,7 +35,7 @@ class Normals {
 // One candidate as quadratic forms of its score.
 struct Form {
   Eigen::Index first = 0, count = 0;
-  Eigen::MatrixXd root;      // gain = |root * score|^2
+  Eigen::MatrixXd root;      // delta_chi2 = |root * score|^2
   Eigen::VectorXd variance;  // of the scores; 0: not seen
 };
 
@@ -60,9 +60,9 @@ double smallest_log_p(const std::vector<Form>& forms, const Eigen::VectorXd& sco
       }
     }
     const auto rank = static_cast<double>(f.root.rows());
-    const double gain = (f.root * own).squaredNorm();
-    if (rank > 1.0 && gain > rank + worth_a_look * std::sqrt(2.0 * rank)) {
-      smallest = std::min(smallest, log_chi_squared_tail(gain, rank));
+    const double delta_chi2 = (f.root * own).squaredNorm();
+    if (rank > 1.0 && delta_chi2 > rank + worth_a_look * std::sqrt(2.0 * rank)) {
+      smallest = std::min(smallest, log_chi_squared_tail(delta_chi2, rank));
     }
   }
   return std::min(smallest, log_chi_squared_tail(single, 1.0));

@@ -80,7 +80,7 @@ Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score
   for (Eigen::Index k = 0; k < n; ++k) {
     if (eigen.eigenvalues()(k) > floor) {
       solved(k) = rotated(k) / eigen.eigenvalues()(k);
-      fit.gain += rotated(k) * solved(k);
+      fit.delta_chi2 += rotated(k) * solved(k);
       ++fit.rank;
     }
   }

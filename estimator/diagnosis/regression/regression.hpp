@@ -20,14 +20,14 @@ double sigma_about(double centre, const std::vector<Share>& shares);
 struct Fit {
   Eigen::VectorXd value;       // in the columns' units
   Eigen::MatrixXd covariance;  // with a prior of `most` on every coefficient
-  double gain = 0.0;           // fall of the residual's square
+  double delta_chi2 = 0.0;     // fall of the residual's square
   int rank = 0;
 };
 // Solves the normal equations of columns that are fitted beside those in question, with a prior of 1000 typical sizes (no sensor
 // is that bad), so that a direction that nothing shows is left alone instead of divided by zero.
 Eigen::LDLT<Eigen::MatrixXd> solver_beside(Eigen::MatrixXd information);
 Fit fit_columns(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, double most = 300.0);
-// Rows r_k of the visible directions with gain = sum (r_k score)^2, as fit_columns takes them.
+// Rows r_k of the visible directions with delta_chi2 = sum (r_k score)^2, as fit_columns takes them.
 Eigen::MatrixXd visible_root(const Eigen::MatrixXd& information, double most = 300.0);
 
 }  // namespace selfcal::diagnosis

@@ -284,12 +284,12 @@ PlaceAverage average_place(const Averaging& averaging, std::size_t i, const std:
 }
 
 // Size and sigma of the coefficients, all of them unknown: that only one is concerned may well be the better guess, but
-// an interval must not rest on it. Size and constant as told belong together; sigma says what else they may be.
-void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, AveragedTerm& told) {
+// an interval must not rest on it. Size and constant as reported belong together; sigma says what else they may be.
+void report_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tried, AveragedTerm& reported) {
   std::erase_if(tried, [&](const Tried& t) { return t.candidate != &averaging.term(i).candidate || t.part.only >= 0; });
   const double top = top_of(tried);
   const Eigen::Index count = averaging.term(i).candidate.count;
-  Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;  // with any constant, with the one told
+  Mixture<Eigen::VectorXd, Eigen::MatrixXd> any, fitted;  // with any constant, with the one reported
   std::vector<std::vector<Share>> each(static_cast<std::size_t>(count));
   for (const Tried& t : tried) {
     if (t.log_p < top - negligible) {
@@ -307,13 +307,14 @@ void tell_sizes(const Averaging& averaging, std::size_t i, std::vector<Tried> tr
       each[static_cast<std::size_t>(k)].push_back({weight, mean(k), std::sqrt(covariance(k, k))});
     }
   }
-  told.amplitude = (fitted.weight > 0.0 ? fitted : any).mean();
-  told.covariance = any.covariance();
+  reported.amplitude = (fitted.weight > 0.0 ? fitted : any).mean();
+  reported.covariance = any.covariance();
   Eigen::VectorXd stretch(count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    stretch(k) = sigma_about(told.amplitude(k), each[static_cast<std::size_t>(k)]) / std::sqrt(told.covariance(k, k));
+    stretch(k) =
+        sigma_about(reported.amplitude(k), each[static_cast<std::size_t>(k)]) / std::sqrt(reported.covariance(k, k));
   }
-  told.covariance = stretch.asDiagonal() * told.covariance * stretch.asDiagonal();
+  reported.covariance = stretch.asDiagonal() * reported.covariance * stretch.asDiagonal();
 }
 
 }  // namespace
@@ -332,12 +333,12 @@ Averages average_explanations(const Evidence& evidence, const Eigen::MatrixXd& s
   for (std::size_t i = 0; i < terms.size(); ++i) {
     const std::vector<Tried> tried = try_all(averaging, i, alternatives);
     const PlaceAverage place = average_place(averaging, i, tried);
-    AveragedTerm told;
-    told.probability = place.probability;
-    tell_sizes(averaging, i, tried, told);
-    told.constant_sigma =
+    AveragedTerm reported;
+    reported.probability = place.probability;
+    report_sizes(averaging, i, tried, reported);
+    reported.constant_sigma =
         place.constants.empty() ? terms[i].constant_sigma : sigma_about(terms[i].candidate.constant, place.constants);
-    result.terms.push_back(std::move(told));
+    result.terms.push_back(std::move(reported));
     result.shift += place.shift.mean() - best.shift;
     result.shift_covariance += place.shift.covariance() - best.shift_covariance;
     for (int k = 0; k < sensor_parameter_count; ++k) {  // averaging one effect never adds certainty about the others

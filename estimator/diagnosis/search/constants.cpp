@@ -24,29 +24,29 @@ std::vector<double> gains_around(const RecordingContext& context, const Operatin
     grid.push_back({own.effect, constant, constant});
   }
   const LinearModel model = LinearModel::about(context, point, without_term(h, i), grid, false);
-  std::vector<double> gain;
+  std::vector<double> delta_chi2;
   for (const Candidate& c : model.alternatives()) {
-    gain.push_back(model.test(c).gain);
+    delta_chi2.push_back(model.test(c).delta_chi2);
   }
-  return gain;
+  return delta_chi2;
 }
 
-// Where the parabola through the gain has its top.
+// Where the parabola through Δχ² has its top.
 struct Top {
   double offset = 0.0;  // steps from the middle of the grid
   double sigma = 0.0;   // steps; 0: no top
   bool at_edge = false;
 };
 
-Top top_of(const std::vector<double>& gain) {
-  const auto top = std::max_element(gain.begin(), gain.end()) - gain.begin();
+Top top_of(const std::vector<double>& delta_chi2) {
+  const auto top = std::max_element(delta_chi2.begin(), delta_chi2.end()) - delta_chi2.begin();
   const auto middle = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(top, 1, 2 * steps - 1));
-  const double curvature = gain[middle - 1] - 2.0 * gain[middle] + gain[middle + 1];
-  const double slope = 0.5 * (gain[middle + 1] - gain[middle - 1]);
+  const double curvature = delta_chi2[middle - 1] - 2.0 * delta_chi2[middle] + delta_chi2[middle + 1];
+  const double slope = 0.5 * (delta_chi2[middle + 1] - delta_chi2[middle - 1]);
   const double offset = curvature < 0.0 ? std::clamp(-slope / curvature, -1.0, 1.0) : 0.0;
-  // gain = -2 log likelihood: sigma^2 = -2 / (second derivative).
+  // Δχ² = -2 log likelihood: sigma^2 = -2 / (second derivative).
   const double sigma = curvature < 0.0 ? std::sqrt(-2.0 / curvature) : 0.0;
-  return {static_cast<double>(middle) - steps + offset, sigma, top == 0 || top + 1 == std::ssize(gain)};
+  return {static_cast<double>(middle) - steps + offset, sigma, top == 0 || top + 1 == std::ssize(delta_chi2)};
 }
 
 // The catalogue's grid may be wide: the top is followed along it, and by a factor of 2 beyond. A frequency has none.

@@ -8,7 +8,7 @@
 
 namespace selfcal::diagnosis {
 
-// With the constant of term i at the top of the likelihood, the other terms beside it: a parabola through the gain over its
+// With the constant of term i at the top of the likelihood, the other terms beside it: a parabola through Δχ² over its
 // logarithm, on a grid that closes in. `about`: where the signatures are carried, some passes.
 Selection with_constant_followed(const RecordingContext& context, const Stage& about, Selection selection,
                                  std::size_t i);

@@ -33,7 +33,7 @@ bool structure_good(const Structure& left, const Rules& rules) {
 void describe_all(const SearchResult& found, const Rules& rules, Judgement& j) {
   for (const NamedTerm& term : found.named) {
     j.named.push_back(describe(term, found.rows));
-    j.named.back().share = term.gain / found.misfit;
+    j.named.back().share = term.delta_chi2 / found.misfit;
   }
   for (const RandomWalk& walk : found.walks) {
     (rules.goes_on(walk) ? j.named : j.jumps).push_back(describe(walk, found.rows));
@@ -81,7 +81,7 @@ Finding describe(const NamedTerm& term, double rows) {
   }
   f.log_p = term.log_p;
   f.significance = sigma_from_log_p(term.log_p);
-  f.delta_bic = term.gain - term.rank * std::log(rows);
+  f.delta_bic = term.delta_chi2 - term.rank * std::log(rows);
   f.held_out_gain = term.held_out;
   return f;
 }
@@ -95,9 +95,9 @@ Finding describe(const RandomWalk& walk, double rows) {
   const double unit = map_unit(walk.axis) / (walk.axis < 3 ? units::degree_per_hour : units::micro_g);
   f.parameters.push_back({axis_letters[static_cast<std::size_t>(walk.axis)],
                           walk.axis < 3 ? "deg/h/sqrt(h)" : "ug/sqrt(h)", walk.rate * unit, walk.sigma * unit});
-  f.log_p = log_normal_tail(std::sqrt(walk.gain));
+  f.log_p = log_normal_tail(std::sqrt(walk.delta_chi2));
   f.significance = sigma_from_log_p(f.log_p);
-  f.delta_bic = walk.gain - std::log(rows);
+  f.delta_bic = walk.delta_chi2 - std::log(rows);
   f.stochastic = true;
   return f;
 }
@@ -133,8 +133,8 @@ Judgement judge(const SearchResult& found, const Rules& rules) {
     j.after.accepted = j.after.accepted && structure_good(found.structure, rules);
   }
   j.after.accepted = j.after.accepted || (!j.named.empty() && negligible(j.after, j.before));
-  const bool itself = found.log_p_likeness > std::log(rejection_rate);
-  j.after.accepted = j.after.accepted && j.jumps.empty() && itself && !found.entangled;
+  const bool itself = found.log_p_lack_of_fit > std::log(rejection_rate);
+  j.after.accepted = j.after.accepted && j.jumps.empty() && itself && !found.collinear;
   j.names_stand = j.after.accepted || j.after.misfit < rules.tolerable_share * j.before.misfit;
   return j;
 }

@@ -107,7 +107,7 @@ Map locate(const Evidence& e, const std::vector<LocatedColumn>& map, int first_m
 
 double square_within(const Evidence& e, const std::vector<int>& place, const std::vector<int>& named,
                      const Eigen::VectorXd& size) {
-  return named.empty() ? 0.0 : fit_columns(e.information(place, place), e.information(place, named) * size).gain;
+  return named.empty() ? 0.0 : fit_columns(e.information(place, place), e.information(place, named) * size).delta_chi2;
 }
 
 namespace {

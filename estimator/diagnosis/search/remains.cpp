@@ -38,7 +38,7 @@ bool stands_for(const LinearModel& model, const std::vector<int>& group, const C
   const Eigen::MatrixXd G = other.transpose() * other;
   for (Eigen::Index k = 0; k < z.size(); ++k) {
     const Eigen::VectorXd column = model.rows().columns.col(own.first + k);
-    if (z(k) >= least && fit_columns(G, other.transpose() * column).gain / column.squaredNorm() > half_of_it) {
+    if (z(k) >= least && fit_columns(G, other.transpose() * column).delta_chi2 / column.squaredNorm() > half_of_it) {
       return true;
     }
   }
@@ -47,7 +47,7 @@ bool stands_for(const LinearModel& model, const std::vector<int>& group, const C
 
 }  // namespace
 
-bool entangled(const LinearModel& model, const Hypothesis& named) {
+bool any_collinear(const LinearModel& model, const Hypothesis& named) {
   const std::vector<Candidate>& terms = model.terms();
   for (std::size_t i = 0; i < terms.size(); ++i) {
     const Eigen::VectorXd z = sigmas(named.terms[i]);
@@ -84,7 +84,8 @@ Structure structure_left(const Stage& stage) {
       const GroupTest left = test_group(given, group, others);
       const bool walks_there =
           std::any_of(walks.begin(), walks.end(), [&](const RandomWalk& w) { return w.axis / 3 == axis / 3; });
-      const bool named = walks_there || (!others.empty() && square_within(given, group, others, size) >= left.gain);
+      const bool named =
+          walks_there || (!others.empty() && square_within(given, group, others, size) >= left.delta_chi2);
       double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
       smallest = std::min(smallest, left.log_p);
       ++tests;
@@ -120,7 +121,7 @@ std::vector<int> columns_with_derivatives(const WithConstants& with) {
 }
 
 // Of what `left` has on the axes that a term concerns, column by column, given all that is named and its constants: the
-// smallest p, corrected. `own`: the term's gain.
+// smallest p, corrected. `own`: the term's Δχ².
 double log_p_left(const RecordingContext& context, const Stage& stage, const WithConstants& with, const Effect& left,
                   const std::array<bool, 3>& concerned, double own) {
   constexpr double tests_per_axis = 3.0;  // four functions of the gimbal angles; warm-ups are alike: two
@@ -138,7 +139,7 @@ double log_p_left(const RecordingContext& context, const Stage& stage, const Wit
   for (int column = 0; column < static_cast<int>(rows.columns.cols()); ++column) {  // axis by axis in threes
     if (concerned[static_cast<std::size_t>(column % 3)]) {
       const GroupTest test = test_group(given, {first + column}, others);
-      smallest = test.gain > form_square * own ? std::min(smallest, test.log_p) : smallest;
+      smallest = test.delta_chi2 > form_square * own ? std::min(smallest, test.log_p) : smallest;
     }
   }
   const auto axes = std::count(concerned.begin(), concerned.end(), true);
@@ -150,14 +151,14 @@ double log_p_left(const RecordingContext& context, const Stage& stage, const Wit
 // A drift that is named after one curve in time must not need a second, one named after gravity, field or rate no
 // function of the gimbal angles beside it: over tens of minutes and eighteen positions much looks alike, and a test of
 // everything that may be left has little power against what is likely.
-double log_p_of_likenesses(const RecordingContext& context, const Stage& stage, const WithConstants& with,
-                           const Hypothesis& named) {
+double log_p_of_lack_of_fit(const RecordingContext& context, const Stage& stage, const WithConstants& with,
+                            const Hypothesis& named) {
   const bool gimbal = !context.data().gimbal_outer.empty() && !context.data().gimbal_inner.empty();
   double smallest = 0.0;
   for (std::size_t i = 0; i < named.terms.size(); ++i) {
     const Effect* left = named.terms[i].effect->lack_of_fit.get();
     if (left != nullptr && (!left->needs_gimbal || gimbal)) {
-      const double own = test_group(stage.model.evidence(), columns_of(stage.model.terms()[i]), {}).gain;
+      const double own = test_group(stage.model.evidence(), columns_of(stage.model.terms()[i]), {}).delta_chi2;
       smallest = std::min(smallest, log_p_left(context, stage, with, *left, concerned_axes(named.terms[i]), own));
     }
   }

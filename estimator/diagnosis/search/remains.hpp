@@ -11,7 +11,7 @@ namespace selfcal::diagnosis {
 
 // Two terms of which the one can stand for half of the other and more: together they describe a curve, and are no explanation
 // of it. Walks stand for what their triad's do. `named`: the terms of the model, with the amplitudes that count.
-bool entangled(const LinearModel& model, const Hypothesis& named);
+bool any_collinear(const LinearModel& model, const Hypothesis& named);
 
 // Of the biases that dwells, rotations, times since a turn and times of the recording still show, axis by axis: the
 // smallest p, corrected. A single one is the map's; this is what many together leave. `log_p_named`: where what is named
@@ -23,9 +23,9 @@ struct Structure {
 Structure structure_left(const Stage& stage);
 
 // Of slow curves that drifts as named leave on their axes, and of functions of the gimbal angles that gyro drifts with the
-// attitude leave on theirs: the smallest p, corrected. What is named after its likeness leaves some. `named`: as for entangled.
-double log_p_of_likenesses(const RecordingContext& context, const Stage& stage, const WithConstants& with,
-                           const Hypothesis& named);
+// attitude leave on theirs: the smallest p, corrected. An effect that is named only because it is like the true one leaves some: a lack of fit. `named`: as for any_collinear.
+double log_p_of_lack_of_fit(const RecordingContext& context, const Stage& stage, const WithConstants& with,
+                            const Hypothesis& named);
 
 // The map by gimbal angles, directions and temperature (quantities.hpp); takes no part in any verdict. One more pass.
 struct ByQuantity {

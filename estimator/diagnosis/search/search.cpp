@@ -154,7 +154,7 @@ Hypothesis averaged(Hypothesis h, const Averages& averages) {
   return h;
 }
 
-std::vector<NamedTerm> named_terms(const RecordingContext& context, const Stage& stage, const Hypothesis& told,
+std::vector<NamedTerm> named_terms(const RecordingContext& context, const Stage& stage, const Hypothesis& reported,
                                    const Averages& averages, const Significance& significance) {
   std::vector<int> fold;  // by dwells and rotations
   for (const double t : stage.model.rows().time_s) {
@@ -167,8 +167,8 @@ std::vector<NamedTerm> named_terms(const RecordingContext& context, const Stage&
     const std::vector<int> others = columns_of(terms, i);
     const GroupTest marginal = test_group(stage.given_forms(), columns_of(terms[i]), others);
     NamedTerm n;
-    static_cast<Term&>(n) = told.terms[i];
-    n.gain = marginal.gain;
+    static_cast<Term&>(n) = reported.terms[i];
+    n.delta_chi2 = marginal.delta_chi2;
     n.rank = marginal.rank;
     n.log_p = significance.corrected(marginal.log_detection, *n.effect);
     n.held_out = held_out_gain(stage.model.rows().columns, residual, fold, stage.columns(), others);
@@ -194,19 +194,19 @@ Shown shown_after(const Stage& stage) {
   const Evidence& given = stage.given_forms();
   const std::vector<int> fitted = stage.columns();
   const OpenForms& forms = stage.forms.open;
-  return {given.square - given.fit(fitted).gain,
+  return {given.square - given.fit(fitted).delta_chi2,
           test_whiteness(stage.model.residual_after(fitted, forms.columns, forms.mean)).log_p,
           map_of(stage, given, fitted)};
 }
 
-// The 24 with the terms as told, and as a mean over all explanations with its covariance.
-void tell_parameters(const Stage& stage, const Hypothesis& told, const Averages& averages, SearchResult& result) {
+// The 24 with the terms as reported, and as a mean over all explanations with its covariance.
+void report_parameters(const Stage& stage, const Hypothesis& reported, const Averages& averages, SearchResult& result) {
   const Eigen::MatrixXd& shift = stage.model.rows().shift;
   const OpenForms& forms = stage.forms.open;
   const std::vector<int> columns = stage.columns();
   Eigen::VectorXd amplitudes(static_cast<Eigen::Index>(columns.size()));
   Eigen::Index at = 0;
-  for (const Term& t : told.terms) {
+  for (const Term& t : reported.terms) {
     amplitudes.segment(at, t.amplitude.size()) = t.amplitude;
     at += t.amplitude.size();
   }
@@ -220,7 +220,7 @@ void tell_parameters(const Stage& stage, const Hypothesis& told, const Averages&
   }
 }
 
-void tell_forms(const Stage& stage, SearchResult& result) {
+void report_forms(const Stage& stage, SearchResult& result) {
   const OpenForms& forms = stage.forms.open;
   for (const FormFamily& f : forms.families) {
     result.open_forms.push_back({f.kind, stage.hypothesis().terms[f.term].effect, f.square});
@@ -243,20 +243,20 @@ SearchResult search(const RecordingContext& context, const PassInput& input, con
   const WithConstants with = with_constants(context, stage);
   const Averages averages =
       average_explanations(with.model.evidence(), with.model.rows().shift, with.terms, stage.model.alternatives());
-  const Hypothesis told = averaged(stage.hypothesis(), averages);
-  result.log_p_likeness = log_p_of_likenesses(context, stage, with, told);
-  result.named = named_terms(context, stage, told, averages, ground.significance);
-  result.walks = told.walks;
-  result.noise = told.noise;
+  const Hypothesis reported = averaged(stage.hypothesis(), averages);
+  result.log_p_lack_of_fit = log_p_of_lack_of_fit(context, stage, with, reported);
+  result.named = named_terms(context, stage, reported, averages, ground.significance);
+  result.walks = reported.walks;
+  result.noise = reported.noise;
   result.rows = stage.model.evidence().rows;
   result.log_p_limit = options.log_threshold - std::log(ground.significance.independent_tests);
   result.after = shown_after(stage);
   result.structure = structure_left(stage);
-  result.entangled = entangled(stage.model, told);
+  result.collinear = any_collinear(stage.model, reported);
   result.misfit = std::max(1.0, stage.model.evidence().square - result.rows);
-  tell_forms(stage, result);
+  report_forms(stage, result);
   result.suspects = suspects_of(stage, ground.significance);
-  tell_parameters(stage, told, averages, result);
+  report_parameters(stage, reported, averages, result);
   result.stage = std::move(stage);
   return result;
 }

@@ -21,7 +21,7 @@ struct SearchOptions {
 // A term of the answer.
 struct NamedTerm : Term {
   double log_p = 0.0;  // given the others, corrected for variants and effects
-  double gain = 0.0;
+  double delta_chi2 = 0.0;
   int rank = 0;
   double held_out = 0.0;  // log-likelihood on dwells and rotations left out in turn
   std::vector<const Effect*> equivalent;
@@ -57,8 +57,8 @@ struct SearchResult {
       0.0;  // of one test's p, not corrected: as many independent ones as the catalogue and the walks count for
   Shown before, after;
   Structure structure;
-  double log_p_likeness = 0.0;
-  bool entangled = false;
+  double log_p_lack_of_fit = 0.0;
+  bool collinear = false;
   double misfit = 1.0;  // of the recording, at least 1: what shares are of
   std::vector<OpenForm> open_forms;
   double square_of_forms = 0.0;

@@ -60,7 +60,7 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
   // A walk has one coefficient, at the edge of its range (half a chi-squared).
   const RandomWalk* walk = nullptr;
   for (const RandomWalk& test : walks) {
-    const double log_p = log_chi_squared_tail(test.gain, 1.0);
+    const double log_p = log_chi_squared_tail(test.delta_chi2, 1.0);
     detected = std::min(detected, significance.corrected(log_p));
     if (log_p < std::min(best_walk, best_equation)) {
       best_walk = log_p;
@@ -124,7 +124,7 @@ std::vector<const Effect*> equivalents(const Evidence& evidence, const std::vect
       continue;
     }
     const GroupTest test = test_group(evidence, columns_of(rival), others);
-    const bool contains = test.gain > own.gain - contained_gain && test.log_p < contained_share * own.log_p;
+    const bool contains = test.delta_chi2 > own.delta_chi2 - contained_gain && test.log_p < contained_share * own.log_p;
     if (test.log_p < own.log_p + class_log_odds || contains) {
       all.push_back(rival.effect);
     }

@@ -111,7 +111,7 @@ OpenForms open_plausible(const Stage& s, std::vector<FormFamily> families) {
     OpenForms open = open_forms(evidence, families, s.columns());
     size_families(open, evidence);
     const auto too_large = std::find_if(open.families.begin(), open.families.end(), [&](const FormFamily& f) {
-      const double own = test_group(evidence, columns_of(terms[f.term]), columns_of(terms, f.term)).gain;
+      const double own = test_group(evidence, columns_of(terms[f.term]), columns_of(terms, f.term)).delta_chi2;
       return f.square > (terms[f.term].effect->lack_of_fit ? resembling_share : form_share) * own;
     });
     if (too_large == open.families.end()) {

@@ -23,7 +23,7 @@ double largest_square(const Stage& stage, Counts counts) {
   double largest = 0.0;
   for (const Candidate& c : stage.model.terms()) {
     if (counts(*c.effect)) {
-      largest = std::max(largest, test_group(stage.model.evidence(), columns_of(c), {}).gain);
+      largest = std::max(largest, test_group(stage.model.evidence(), columns_of(c), {}).delta_chi2);
     }
   }
   return largest;
@@ -32,7 +32,7 @@ double largest_square(const Stage& stage, Counts counts) {
 // A bias that wanders by less than what the named effect's form may be off by.
 bool within_form(const Stage& stage, const RandomWalk& walk) {
   const bool of_gyro = walk.axis < 3;
-  return walk.gain <
+  return walk.delta_chi2 <
          form_square * largest_square(
                            stage, [&](const Effect& effect) { return (effect.triad == Triad::gyro) == of_gyro; });
 }
@@ -42,7 +42,7 @@ bool within_form(const Stage& stage, const RandomWalk& walk) {
 bool immaterial(const Stage& stage, const Candidate& candidate, const GroupTest& test) {
   constexpr double typical_share = 0.1, noticed_sigma = 0.5;
   if (stage.hypothesis().terms.empty() ||
-      test.gain > form_square * largest_square(stage, [](const Effect&) { return true; })) {
+      test.delta_chi2 > form_square * largest_square(stage, [](const Effect&) { return true; })) {
     return false;
   }
   std::vector<int> all = stage.columns();
@@ -166,7 +166,7 @@ std::optional<Stage> drop_weak_walk(const SearchGround& ground, const Stage& sta
     const Stage without = with_walks(ground.context, stage, std::move(others));
     const RandomWalk left = test_walk(without.given_forms(), without.model.map(), without.model.first_map_column(),
                                       walks[i].axis, without.columns());
-    if (!ground.significance.holds(ground.significance.corrected(log_chi_squared_tail(left.gain, 1.0)))) {
+    if (!ground.significance.holds(ground.significance.corrected(log_chi_squared_tail(left.delta_chi2, 1.0)))) {
       // The constants were found beside the walk.
       const Selection selection = with_constants_followed(ground.context, without, without.selection, false);
       return settled(ground.context, linearised(ground.context, without.point, selection), selection);

@@ -60,9 +60,9 @@ TEST(Forms, TakeNothingFromWhatIsNoForm) {
   const OpenForms open = open_forms(evidence, {family(0.05)}, {0});
   Evidence given = evidence;
   given.marginalise(open.columns, open.sigma.cwiseAbs2().asDiagonal());
-  EXPECT_NEAR(test_group(given, {2}, {0}).gain, 100.0, 1e-9);
+  EXPECT_NEAR(test_group(given, {2}, {0}).delta_chi2, 100.0, 1e-9);
   // Of the form itself next to nothing is left to be named once more.
-  EXPECT_LT(test_group(given, {1}, {0}).gain, 1.1);
+  EXPECT_LT(test_group(given, {1}, {0}).delta_chi2, 1.1);
 }
 
 TEST(Forms, EveryEffectOfTheSensorsHasSome) {

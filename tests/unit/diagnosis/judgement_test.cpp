@@ -37,7 +37,7 @@ SearchResult one_named() {
   term.effect = &a;
   term.amplitude = Eigen::VectorXd::Ones(1);
   term.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-4);
-  term.gain = 1e4;
+  term.delta_chi2 = 1e4;
   term.log_p = -5000.0;
   r.misfit = 1e4;
   r.named = {term};
@@ -48,7 +48,7 @@ SearchResult with_walk() {
   SearchResult r = clean();
   RandomWalk walk;
   walk.axis = 3;
-  walk.gain = 100.0;
+  walk.delta_chi2 = 100.0;
   r.walks = {walk};
   return r;
 }
@@ -133,11 +133,11 @@ TEST(Verdict, HoldsTheSizeOfTheInnovationsToItsShareOfTheBudget) {
 TEST(Verdict, RefusesNamesThatAreACurveOrLeaveTheirLikeness) {
   SearchResult r = one_named();
   EXPECT_TRUE(accepted(r));
-  r.entangled = true;
+  r.collinear = true;
   EXPECT_FALSE(accepted(r));
   EXPECT_FALSE(judge(r, rules_of_one()).names_stand);
   r = one_named();
-  r.log_p_likeness = std::log(0.009);
+  r.log_p_lack_of_fit = std::log(0.009);
   EXPECT_FALSE(accepted(r));
 }
 

@@ -92,7 +92,7 @@ TEST_F(CreepingRecording, WalksAreMarginalised) {
   const OperatingPoint point{input_, CorrectedRecording(creeping_.data())};
   const LinearModel without = about(context, point);
   const RandomWalk walk = test_walk(without.evidence(), without.map(), without.first_map_column(), 5, {});
-  ASSERT_GT(walk.gain, 0.0);
+  ASSERT_GT(walk.delta_chi2, 0.0);
   Evidence by_hand = without.evidence();
   std::vector<int> columns = walk.places;
   for (int& column : columns) {

@@ -17,7 +17,7 @@ TEST(FitColumns, LeavesOutWhatCannotBeSeen) {
   const Fit fit = fit_columns(information, Eigen::Vector2d(50.0, 1.0));
   EXPECT_EQ(fit.rank, 1);
   EXPECT_NEAR(fit.value(0), 2.0, 1e-12);
-  EXPECT_NEAR(fit.gain, 100.0, 1e-9);
+  EXPECT_NEAR(fit.delta_chi2, 100.0, 1e-9);
   const Fit seen = fit_columns(Eigen::Matrix2d::Identity(), Eigen::Vector2d(50.0, 1.0));
   EXPECT_EQ(seen.rank, 2);  // the negative control
 }

@@ -64,7 +64,7 @@ TEST(BestAddition, IsAnEquationBeforeAWalkThatJumpsButNotBeforeOneThatWalks) {
   const Evidence e = evidence_of(length * Eigen::Matrix3d::Identity(), std::sqrt(50.0) * Eigen::Vector3d::UnitX());
   RandomWalk walk;
   walk.axis = 3;
-  walk.gain = 70.0;
+  walk.delta_chi2 = 70.0;
   const double share = log_chi_squared_tail(50.0, 1.0) / log_chi_squared_tail(70.0, 1.0);
   ASSERT_GT(share, 0.6);
   ASSERT_LT(share, 0.85);
@@ -77,7 +77,7 @@ TEST(BestAddition, IsAnEquationBeforeAWalkThatJumpsButNotBeforeOneThatWalks) {
   }
 }
 
-// Beside a, b at cosine k adds nothing; beside b, a keeps the gain 100 (1 - k^2). At k = 0.9 that is 19, log p -11.4 and
+// Beside a, b at cosine k adds nothing; beside b, a keeps Δχ² 100 (1 - k^2). At k = 0.9 that is 19, log p -11.4 and
 // corrected -9.8: a stays and b is weak. At 0.999 it is 0.2, and the first of the twins is.
 TEST(WeakTerm, OfACollinearPairIsTheOneThatTheOtherStandsFor) {
   EXPECT_EQ(weak_term(one_a(0.9), {column_a, column_b}, with_threshold(-9.0)), 1U);
@@ -95,7 +95,7 @@ TEST(BetterExchange, TakesTheTrueTermForItsTwin) {
   EXPECT_FALSE(better_exchange(one_a(0.9999), {column_b}, all)) << "twins would change places for ever";
 }
 
-// Odds of 1:100 are 4.6 in log p, some 9.2 in gain: b is in a's class at k^2 = 0.94 and not at 0.88. c never is.
+// Odds of 1:100 are 4.6 in log p, some 9.2 in Δχ²: b is in a's class at k^2 = 0.94 and not at 0.88. c never is.
 TEST(Equivalents, AreThoseWithOddsAboveOneInAHundred) {
   const std::vector<const Effect*> twin = {&b};
   EXPECT_EQ(equivalents(one_a(std::sqrt(0.94)), {column_a}, 0, all), twin);
@@ -121,7 +121,7 @@ struct Dwells {
   }
 };
 
-// A ramp of biases is a ramp: its gain is the whole square, and a walk's is less by what its freedom costs. Biases that lie
+// A ramp of biases is a ramp: its Δχ² is the whole square, and a walk's is less by what its freedom costs. Biases that lie
 // at right angles to a ramp (+ - - + three times over) are none.
 TEST(WalkAgainstRamp, EachIsTakenForWhatItIs) {
   const Dwells dwells;
