@@ -33,6 +33,7 @@ MAY_INCLUDE = {
     "daemon/host": ["protocol", "estimator/geometry"],
     "daemon/ins": ["daemon/host", "protocol", "estimator/geometry"],
     "daemon/store": ["daemon/host", "protocol", "estimator/geometry"],
+    "daemon/hub": ["daemon/host", "daemon/store", "protocol", "estimator/geometry"],
     "daemon/estimate": ["daemon/host", "daemon/store", "protocol", "estimator"],
     "daemon/run": ["daemon/host", "daemon/ins", "daemon/store", "daemon/estimate", "protocol", "estimator"],
     "daemon": ["daemon", "protocol", "estimator"],

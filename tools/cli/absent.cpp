@@ -15,6 +15,9 @@ namespace {
 const CommandRegistration report{
     {"report", "a calibration as a page with plots (not built into this program)", configure}};
 #endif
+#ifdef SELFCAL_WITHOUT_HUB
+const CommandRegistration hub{{"hub", "a depot's memory (not built into this program)", configure}};
+#endif
 #ifdef SELFCAL_WITHOUT_ANALYSIS
 const CommandRegistration diagnose{{"diagnose", "which physics was left out (not built into this program)", configure}};
 const CommandRegistration poses{
