@@ -11,6 +11,7 @@
 #include <span>
 #include <sstream>
 
+#include "daemon/host/hub_config.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
 #include "protocol/toml_file/toml_text.hpp"
@@ -150,6 +151,15 @@ const std::vector<Key<InsConfig>>& ins_keys() {
   return keys;
 }
 
+const std::vector<Key<HubConfig>>& hub_keys() {
+  static const std::vector<Key<HubConfig>> keys{
+      text("connection", &HubConfig::connection),
+      text("recordings", &HubConfig::recordings, true),
+      number("interval_s", &HubConfig::interval_s, 0.05, 3600.0),
+  };
+  return keys;
+}
+
 class Reader {
  public:
   explicit Reader(std::string file) : file_(std::move(file)) {}
@@ -191,6 +201,13 @@ class Reader {
   std::string file_;
   std::string complaints_;
 };
+
+void read_hub(toml::source_index line, const toml::table& table, HubConfig& hub, Reader& reader) {
+  reader.read(table, "hub", hub_keys(), hub);
+  if (hub.connection.empty() && !table.contains("connection")) {
+    reader.complain(line, "hub.connection", "missing");
+  }
+}
 
 // "selfcal" is built in; a path is one from the configuration's folder, a mere name is a file of its folder profiles.
 profile::ProfilePtr profile_of(const toml::table& table, const std::string& section, const std::string& file,
@@ -286,6 +303,9 @@ Expected<Config> parse_config(std::string_view content, const std::string& file)
     const std::string section(key.str());
     if (section == "daemon" && node.is_table()) {
       reader.read(*node.as_table(), section, daemon_keys(), config);
+    } else if (section == "hub" && node.is_table()) {
+      HubConfig hub;
+      read_hub(key.source().begin.line, *node.as_table(), hub, reader);
     } else if (section == "ins" && node.is_table()) {
       for (const auto& [name, ins_node] : *node.as_table()) {
         const std::string full = "ins." + std::string(name.str());
@@ -316,20 +336,54 @@ Expected<Config> parse_config(std::string_view content, const std::string& file)
   return config;
 }
 
-Expected<Config> load_config(const std::string& file) {
+namespace {
+
+Expected<std::string> text_of(const std::string& file) {
   std::ifstream in(file);
   if (!in) {
     return fail(ErrorKind::bad_input, fmt::format("{}: cannot be opened", file));
   }
   std::stringstream content;
   content << in.rdbuf();
-  return parse_config(content.str(), file);
+  return content.str();
+}
+
+}  // namespace
+
+Expected<Config> load_config(const std::string& file) {
+  const auto content = text_of(file);
+  return content ? parse_config(*content, file) : tl::unexpected(content.error());
+}
+
+Expected<std::optional<HubConfig>> load_hub_config(const std::string& file) {
+  const auto content = text_of(file);
+  if (!content) {
+    return tl::unexpected(content.error());
+  }
+  const auto root = parse_toml(*content, file);
+  if (!root) {
+    return tl::unexpected(root.error());
+  }
+  const toml::table* table = root->get_as<toml::table>("hub");
+  if (table == nullptr) {
+    return std::optional<HubConfig>();
+  }
+  HubConfig hub;
+  Reader reader(file);
+  read_hub(table->source().begin.line, *table, hub, reader);
+  if (!reader.complaints().empty()) {
+    return fail(ErrorKind::bad_input, reader.complaints());
+  }
+  return std::optional<HubConfig>(hub);
 }
 
 std::vector<std::string> config_keys() {
   std::vector<std::string> keys;
   for (const auto& key : daemon_keys()) {
     keys.push_back("daemon." + std::string(key.name));
+  }
+  for (const auto& key : hub_keys()) {
+    keys.push_back("hub." + std::string(key.name));
   }
   for (const auto& key : ins_keys()) {
     keys.push_back("ins.*." + std::string(key.name));

@@ -102,6 +102,9 @@ Expected<std::unique_ptr<Connection>> Connection::open(const std::string& parame
   *all += " application_name=selfcal connect_timeout=10";
   std::unique_ptr<Connection> connection(new Connection(PQconnectdb(all->c_str())));
   PGconn* raw = connection->connection_;
+  // libpq writes notices to standard error; what matters comes as an error too.
+  PQsetNoticeProcessor(
+      raw, [](void*, const char*) {}, nullptr);
   if (PQstatus(raw) != CONNECTION_OK) {
     return fail(ErrorKind::device, "hub: " + one_line(PQerrorMessage(raw)));
   }

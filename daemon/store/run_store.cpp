@@ -43,6 +43,25 @@ ALTER TABLE runs ADD COLUMN amends INTEGER NOT NULL DEFAULT 0;
 )sql",
                                   R"sql(
 ALTER TABLE runs ADD COLUMN amends_with TEXT NOT NULL DEFAULT '';
+)sql",
+                                  // For a depot's hub (daemon/hub): what goes there, entered in the transaction that
+                                  // ends a run, and what other sets measured, as it came from there.
+                                  R"sql(
+CREATE TABLE outbox(
+  sequence INTEGER PRIMARY KEY AUTOINCREMENT, run INTEGER NOT NULL UNIQUE REFERENCES runs(id),
+  document TEXT NOT NULL DEFAULT '', answer TEXT NOT NULL DEFAULT '');
+CREATE INDEX outbox_waiting ON outbox(sequence) WHERE answer='';
+INSERT INTO outbox(run) SELECT id FROM runs WHERE state IN ('completed','refused','failed','aborted') ORDER BY id;
+CREATE TRIGGER run_ended AFTER UPDATE OF state ON runs
+  WHEN NEW.state IN ('completed','refused','failed','aborted')
+   AND OLD.state NOT IN ('completed','refused','failed','aborted')
+  BEGIN INSERT OR IGNORE INTO outbox(run) VALUES(NEW.id); END;
+CREATE TABLE hub_past(
+  arrival INTEGER PRIMARY KEY, set_name TEXT NOT NULL, run INTEGER NOT NULL, serial TEXT NOT NULL, utc TEXT NOT NULL);
+CREATE INDEX hub_past_by_serial ON hub_past(serial, arrival);
+CREATE TABLE hub_past_parameters(
+  arrival INTEGER NOT NULL REFERENCES hub_past(arrival), name TEXT NOT NULL,
+  value REAL NOT NULL, sigma REAL NOT NULL, determined INTEGER NOT NULL, PRIMARY KEY(arrival, name)) WITHOUT ROWID;
 )sql"};
 constexpr auto schema_version = static_cast<std::int64_t>(schema_steps.size());
 
@@ -310,10 +329,13 @@ Expected<std::optional<std::vector<std::uint8_t>>> RunStore::set(RunId run, SetR
   return select.blob();
 }
 
+// Of this set and, as run 0, of others of the depot: what the hub told of them.
 Expected<std::vector<ParameterRecord>> RunStore::parameter_history(const std::string& serial, int index) const {
   Statement select(database_,
-                   "SELECT r.id, r.ended_utc, p.value, p.sigma, p.determined FROM parameters p JOIN runs r ON "
-                   "p.run=r.id WHERE r.serial=? AND r.state='completed' AND r.dry_run=0 AND p.name=? ORDER BY r.id");
+                   "SELECT r.id, r.ended_utc AS utc, p.value, p.sigma, p.determined FROM parameters p JOIN runs r ON "
+                   "p.run=r.id WHERE r.serial=?1 AND r.state='completed' AND r.dry_run=0 AND p.name=?2 UNION ALL "
+                   "SELECT 0, h.utc, p.value, p.sigma, p.determined FROM hub_past_parameters p JOIN hub_past h ON "
+                   "p.arrival=h.arrival WHERE h.serial=?1 AND p.name=?2 ORDER BY utc, 1");
   select.bind(serial).bind(std::string(sensor_parameters.at(static_cast<std::size_t>(index)).name));
   std::vector<ParameterRecord> history;
   while (true) {

@@ -52,6 +52,13 @@ TEST(Config, TheShippedFileShowsEveryKey) {
   }
 }
 
+TEST(Config, AHubNeedsAConnection) {
+  const std::string ins = "[ins.a]\ninterface = \"c\"\n";
+  EXPECT_TRUE(parse_config(ins + "[hub]\nconnection = \"host=h\"\n", "f.toml"));
+  EXPECT_EQ(complaint(ins + "[hub]\ninterval_s = 3.0\n"), "f.toml:3: hub.connection: missing");
+  EXPECT_EQ(complaint(ins + "[hub]\nconnection = \"\"\n"), "f.toml:4: hub.connection: must not be empty");
+}
+
 TEST(Config, AKeyComesBeforeTheProfileAndTheProfileBeforeTheDefault) {
   const std::string section =
       "[ins.a]\ninterface = \"c\"\nprofile = \"" SELFCAL_SOURCE_DIR "/config/profiles/example.toml\"\n";

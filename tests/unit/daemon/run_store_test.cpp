@@ -32,6 +32,30 @@ class RunStoreTest : public testing::Test {
     return run;
   }
 
+  // By SQL, as another program would.
+  void change(const char* sql) {
+    sqlite3* raw = nullptr;
+    ASSERT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(raw, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(raw);
+    sqlite3_close(raw);
+  }
+
+  // "sequence:run " of each entry.
+  std::string outbox() {
+    sqlite3* raw = nullptr;
+    EXPECT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
+    std::string text;
+    sqlite3_exec(
+        raw, "SELECT sequence || ':' || run || ' ' FROM outbox ORDER BY sequence",
+        [](void* to, int, char** column, char**) {
+          *static_cast<std::string*>(to) += column[0];
+          return 0;
+        },
+        &text, nullptr);
+    sqlite3_close(raw);
+    return text;
+  }
+
   const testing_support::ScratchFolder scratch_;
   const std::filesystem::path& folder_ = scratch_.path();
   const std::filesystem::path file_ = folder_ / "selfcal.db";
@@ -71,15 +95,10 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
     auto store = open();
     run.id = *store->create_run(run);
   }
-  sqlite3* raw = nullptr;
-  ASSERT_EQ(sqlite3_open(file_.c_str(), &raw), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(
-                raw,
-                "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
-                "ALTER TABLE runs DROP COLUMN amends; ALTER TABLE runs DROP COLUMN amends_with; PRAGMA user_version=1",
-                nullptr, nullptr, nullptr),
-            SQLITE_OK);
-  sqlite3_close(raw);
+  change(
+      "DROP TRIGGER run_ended; DROP TABLE outbox; DROP TABLE hub_past_parameters; DROP TABLE hub_past; "
+      "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
+      "ALTER TABLE runs DROP COLUMN amends; ALTER TABLE runs DROP COLUMN amends_with; PRAGMA user_version=1");
   auto store = open();
   const auto found = *store->run(run.id);
   ASSERT_TRUE(found);
@@ -90,6 +109,53 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   EXPECT_TRUE(found->amends_with.empty());
   run.stop_when_met = true;
   EXPECT_TRUE(store->run(*store->create_run(run)).value()->stop_when_met);
+}
+
+// For the hub: each run once, in the transaction that ends it, also where it ended before there was an outbox.
+TEST_F(RunStoreTest, ARunThatEndsStandsInTheOutboxOnce) {
+  auto store = open();
+  RunRecord first = begun(), second = begun();
+  first.id = *store->create_run(first);
+  second.id = *store->create_run(second);
+  EXPECT_EQ(outbox(), "");
+  second.state = State::failed;
+  ASSERT_TRUE(store->update_run(second));
+  second.recording = "pruned later";
+  ASSERT_TRUE(store->update_run(second));
+  first.state = State::completed;
+  ASSERT_TRUE(store->update_run(first));
+  EXPECT_EQ(outbox(), "1:2 2:1 ");
+  store.reset();
+  change(
+      "DROP TABLE outbox; DROP TABLE hub_past; DROP TABLE hub_past_parameters; DROP TRIGGER run_ended; PRAGMA "
+      "user_version=4");
+  store = open();
+  EXPECT_EQ(outbox(), "1:1 2:2 ");
+}
+
+// What other sets measured of a unit belongs to its past, by time, and is no run of ours.
+TEST_F(RunStoreTest, HistoryHoldsWhatOtherSetsMeasured) {
+  auto store = open();
+  RunRecord run = begun();
+  run.serial = "S";
+  run.id = *store->create_run(run);
+  RunStore::Parameters parameters;
+  parameters.value.fill(2.0);
+  ASSERT_TRUE(store->store_parameters(run.id, parameters));
+  run.state = State::completed;
+  run.ended_utc = "2026-03-01T00:00:00Z";
+  ASSERT_TRUE(store->update_run(run));
+  change(
+      "INSERT INTO hub_past VALUES(7,'set_b',1,'S','2026-02-01T00:00:00Z'),(9,'set_c',4,'S','2026-04-01T00:00:00Z'),"
+      "(8,'set_c',3,'T','2026-02-01T00:00:00Z');"
+      "INSERT INTO hub_past_parameters VALUES(7,'accel_bias_x',1.0,0.5,1),(9,'accel_bias_x',3.0,0.5,1),"
+      "(8,'accel_bias_x',9.0,0.5,1),(7,'accel_bias_y',9.0,0.5,1)");
+  const auto history = *store->parameter_history("S", 0);
+  ASSERT_EQ(history.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(history[i].value, static_cast<double>(i + 1));
+    EXPECT_EQ(history[i].run, i == 1 ? run.id : 0);
+  }
 }
 
 TEST_F(RunStoreTest, NumbersAreNeverUsedTwice) {
