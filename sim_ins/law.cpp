@@ -44,17 +44,21 @@ std::string as_mu_parser_reads(const std::string& expression) {
     const char c = expression[k];
     if (c == ' ' || c == '\t') {
       text += ' ';
-    } else if (c == '*' && expression.compare(k, 2, "**") == 0) {
+      continue;
+    }
+    if (c == '*' && expression.compare(k, 2, "**") == 0) {
       text += '^';
       ++k;
-    } else if (c == '-' && text.ends_with("~")) {
-      text.pop_back();  // two signs are none
-    } else {
-      const std::size_t before = text.find_last_not_of(' ');
-      const bool sign_place =
-          before == std::string::npos || std::string_view("(+-*/^~").find(text[before]) != std::string_view::npos;
-      text += c == '-' && sign_place ? '~' : c;
+      continue;
     }
+    const std::size_t before = text.find_last_not_of(' ');
+    if (c == '-' && before != std::string::npos && text[before] == '~') {
+      text.erase(before);  // two signs are none, blanks between them or not
+      continue;
+    }
+    const bool sign_place =
+        before == std::string::npos || std::string_view("(+-*/^~").find(text[before]) != std::string_view::npos;
+    text += c == '-' && sign_place ? '~' : c;
   }
   std::replace(text.begin(), text.end(), '~', '-');
   return text;

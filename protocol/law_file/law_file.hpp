@@ -30,7 +30,7 @@ inline constexpr std::size_t most_laws = 64;
 [[nodiscard]] Expected<std::vector<LawText>> parse_laws(std::string_view toml, const std::string& name);
 [[nodiscard]] Expected<std::vector<LawText>> read_laws(const std::filesystem::path& path);
 
-// As [[law]] tables.
+// As [[law]] tables, numbers with nine digits, sigma with three. Expressions must be ones: they are not escaped.
 std::string format_laws(const std::vector<LawText>& laws);
 
 }  // namespace selfcal

@@ -56,6 +56,7 @@ TEST(SimLaw, BothEvaluatorsAgree) {
                            "1-2-3",
                            "8/4/2",
                            "--fx",
+                           "- \t-fx*-- -fy",
                            "1.5e-3*n"}) {
     const auto expression = laws::Expression::parse(text);
     auto evaluator = sim::LawEvaluator::compile(text);
