@@ -96,6 +96,7 @@ void add_next_experiment(ordered_json& document, const std::optional<discovery::
          {{"positions", positions}, {"dwell_s", next->schedule.dwell_s}, {"rotation_s", next->schedule.rotation_s}}},
         {"splits", next->closest.empty() ? ordered_json::array() : ordered_json{next->closest}},
         {"separation_sigma", next->separation},
+        {"separation_now_sigma", next->separation_now},
         {"expected_odds", std::exp(std::min(next->log_odds, 700.0))}};
   }
 }

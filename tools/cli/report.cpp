@@ -138,12 +138,6 @@ Expected<Json> run_of_daemon(const std::string& number) {
   });
 }
 
-Expected<Json> saved_run(const std::string& file) {
-  return read_text_file(file, largest_document).and_then([&](const std::string& text) {
-    return report::read_run(text, file);
-  });
-}
-
 // A recording that is gone or may not be read costs the curves, not the page.
 Json document_of_run(const Json& run, const ReportArguments& arguments) {
   const std::string recording = run.value("recording", std::string());
@@ -159,36 +153,54 @@ Json document_of_run(const Json& run, const ReportArguments& arguments) {
   return report::run_page_document(run, std::move(*recomputed));
 }
 
+// The past from a file, else from the daemon where it gave the run too.
+Expected<Json> with_past(Json document, const std::string& serial, const std::string& utc, bool live,
+                         const ReportArguments& arguments) {
+  if (arguments.past.empty() && (!live || serial.empty())) {
+    return document;
+  }
+  return (arguments.past.empty() ? history_of(serial) : saved_history(arguments.past)).map([&](const Json& history) {
+    report::add_history(document, history, utc);
+    return std::move(document);
+  });
+}
+
+Expected<Json> page_of_run(const Json& run, bool live, const ReportArguments& arguments) {
+  return with_past(document_of_run(run, arguments), run.at("serial").get<std::string>(),
+                   run.at("started_utc").get<std::string>(), live, arguments);
+}
+
+Expected<Json> page_of_recording(const std::string& file, const ReportArguments& arguments) {
+  Expected<Json> document = recording_document(file, arguments);
+  if (!document) {
+    return document;
+  }
+  (*document)["summary"] = report::page_summary(*document);
+  const std::string utc = document->value("start_time_utc", std::string());
+  return with_past(std::move(*document), {}, utc, false, arguments);
+}
+
+// What `show RUN --json` or `investigate --json` said.
+Expected<Json> page_of_document(const std::string& file, const ReportArguments& arguments) {
+  const Expected<std::string> text = read_text_file(file, largest_document);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  Expected<std::optional<Json>> story = report::read_investigation(*text, file);
+  if (!story) {
+    return tl::unexpected(story.error());
+  }
+  if (*story) {
+    return std::move(**story);
+  }
+  return report::read_run(*text, file).and_then([&](const Json& run) { return page_of_run(run, false, arguments); });
+}
+
 Expected<Json> page_of(const std::string& subject, const ReportArguments& arguments) {
-  const bool live = is_number(subject);
-  const bool saved = subject.ends_with(".json");
-  Json document;
-  std::string serial, utc;
-  if (live || saved) {
-    Expected<Json> run = live ? run_of_daemon(subject) : saved_run(subject);
-    if (!run) {
-      return run;
-    }
-    document = document_of_run(*run, arguments);
-    serial = run->at("serial").get<std::string>();
-    utc = run->at("started_utc").get<std::string>();
-  } else {
-    Expected<Json> made = recording_document(subject, arguments);
-    if (!made) {
-      return made;
-    }
-    document = std::move(*made);
-    document["summary"] = report::page_summary(document);
-    utc = document.value("start_time_utc", std::string());
+  if (is_number(subject)) {
+    return run_of_daemon(subject).and_then([&](const Json& run) { return page_of_run(run, true, arguments); });
   }
-  if (!arguments.past.empty() || (live && !serial.empty())) {
-    Expected<Json> history = arguments.past.empty() ? history_of(serial) : saved_history(arguments.past);
-    if (!history) {
-      return history;
-    }
-    report::add_history(document, *history, utc);
-  }
-  return document;
+  return subject.ends_with(".json") ? page_of_document(subject, arguments) : page_of_recording(subject, arguments);
 }
 
 Expected<std::vector<Json>> histories_of_daemon() {
@@ -277,10 +289,12 @@ Expected<void> write_plan_page(const std::vector<report::PlannedSchedule>& sched
 CommandRun configure(Options& options) {
   plan_page_writer() = write_plan_page;
   auto arguments = std::make_shared<ReportArguments>();
-  options.texts("RUN", arguments->subjects,
-                "number of a run (asks the daemon), a file with what `show RUN --json` said, or a recording (HDF5, or "
-                "CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else all units "
-                "of the daemon");
+  options.texts(
+      "RUN", arguments->subjects,
+      "number of a run (asks the daemon), a file with what `show RUN --json` or `investigate --json` said, or a "
+      "recording (HDF5, or CSV with its TOML file); with --history: files with what `history SERIAL --json` said, else "
+      "all units "
+      "of the daemon");
   options.text("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)", Needed::yes);
   options.flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
   options.text("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
@@ -296,7 +310,7 @@ CommandRun configure(Options& options) {
 }
 
 const CommandRegistration registration{
-    {"report", "a calibration, or all units, as an HTML page with plots", configure}};
+    {"report", "a calibration, an investigation, or all units, as an HTML page with plots", configure}};
 
 }  // namespace
 }  // namespace selfcal::cli

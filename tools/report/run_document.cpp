@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "protocol/document/document_head.hpp"
 #include "tools/report/run_words.hpp"
 
 namespace selfcal::report {
@@ -68,6 +69,19 @@ Expected<Json> read_run(const std::string& text, const std::string& source) {
 
 Expected<Json> read_history(const std::string& text, const std::string& source) {
   return read(text, source, {"serial", "runs", "parameters"});
+}
+
+Expected<std::optional<Json>> read_investigation(const std::string& text, const std::string& source) {
+  const Json head = Json::parse(text, nullptr, false);
+  const auto schema = head.is_object() ? head.find("schema") : head.end();
+  if (schema == head.end() || !schema->is_object() ||
+      schema->value("name", std::string()) != document::investigation.name) {
+    return std::nullopt;
+  }
+  return read(text, source, {"steps", "ended", "written_by", "exit_status"}).map([](Json story) {
+    story["kind"] = "investigation";
+    return std::optional<Json>(std::move(story));
+  });
 }
 
 Json run_page_document(const Json& run, const std::optional<Json>& recomputed) {

@@ -14,6 +14,10 @@ namespace selfcal::report {
 Expected<nlohmann::ordered_json> read_run(const std::string& text, const std::string& source);
 Expected<nlohmann::ordered_json> read_history(const std::string& text, const std::string& source);
 
+// What `selfcal investigate --json` said, as the document of its page; nothing where the text is another document. bad_input names
+// the key that is missing.
+Expected<std::optional<nlohmann::ordered_json>> read_investigation(const std::string& text, const std::string& source);
+
 // The document of the run's page. The run's own result counts; `recomputed` (calibration_document() of its recording,
 // nothing where the recording is gone) adds the curves to it.
 nlohmann::ordered_json run_page_document(const nlohmann::ordered_json& run,

@@ -1,6 +1,6 @@
 """What the daemon says of a run and of three units, made from an estimate: report_documents.py ESTIMATE.json RECORDING
 writes run.json, failed.json (a run that broke off), replaced.json (a run whose set another run replaced) and history-SN-000{1,2,3}.json, in the formats of `selfcal show --json`
-and `selfcal history --json`.
+and `selfcal history --json`; and investigation.json, a story as `selfcal investigate --json` tells it.
 
 SN-0002's accel_bias_z moves by 9 sigma a year, its limit two years ahead; the other values stand still to the millionth of
 their sigma, so that no slope among the 71 others can pass for a drift by chance.
@@ -58,3 +58,27 @@ none = {"previous": None, "proposed": None, "read_back": None, "pushed": None, "
 run |= {"state": "failed", "exit_status": 4, "reason": "the link to the INS is gone", "result": None, "coefficients": none,
         "recording": "gone.h5", "drift_before_m": None, "drift_after_m": None}
 json.dump(run, open("failed.json", "w"))
+
+# Two equations that one recording cannot tell apart, a rotation, and the one that is left.
+SLOW, FAST = "exp(-since/45.2)*so", "exp(-since/30)*-so**2/(1+abs(fx))"
+
+
+def law(expression, members, size, sigma):
+    return {"axis": "accel_y", "expression": expression, "coefficient": size, "sigma": sigma, "unit": "ug", "constants": {},
+            "significance": size / sigma, "held_out_gain": 120.0, "share": 0.97,
+            "class": [{"expression": e, "axis": "accel_y", "odds": odds} for e, odds in members]}
+
+
+def told(verdict, standing, following):
+    return {"standing": standing, "verdict": verdict, "cause": "accel_y: NIS 3.1 becomes 1.01.", "next": following}
+
+
+first = {"runs": [7], "amendment": 8, "summary": told("The model leaves out what no catalogue holds.", "bad", "selfcal amend 7"),
+         "discovered": [law(SLOW, [(SLOW, 1.0), (FAST, 0.21)], 24.5, 1.2)], "experiment": 9,
+         "next_experiment": {"schedule": {"positions": [[0, 0], [45, 0], [45, 90]], "dwell_s": [60, 60, 120], "rotation_s": 6.0},
+                             "splits": [FAST], "separation_sigma": 8.4, "separation_now_sigma": 1.8, "expected_odds": 2.1e15}}
+second = {"runs": [7, 9], "amendment": 10, "summary": told("All 24 parameters are determined to tolerance.", "good", "selfcal report 11"),
+          "discovered": [law(SLOW, [(SLOW, 1.0)], 24.9, 0.6)], "experiment": None}
+json.dump({"schema": {"name": "selfcal.investigation", "version": 1}, "program": {"name": "selfcal", "version": "0"},
+           "steps": [first, second], "ended": "one equation is left", "written_by": 11, "exit_status": 0},
+          open("investigation.json", "w"))

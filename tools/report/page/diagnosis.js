@@ -63,7 +63,7 @@ function discoveredTable(d) {
   const all = [...laws, ...processes];
   return table([
     {title: 'sensor', cells: all.map((l) => textOf(l.axis)), class: 'left'},
-    {title: 'law', cells: [...laws.map((l) => textOf(l.expression)), ...processes.map((p) => textOf(p.process))], class: 'words'},
+    {title: 'law', cells: [...laws.map((l) => lawAsMath(textOf(l.expression))), ...processes.map((p) => textOf(p.process))], class: 'words'},
     {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
     {title: 'explains it as well', cells: all.map((l) => listOf(l.class).length > 1 ? `${l.class.length - 1} others` : '–'), class: 'words'},
   ], {id: 'discovered'});
@@ -210,7 +210,8 @@ function showDiagnosisTables(d) {
   add(findings.length > 0 ? 'Before and after' : 'Recording against model', adequacyTable(objectOf(d.adequacy), findings.length > 0));
   const found = listOf(d.discovered).length + listOf(d.processes).length > 0;
   if (found) {
-    add('Found beyond the catalogue', discoveredTable(d));
+    const symbols = lawSymbols(listOf(d.discovered).map((l) => textOf(l.expression)));
+    add('Found beyond the catalogue', discoveredTable(d), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''));
   }
   if (d.unexplained && !explained(d)) {
     add('What to do', adviceForUnexplained(d.adequacy));

@@ -2,7 +2,8 @@
 // KIND calibration: EXPECTED is what `selfcal estimate --json` said of the same recording; run: the saved run;
 // failed: a saved run without a result, whose recording is gone; replaced: a saved run whose set is no longer in force;
 // creep: `selfcal diagnose --json` of the same recording, in which an effect is named; unexplained: the same with nothing
-// named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; hostile, thin: any JSON, the
+// named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; investigation: the saved
+// story; hostile, thin: any JSON, the
 // page being alter_page.py's. With "not-" before it the page must fail, as it holds other numbers. One line for each failure; status 1.
 // SELFCAL_PICTURES: a folder for screenshots at 1400 and 800 px and the PDF of each page.
 // SELFCAL_FIRST_PLOT_MS: fail where the first plot takes longer (a bench: it depends on the machine).
@@ -83,6 +84,7 @@ const wanted = {
   thin: [],
   plan: ['timeline-0', 'timeline-1', 'sphere-0', 'sphere-1', 'forecast-accel_bias_x', 'forecast-gyro_misalignment_zy'],
   fleet: ['trend-accel_bias_x', 'trend-gyro_misalignment_zy'],
+  investigation: ['rotation-1'],
 };
 
 // Every plot is drawn as wide as its place (a canvas of another width is squeezed), holds its data, and has room for the
@@ -321,6 +323,36 @@ async function check_fleet(page) {
   expect(await page.$('#trend-accel_bias_x'), 'the choice of a unit leaves no plots');
 }
 
+// What was known before the rotation, why it was made, what it showed; and equations as they are written by hand.
+async function check_investigation(page) {
+  await check_banner(page, 'good', expected.steps.at(-1).summary.verdict, expected.ended, `selfcal show ${expected.written_by}`);
+  const text = await page.textContent('main');
+  for (const wanted of ['1. What run 7 shows', '2. What runs 7, 9 show together', 'Why the next rotation', '8.40 σ', '1.80 σ', 'run 9',
+                        'Run 11 wrote the set and proved it', '24.5 ± 1.2 µg', '24.90 ± 0.60 µg']) {
+    expect(text.includes(wanted), `the story lacks "${wanted}"`);
+  }
+  const odds = await page.$$eval('table.odds', (tables) => tables.map((one) => [...one.querySelectorAll('tbody tr')].map(
+      (row) => [...row.cells].slice(2).map((cell) => cell.textContent))));
+  const right = [[['best'], ['0.21']], [['best', 'best'], ['0.21', 'ruled out']]];
+  expect(JSON.stringify(odds) === JSON.stringify(right), `odds: ${JSON.stringify(odds)}`);
+  // 4 minutes of dwells and two turns of 6 s.
+  const ends = await page.evaluate(() => livePlots.find(({spec}) => spec.id === 'rotation-1').spec.x.values.at(-1));
+  expect(Math.abs(ends - 4.2) < 1e-9, `the rotation ends after ${ends} min`);
+  const shown = await page.evaluate((texts) => texts.map((one) => lawAsMath(one).outerHTML.replace(/ xmlns="[^"]*"/g, '').replace(/<\/?mrow>/g, '')), [
+    '-fx**2', '2**-1', '(fx-wo)*n', 'fx-(t-n)', 'exp(-since/45.2)*so', '1.5e-3/sqrt(abs(T))', 'log(dT)+?', 'fx fy', '__proto__', '((fx']);
+  const f = '<msub><mi>f</mi><mi>x</mi></msub>';
+  const wanted = [
+    `<math><mo>−</mo><msup>${f}<mn>2</mn></msup></math>`,
+    '<math><msup><mn>2</mn><mo>−</mo><mn>1</mn></msup></math>',
+    `<math><mo>(</mo>${f}<mo>−</mo><msub><mi>ω</mi><mi>outer</mi></msub><mo>)</mo><mo>·</mo><mi>n</mi></math>`,
+    `<math>${f}<mo>−</mo><mo>(</mo><mi>t</mi><mo>−</mo><mi>n</mi><mo>)</mo></math>`,
+    '<math><msup><mi>e</mi><mo>−</mo><msub><mi>t</mi><mi>turn</mi></msub><mo>/</mo><mn>45.2</mn></msup><mo>·</mo><msub><mi>s</mi><mi>outer</mi></msub></math>',
+    '<math><mfrac><mn>1.5</mn><mo>×</mo><msup><mn>10</mn><mn>−3</mn></msup><msqrt><mo>|</mo><mi>T</mi><mo>|</mo></msqrt></mfrac></math>',
+    '<math><mi>ln</mi><mo>(</mo><mover><mi>T</mi><mo>˙</mo></mover><mo>)</mo><mo>+</mo><mi>?</mi></math>',
+    '<code>fx fy</code>', '<code>__proto__</code>', '<code>((fx</code>'];
+  wanted.forEach((one, k) => expect(shown[k] === one, `equation ${k}: ${shown[k]}`));
+}
+
 async function check_saving(page, id) {
   for (const [type, begin] of [['CSV', ''], ['JSON', '['], ['SVG', '<svg'], ['PNG', '']]) {
     const [download] = await Promise.all([
@@ -416,7 +448,7 @@ async function check_page(browser, page_file) {
     await check_width(page, where);
     if (width === 1400) {
       await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep,
-             unexplained: check_unexplained, plan: check_plan, fleet: check_fleet}[kind](page);
+             unexplained: check_unexplained, plan: check_plan, fleet: check_fleet, investigation: check_investigation}[kind](page);
       if (kind === 'calibration') {
         await check_keyboard(page);
         await check_saving(page, 'nis');
