@@ -67,6 +67,14 @@ std::string Rows::text(int row, int column) const { return PQgetvalue(result_.ge
 
 bool Rows::is_null(int row, int column) const { return PQgetisnull(result_.get(), row, column) != 0; }
 
+// Object identifiers of PostgreSQL's own types are fixed (pg_type.dat): int8, int2, int4, float8, numeric; bool.
+bool Rows::is_number(int column) const {
+  const Oid type = PQftype(result_.get(), column);
+  return type == 20 || type == 21 || type == 23 || type == 701 || type == 1700;
+}
+
+bool Rows::is_boolean(int column) const { return PQftype(result_.get(), column) == 16; }
+
 std::int64_t Rows::integer(int row, int column) const {
   return std::strtoll(PQgetvalue(result_.get(), row, column), nullptr, 10);
 }

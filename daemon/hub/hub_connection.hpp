@@ -21,6 +21,8 @@ class Rows {
   int size() const;
   std::string text(int row, int column) const;  // empty where null
   bool is_null(int row, int column) const;
+  bool is_number(int column) const;  // by the server's type
+  bool is_boolean(int column) const;
   std::int64_t integer(int row, int column) const;       // 0 where it is none
   double real(int row, int column) const;                // NaN where it is none
   std::vector<double> reals(int row, int column) const;  // of a one-dimensional array; empty where it is none

@@ -19,6 +19,7 @@ MAY_INCLUDE = {
     "estimator/filter": ["estimator/geometry", "estimator/models"],
     "estimator/navigation": ["estimator/geometry", "estimator/models", "estimator/filter"],
     "estimator/statistics": [],
+    "estimator/fleet": ["estimator/statistics"],
     "estimator/passes": ["estimator/geometry", "estimator/models", "estimator/filter", "estimator/navigation",
                          "estimator/statistics"],
     "estimator": ["estimator"],  # planning, diagnosis: on top of all the others

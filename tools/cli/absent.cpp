@@ -16,6 +16,7 @@ const CommandRegistration report{
     {"report", "a calibration as a page with plots (not built into this program)", configure}};
 #endif
 #ifdef SELFCAL_WITHOUT_HUB
+const CommandRegistration fleet{{"fleet", "a depot's units and sets (not built into this program)", configure}};
 const CommandRegistration hub{{"hub", "a depot's memory (not built into this program)", configure}};
 #endif
 #ifdef SELFCAL_WITHOUT_ANALYSIS

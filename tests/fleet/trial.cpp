@@ -1,0 +1,435 @@
+// Trial of the fleet's model on a fleet that ages by another law (drawn_fleet.hpp).
+//
+//   fleet_trial [--units 500] [--sets 20] [--measurements 200] [--parameters 24] [--scenarios 200] [--limit 8] [--seed 1]
+//
+// forecast: each unit's next values against their 95 % bands, beside two rivals (last value; straight line per unit).
+// sets: one set of twenty gets a bias of two sigma of one calibration in one parameter; is it named within ten calibrations of
+// distinct units, and how many sound sets are accused over the same time and over ten years. Control: no set is biased.
+// intervals: calibrations by the rule against a fixed year and against the staircase of ILAC-G24, from the same start.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "estimator/fleet/set_watch.hpp"
+#include "tests/fleet/drawn_fleet.hpp"
+
+namespace {
+
+using namespace selfcal::fleet;
+
+constexpr double years = 10.0;
+constexpr double sigma = 1.0;
+
+struct Arguments {
+  int units = 500, sets = 20, measurements = 200, parameters = 24, scenarios = 200;
+  int limit = 8;  // that a parameter may change by, in sigma of a calibration
+  std::uint64_t seed = 1;
+};
+
+struct Visit {
+  int unit, set;
+  double year;
+};
+
+// All units come at random times, to sets at random.
+std::vector<Visit> calendar(const Arguments& arguments, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> when(0.0, years);
+  std::uniform_int_distribution<int> where(0, arguments.sets - 1);
+  std::vector<Visit> visits;
+  for (int unit = 0; unit < arguments.units; ++unit) {
+    for (int k = 0; k < arguments.measurements; ++k) {
+      visits.push_back({unit, where(random), when(random)});
+    }
+  }
+  std::ranges::sort(visits, {}, &Visit::year);
+  return visits;
+}
+
+struct Fleet {
+  std::vector<UnitHistory> units;
+  std::vector<double> set_offsets;
+  std::vector<Measurement> in_order;  // of `visits`
+};
+
+Fleet draw(const Arguments& arguments, const std::vector<Visit>& visits, const Nature& nature,
+           std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Fleet fleet;
+  fleet.units.resize(static_cast<std::size_t>(arguments.units));
+  for (int s = 0; s < arguments.sets; ++s) {
+    fleet.set_offsets.push_back(nature.sets * normal(random));
+  }
+  std::vector<AgeingValue> truth;
+  for (int u = 0; u < arguments.units; ++u) {
+    truth.emplace_back(nature, random);
+  }
+  for (const Visit& visit : visits) {
+    const double value = truth[static_cast<std::size_t>(visit.unit)].at(visit.year) +
+                         fleet.set_offsets[static_cast<std::size_t>(visit.set)] + nature.setup * normal(random) +
+                         sigma * normal(random);
+    const Measurement m{visit.set, visit.year, value, sigma};
+    fleet.units[static_cast<std::size_t>(visit.unit)].push_back(m);
+    fleet.in_order.push_back(m);
+  }
+  return fleet;
+}
+
+// The history up to a year.
+std::vector<UnitHistory> until(const Fleet& fleet, double year) {
+  std::vector<UnitHistory> past(fleet.units.size());
+  for (std::size_t u = 0; u < past.size(); ++u) {
+    std::ranges::copy_if(fleet.units[u], std::back_inserter(past[u]),
+                         [&](const Measurement& m) { return m.year < year; });
+  }
+  return past;
+}
+
+UnitFilter followed(const TypeModel& model, const UnitHistory& past) {
+  UnitFilter filter(model, past.empty() ? 0.0 : past.front().year);
+  for (const Measurement& m : past) {
+    filter.add(m);
+  }
+  return filter;
+}
+
+struct Score {
+  double squares = 0.0;
+  int inside = 0, count = 0;
+  void add(double error, double band) {
+    squares += error * error;
+    inside += std::abs(error) <= band ? 1 : 0;
+    ++count;
+  }
+  double rms() const { return std::sqrt(squares / count); }
+  double share() const { return 100.0 * inside / count; }
+};
+
+constexpr double band_95 = 1.959964;
+
+// Least squares through a unit's past, and the sigma of a new value.
+std::pair<double, double> straight_line(const UnitHistory& past, double year) {
+  double n = 0, t = 0, v = 0;
+  for (const Measurement& m : past) {
+    n += 1;
+    t += m.year;
+    v += m.value;
+  }
+  t /= n;
+  v /= n;
+  double tt = 0, tv = 0, rest = 0;
+  for (const Measurement& m : past) {
+    tt += (m.year - t) * (m.year - t);
+    tv += (m.year - t) * (m.value - v);
+  }
+  const double slope = tv / tt;
+  for (const Measurement& m : past) {
+    rest += std::pow(m.value - v - slope * (m.year - t), 2);
+  }
+  const double variance = rest / (n - 2);
+  return {v + slope * (year - t), std::sqrt(variance * (1.0 + 1.0 / n + (year - t) * (year - t) / tt))};
+}
+
+// Of the last value, by what one value differed from the next in the past.
+double last_value_sd(const UnitHistory& past) {
+  double sum = 0;
+  for (std::size_t k = 1; k < past.size(); ++k) {
+    sum += std::pow(past[k].value - past[k - 1].value, 2);
+  }
+  return std::sqrt(sum / static_cast<double>(past.size() - 1));
+}
+
+bool forecast(const Arguments& arguments, const Fleet& fleet, const TypeModel& model, double cut, Score (&score)[3]) {
+  const auto past = until(fleet, cut);
+  for (std::size_t u = 0; u < past.size(); ++u) {
+    if (past[u].size() < 4 || past[u].size() == fleet.units[u].size()) {
+      continue;
+    }
+    const Measurement& next = fleet.units[u][past[u].size()];
+    const UnitFilter filter = followed(model, past[u]);
+    score[0].add(next.value - filter.at(next.year).level,
+                 band_95 * std::sqrt(filter.variance_of_measurement(next.year, next.sigma)));
+    score[1].add(next.value - past[u].back().value, band_95 * last_value_sd(past[u]));
+    const auto [value, sd] = straight_line(past[u], next.year);
+    score[2].add(next.value - value, band_95 * sd);
+  }
+  return arguments.units > 0;
+}
+
+struct Watch {
+  std::vector<UnitFilter> filters;
+  std::vector<SetWatch> sets;
+  const TypeModel* model;
+};
+
+Watch watch_from(const TypeModel& model, const std::vector<UnitHistory>& past) {
+  Watch watch;
+  watch.model = &model;
+  for (const UnitHistory& unit : past) {
+    watch.filters.push_back(followed(model, unit));
+  }
+  for (const SetOffset& offset : model.sets) {
+    watch.sets.emplace_back(offset);
+  }
+  return watch;
+}
+
+struct Accusations {
+  int named = 0, elsewhere = 0, biased = 0;  // of biased sets: with the right parameter; with another; all
+  int sound_accused = 0, sound = 0;
+  int first_ten_false = 0;
+  std::vector<int> after;  // calibrations of distinct units
+};
+
+// From `cut` on, `biased` (or none: -1) measures parameter 0 too high by `bias`; ends when that set has seen ten units.
+void scenario(const Arguments& arguments, const std::vector<Visit>& visits, const std::vector<Fleet>& fleets,
+              const std::vector<TypeModel>& models, double cut, int biased, double bias, double limit,
+              Accusations& told) {
+  std::vector<Watch> watches;
+  for (std::size_t p = 0; p < fleets.size(); ++p) {
+    watches.push_back(watch_from(models[p], until(fleets[p], cut)));
+  }
+  std::vector<char> accused(static_cast<std::size_t>(arguments.sets), 0);
+  std::map<int, int> seen;
+  for (std::size_t i = 0; i < visits.size(); ++i) {
+    const Visit& visit = visits[i];
+    if (visit.year < cut) {
+      continue;
+    }
+    const auto u = static_cast<std::size_t>(visit.unit), s = static_cast<std::size_t>(visit.set);
+    for (std::size_t p = 0; p < fleets.size(); ++p) {
+      Measurement m = fleets[p].in_order[i];
+      m.value += visit.set == biased && p == 0 ? bias : 0.0;
+      const SetVerdict verdict = watches[p].sets[s].add(visit.unit, watches[p].filters[u].add(m));
+      if (std::abs(verdict.z) > limit && !accused[s]) {
+        accused[s] = 1;
+        if (visit.set == biased) {
+          ++(p == 0 ? told.named : told.elsewhere);
+          told.after.push_back(static_cast<int>(seen.size()) + (seen.contains(visit.unit) ? 0 : 1));
+        }
+      }
+    }
+    if (visit.set == std::max(biased, 0)) {
+      ++seen[visit.unit];
+      if (seen.size() >= units_in_window) {
+        break;
+      }
+    }
+  }
+  for (int s = 0; s < arguments.sets; ++s) {
+    if (s == biased) {
+      ++told.biased;
+    } else {
+      ++told.sound;
+      told.sound_accused += accused[static_cast<std::size_t>(s)];
+    }
+  }
+}
+
+// All windows of all sets over the years after `from`.
+Accusations over_years(const Arguments& arguments, const std::vector<Visit>& visits, const std::vector<Fleet>& fleets,
+                       const std::vector<TypeModel>& models, double from, double limit, double& largest) {
+  Accusations told;
+  std::vector<char> accused(static_cast<std::size_t>(arguments.sets), 0);
+  for (std::size_t p = 0; p < fleets.size(); ++p) {
+    Watch watch = watch_from(models[p], until(fleets[p], from));
+    for (std::size_t i = 0; i < visits.size(); ++i) {
+      const auto u = static_cast<std::size_t>(visits[i].unit), s = static_cast<std::size_t>(visits[i].set);
+      if (visits[i].year >= from) {
+        const double z = std::abs(watch.sets[s].add(visits[i].unit, watch.filters[u].add(fleets[p].in_order[i])).z);
+        largest = std::max(largest, z);
+        accused[s] = accused[s] || z > limit ? 1 : 0;
+      }
+    }
+  }
+  told.sound = arguments.sets;
+  told.sound_accused = std::accumulate(accused.begin(), accused.end(), 0);
+  return told;
+}
+
+// --- intervals ---------------------------------------------------------------------------------------------------------
+struct Rule {
+  const char* name;
+  int calibrations = 0, intervals = 0, left = 0;
+};
+
+// Ten years of a unit by each rule: the same truth, looked at every two weeks.
+void live(const Arguments& arguments, const Nature& nature, const std::vector<TypeModel>& models, double limit,
+          double risk, std::uint64_t seed, Rule& rule, int which) {
+  constexpr double look = 14.0 / 365.2425;
+  for (int unit = 0; unit < arguments.units; ++unit) {
+    std::mt19937_64 random(seed + static_cast<std::uint64_t>(unit));
+    std::mt19937_64 noise(seed + 7919u * static_cast<std::uint64_t>(unit) + static_cast<std::uint64_t>(which));
+    std::normal_distribution<double> normal;
+    std::vector<AgeingValue> truth;
+    std::vector<UnitFilter> filters;
+    for (const TypeModel& model : models) {
+      truth.emplace_back(nature, random);
+      filters.emplace_back(model, 0.0);
+    }
+    std::vector<double> measured(models.size()), value(models.size());
+    double due = 0.0, last = 0.0, interval = 1.0;
+    bool left = false, first = true;
+    for (int k = 0; k * look < years; ++k) {
+      const double year = k * look;
+      bool beyond = false;
+      for (std::size_t p = 0; p < models.size(); ++p) {
+        value[p] = truth[p].at(year);
+        beyond = beyond || (!first && std::abs(value[p] - measured[p]) > limit);
+      }
+      left = left || beyond;
+      if (year < due) {
+        continue;
+      }
+      bool out = false, near_limit = false;
+      for (std::size_t p = 0; p < models.size(); ++p) {
+        const double found =
+            value[p] + nature.setup * normal(noise) + nature.sets * normal(noise) + sigma * normal(noise);
+        out = out || (!first && std::abs(found - measured[p]) > limit);
+        near_limit = near_limit || (!first && std::abs(found - measured[p]) > 0.8 * limit);
+        measured[p] = found;
+        Measurement m{0, year, found, std::hypot(sigma, nature.sets)};
+        filters[p].add(m);
+      }
+      ++rule.calibrations;
+      if (!first) {
+        ++rule.intervals;
+        rule.left += left ? 1 : 0;
+      }
+      if (which == 1) {  // ILAC-G24, method 1: longer where it was within 80 % of its limits, shorter where it was out
+        interval = std::clamp(interval * (first ? 1.0 : out ? 0.6 : near_limit ? 1.0 : 1.25), 0.1, 5.0);
+      } else if (which == 2) {
+        std::vector<Watched> parameters;
+        for (std::size_t p = 0; p < models.size(); ++p) {
+          parameters.push_back({&filters[p], measured[p], limit});
+        }
+        interval = interval_years(parameters, year, risk, 4 * look, 5.0);
+      }
+      first = false;
+      left = false;
+      last = year;
+      due = last + interval;
+    }
+  }
+}
+
+bool whole(const char* text, int& value) {
+  char* end = nullptr;
+  const long number = std::strtol(text, &end, 10);
+  value = static_cast<int>(number);
+  return *end == '\0' && number > 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  int seed = 1;
+  const std::map<std::string, int*> known{{"--units", &arguments.units},
+                                          {"--sets", &arguments.sets},
+                                          {"--measurements", &arguments.measurements},
+                                          {"--parameters", &arguments.parameters},
+                                          {"--scenarios", &arguments.scenarios},
+                                          {"--limit", &arguments.limit},
+                                          {"--seed", &seed}};
+  for (int i = 1; i + 1 < argc + 1; i += 2) {
+    if (i + 1 >= argc || !known.contains(argv[i]) || !whole(argv[i + 1], *known.at(argv[i]))) {
+      fmt::print(stderr, "fleet_trial: {}: a known option and a whole number are expected\n", argv[i]);
+      return 2;
+    }
+  }
+  arguments.seed = static_cast<std::uint64_t>(seed);
+  std::mt19937_64 random(arguments.seed);
+  const Nature nature;
+  const auto visits = calendar(arguments, random);
+  fmt::print("seed {}: {} units, {} sets, {} calibrations of {} parameters in {} years\n", seed, arguments.units,
+             arguments.sets, visits.size(), arguments.parameters, years);
+  std::vector<Fleet> fleets;
+  std::vector<TypeModel> models;
+  constexpr double cut = 5.0;
+  const auto began = std::chrono::steady_clock::now();
+  double worst_offset = 0.0;
+  for (int p = 0; p < arguments.parameters; ++p) {
+    fleets.push_back(draw(arguments, visits, nature, random));
+    models.push_back(fit_type(until(fleets.back(), cut), arguments.sets));
+    for (std::size_t s = 0; s < fleets.back().set_offsets.size(); ++s) {
+      worst_offset = std::max(worst_offset, std::abs(models.back().sets[s].value - fleets.back().set_offsets[s]));
+    }
+  }
+  const double fit_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  const TypeModel& m = models.front();
+  fmt::print(
+      "fit: {:.2f} s a parameter; first: unit {:.2f} ramp {:.3f} walk {:.3f} set-up {:.3f} (drawn {}) sets {:.3f} "
+      "(drawn {}); set "
+      "offsets wrong by {:.2f} at most\n",
+      fit_s / arguments.parameters, m.unit_sd, m.ramp_sd, m.walk_sd, m.setup_sd, nature.setup, m.set_sd, nature.sets,
+      worst_offset);
+
+  int failed = 0;
+  const auto require = [&](bool holds, const std::string& what) {
+    if (!holds) {
+      fmt::print("NOT MET: {}\n", what);
+      ++failed;
+    }
+  };
+
+  Score score[3];
+  for (const double year : {5.0, 6.5, 8.0, 9.0}) {
+    for (std::size_t p = 0; p < fleets.size(); ++p) {
+      forecast(arguments, fleets[p], models[p], year, score);
+    }
+  }
+  const char* names[] = {"model", "last value", "straight line per unit"};
+  for (int k = 0; k < 3; ++k) {
+    fmt::print("forecast, {}: {} values, 95 % bands cover {:.2f} %, rms {:.3f} sigma\n", names[k], score[k].count,
+               score[k].share(), score[k].rms());
+  }
+  require(score[0].share() >= 93.0 && score[0].share() <= 97.0, "bands cover 93 to 97 %");
+  require(score[0].rms() < score[1].rms() && score[0].rms() < score[2].rms(), "nearer than both rivals");
+
+  // Of one calibration: its own sigma and the set-up.
+  const double bias = 2.0 * std::hypot(sigma, nature.setup);
+  const double a_year = static_cast<double>(visits.size()) / years / arguments.sets;
+  const double limit = accusation_limit(0.01, arguments.parameters, a_year);
+  Accusations biased, control;
+  std::uniform_real_distribution<double> when(cut, years - 0.5);
+  std::uniform_int_distribution<int> which(0, arguments.sets - 1);
+  for (int k = 0; k < arguments.scenarios; ++k) {
+    const double from = when(random);
+    const int set = which(random);
+    scenario(arguments, visits, fleets, models, from, set, k % 2 == 0 ? bias : -bias, limit, biased);
+    scenario(arguments, visits, fleets, models, from, -1, 0.0, limit, control);
+  }
+  std::ranges::sort(biased.after);
+  fmt::print(
+      "sets: limit {:.2f} sigma; biased by two sigma of one calibration: {} of {} named within {} units with the "
+      "parameter, {} "
+      "with another; median after {}; sound sets accused meanwhile: {} of {}; without a biased set: {} of {}\n",
+      limit, biased.named, biased.biased, units_in_window, biased.elsewhere,
+      biased.after.empty() ? 0 : biased.after[biased.after.size() / 2], biased.sound_accused, biased.sound,
+      control.sound_accused, control.sound);
+  double largest = 0.0;
+  const Accusations long_run = over_years(arguments, visits, fleets, models, cut, limit, largest);
+  fmt::print("sets: over {} years {} of {} sound sets accused, largest z {:.2f}\n", years - cut, long_run.sound_accused,
+             long_run.sound, largest);
+  require(biased.sound_accused <= 0.01 * biased.sound, "at most 1 % of sound sets accused");
+  require(biased.named >= 0.5 * biased.biased, "a biased set is named");
+
+  Rule rules[] = {{"fixed year"}, {"staircase (ILAC-G24)"}, {"by the forecast"}};
+  for (int k = 0; k < 3; ++k) {
+    live(arguments, nature, models, arguments.limit, 0.01, arguments.seed * 1000003u, rules[k], k);
+    fmt::print("intervals, {}, limit {} sigma: {} calibrations, {} of {} intervals within limits ({:.2f} %)\n",
+               rules[k].name, arguments.limit, rules[k].calibrations, rules[k].intervals - rules[k].left,
+               rules[k].intervals, 100.0 - 100.0 * rules[k].left / std::max(1, rules[k].intervals));
+  }
+  const double fewer = 100.0 - 100.0 * rules[2].calibrations / rules[0].calibrations;
+  fmt::print("intervals: {:.0f} % fewer calibrations than a fixed year\n", fewer);
+  require(rules[2].left <= 0.01 * rules[2].intervals, "99 % of intervals within limits");
+  require(fewer >= 20.0, "20 % fewer calibrations than a fixed year");
+  return failed == 0 ? 0 : 1;
+}
