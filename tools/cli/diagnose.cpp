@@ -7,6 +7,8 @@
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
+#include "estimator/diagnosis/poses/poses.hpp"
+#include "estimator/diagnosis/poses/references.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -16,6 +18,8 @@
 #include "tools/cli/diagnose_output.hpp"
 #include "tools/cli/discovery_run.hpp"
 #include "tools/cli/dwell_table.hpp"
+#include "tools/cli/poses_input.hpp"
+#include "tools/cli/poses_output.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -35,7 +39,8 @@ struct DiagnoseArguments {
   double gyro_lsb_arcsec = 0.1, accel_lsb_mps = 2e-6;
 };
 
-constexpr CheckPolicy lenient{.gaps_are_errors = false, .gimbal_contradiction_is_error = false};
+constexpr CheckPolicy lenient{
+    .gaps_are_errors = false, .gimbal_contradiction_is_error = false, .uneven_force_is_error = false};
 
 // A recording with the estimator's view of it; stays where it is, for the view points into it.
 struct Opened {
@@ -256,12 +261,37 @@ Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::D
   return 1;
 }
 
+// A recording whose position says nothing is held against gravity in its poses and against its read-outs.
+Expected<int> diagnose_by_poses(const DiagnoseArguments& arguments, const Opened& opened, const std::string& why) {
+  for (const std::string* asked :
+       {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended, &arguments.against}) {
+    if (!asked->empty()) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}: nothing to do with {}", arguments.recording, why, *asked));
+    }
+  }
+  diagnosis::PoseDiagnosis d =
+      diagnosis::diagnose_poses(pose_input_of(opened.loaded.recording), 2.0 * arguments.false_alarm_rate);
+  if (!d.failure.empty()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}; {}", arguments.recording, why, d.failure));
+  }
+  d.not_by_position = why;
+  if (arguments.json) {
+    fmt::print("{}\n", document::with_head(document::poses, poses_json(d), opened.file).dump());
+  } else {
+    fmt::print("{}", poses_text(d, true));
+  }
+  return poses_mismatch(d) ? 1 : 0;
+}
+
 Expected<int> diagnose(const DiagnoseArguments& arguments) {
   const Expected<std::unique_ptr<Opened>> opened = open(arguments.recording);
   if (!opened) {
     return tl::unexpected(opened.error());
   }
   const ImuData& data = (*opened)->data;
+  if (const diagnosis::PositionReference position = diagnosis::position_reference(data); !position.usable) {
+    return diagnose_by_poses(arguments, **opened, position.why_not);
+  }
   const diagnosis::DiagnosisOptions options = options_from(arguments);
   if (!arguments.against.empty()) {
     return compare_with(arguments, **opened, options);

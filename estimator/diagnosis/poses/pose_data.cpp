@@ -1,162 +1,153 @@
 #include "estimator/diagnosis/poses/pose_data.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 namespace selfcal::diagnosis {
 namespace {
 
-Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
-  return Eigen::Map<const Vector3>(series[i].data());
-}
+constexpr std::array<std::pair<int, int>, 6> free_elements = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
+using Nine = Eigen::Matrix<double, 9, 1>;
 
-// Scatter of windows of `window` samples: root of the sum of the axes' variances.
-std::vector<double> scatter(const std::vector<std::array<double, 3>>& series, std::size_t window) {
-  std::vector<double> result;
-  const Vector3 offset = at(series, 0);  // raw counts are large beside their scatter
-  Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    const Vector3 in = at(series, i) - offset;
-    sum += in;
-    square += in.cwiseAbs2();
-    if (i + 1 >= window) {
-      const auto n = static_cast<double>(window);
-      result.push_back(std::sqrt(std::max(0.0, (square / n - (sum / n).cwiseAbs2()).sum())));
-      const Vector3 out = at(series, i + 1 - window) - offset;
-      sum -= out;
-      square -= out.cwiseAbs2();
-    }
-  }
-  return result;
-}
-
-double quiet_level(std::vector<double> values) {
-  const auto tenth = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 20);
-  std::nth_element(values.begin(), tenth, values.end());
-  return *tenth;
-}
-
-Pose mean_of(const PoseInput& input, std::size_t first, std::size_t last) {
-  Pose p;
-  p.first = first;
-  p.last = last;
-  p.middle_s = 0.5 * (input.time_s[first] + input.time_s[last - 1]) - input.time_s.front();
-  p.gyro = p.accel = Vector3::Zero();
-  for (std::size_t i = first; i < last; ++i) {
-    p.gyro += at(input.gyro, i);
-    p.accel += at(input.accel, i);
-  }
-  const auto n = static_cast<double>(last - first);
-  p.gyro /= n;
-  p.accel /= n;
-  Vector3 square = Vector3::Zero();
-  for (std::size_t i = first + 1; i < last; ++i) {
-    square += (at(input.gyro, i) - at(input.gyro, i - 1)).cwiseAbs2();
-  }
-  p.gyro_white = (0.5 * square / (n - 1.0) / n).cwiseSqrt();
-  return p;
-}
-
-}  // namespace
-
-std::vector<Pose> find_poses(const PoseInput& input) {
-  std::vector<Pose> poses;
-  const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
-  const auto window = static_cast<std::size_t>(std::lround(rate));  // 1 s
-  if (window < 4 || input.time_s.size() < 20 * window) {
-    return poses;
-  }
-  const std::vector<double> gyro = scatter(input.gyro, window), accel = scatter(input.accel, window);
-  constexpr double factor = 3.0;
-  const double gyro_limit = factor * quiet_level(gyro), accel_limit = factor * quiet_level(accel);
-  std::size_t begin = 0;
-  bool inside = false;
-  for (std::size_t k = 0; k <= gyro.size(); ++k) {
-    const bool quiet = k < gyro.size() && gyro[k] < gyro_limit && accel[k] < accel_limit;
-    if (quiet && !inside) {
-      begin = k;
-    } else if (!quiet && inside && k - begin >= window) {
-      poses.push_back(mean_of(input, begin + window / 2, k + window / 2));  // middles of the windows
-    }
-    inside = quiet;
-  }
-  return poses;
-}
-
-AccelModel fit_accelerometers(const std::vector<Pose>& poses) {
+// Where the fit begins, with sigma of it.
+AccelModel assumed(const PoseInput& input, const std::vector<Pose>& poses) {
   AccelModel m;
   Vector3 low = poses.front().accel, high = low;
   for (const Pose& p : poses) {
     low = low.cwiseMin(p.accel);
     high = high.cwiseMax(p.accel);
   }
-  m.bias = 0.5 * (low + high);
-  m.T.diagonal() = 2.0 * (high - low).cwiseInverse();
-  const auto n = static_cast<Eigen::Index>(poses.size());
-  m.residual.resize(n);
-  m.jacobian.resize(n, 9);
-  constexpr std::array<std::pair<int, int>, 6> free = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
-  for (int round = 0; round < 20; ++round) {
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const Vector3 d = poses[static_cast<std::size_t>(k)].accel - m.bias;
-      const Vector3 u = m.T * d;
-      const Vector3 e = u.normalized();
-      m.residual(k) = u.norm() - 1.0;
-      m.jacobian.block<1, 3>(k, 0) = -(e.transpose() * m.T);
-      for (std::size_t j = 0; j < free.size(); ++j) {
-        m.jacobian(k, 3 + static_cast<Eigen::Index>(j)) = e(free[j].first) * d(free[j].second);
+  const bool nominal = input.accel_unit > 0.0;
+  m.raw_per_g = nominal ? 9.80665 / input.accel_unit : 0.5 * (high - low).maxCoeff();
+  m.T = Matrix3::Identity() / m.raw_per_g;
+  m.bias = nominal ? Vector3(Vector3::Zero()) : Vector3(0.5 * (low + high));
+  constexpr double nominal_bias = 0.2, nominal_scale = 0.1, raw_bias = 0.3, raw_scale = 0.3, misalignment = 0.03;
+  m.before << Vector3::Constant((nominal ? nominal_bias : raw_bias) * m.raw_per_g),
+      Vector3::Constant((nominal ? nominal_scale : raw_scale) / m.raw_per_g),
+      Vector3::Constant(misalignment / m.raw_per_g);
+  // An axis along which gravity hardly moves shows in |f| by its square alone, and would take on what is anything else's: its
+  // bias, scale and misalignments stay what they are assumed to be.
+  constexpr double reached = 0.5, held = 1e-6;  // of g, and of sigma before
+  m.held.setConstant(false);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (high(axis) - low(axis) < reached * m.raw_per_g) {
+      m.held(axis) = m.held(3 + axis) = true;
+      for (std::size_t j = 3; j < free_elements.size(); ++j) {
+        m.held(3 + static_cast<Eigen::Index>(j)) |= free_elements[j].first == axis || free_elements[j].second == axis;
       }
     }
-    const Eigen::VectorXd step = m.jacobian.colPivHouseholderQr().solve(-m.residual);
-    m.bias += step.head<3>();
-    for (std::size_t j = 0; j < free.size(); ++j) {
-      m.T(free[j].first, free[j].second) += step(3 + static_cast<Eigen::Index>(j));
-    }
   }
+  m.before = m.held.select(held * m.before, m.before);
   return m;
 }
 
-Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to, const GyroModel& model) {
-  Vector3 u = from.u.normalized();
-  for (std::size_t i = from.last; i < to.first; ++i) {
-    const double dt = input.time_s[i] - input.time_s[i - 1];
-    const Vector3 raw = at(input.gyro, i) - model.bias - model.G * u;
-    u = matrix_from_rotation_vector(-(model.S * raw) * input.gyro_unit * dt) * u;
+void linearise(const std::vector<Pose>& poses, AccelModel& m) {
+  const auto n = static_cast<Eigen::Index>(poses.size());
+  m.residual.resize(n);
+  m.jacobian.resize(n, 9);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Vector3 d = poses[static_cast<std::size_t>(k)].accel - m.bias;
+    const Vector3 u = m.T * d;
+    const Vector3 e = u.normalized();
+    m.residual(k) = u.norm() - 1.0;
+    m.jacobian.block<1, 3>(k, 0) = -(e.transpose() * m.T);
+    for (std::size_t j = 0; j < free_elements.size(); ++j) {
+      m.jacobian(k, 3 + static_cast<Eigen::Index>(j)) = e(free_elements[j].first) * d(free_elements[j].second);
+    }
   }
-  return u - to.u.normalized();
 }
 
-void fit_turns(const PoseInput& input, const std::vector<Pose>& poses, std::size_t without, GyroModel& model) {
-  const auto turns = poses.size() - 1;
-  for (int round = 0; round < 3; ++round) {
-    Eigen::MatrixXd J(3 * static_cast<Eigen::Index>(turns), 9);
-    Eigen::VectorXd r(J.rows());
-    J.setZero();
-    r.setZero();
-    for (std::size_t k = 0; k < turns; ++k) {
-      if (k == without) {
-        continue;
-      }
-      const auto row = 3 * static_cast<Eigen::Index>(k);
-      const Vector3 now = direction_error(input, poses[k], poses[k + 1], model);
-      r.segment<3>(row) = now;
-      constexpr double h = 1e-4;
-      for (Eigen::Index j = 0; j < 9; ++j) {
-        GyroModel moved = model;
-        moved.S(j / 3, j % 3) += h;
-        J.block<3, 1>(row, j) = (direction_error(input, poses[k], poses[k + 1], moved) - now) / h;
-      }
-    }
-    const Eigen::Matrix<double, 9, 1> step = J.colPivHouseholderQr().solve(-r);
-    for (Eigen::Index j = 0; j < 9; ++j) {
-      model.S(j / 3, j % 3) += step(j);
-    }
-    if (step.cwiseAbs().maxCoeff() < 1e-5) {
-      break;
+Nine values_of(const AccelModel& m) {
+  Nine x;
+  x.head<3>() = m.bias;
+  for (std::size_t j = 0; j < free_elements.size(); ++j) {
+    x(3 + static_cast<Eigen::Index>(j)) = m.T(free_elements[j].first, free_elements[j].second);
+  }
+  return x;
+}
+
+void move(AccelModel& m, const Nine& step) {
+  m.bias += step.head<3>();
+  for (std::size_t j = 0; j < free_elements.size(); ++j) {
+    m.T(free_elements[j].first, free_elements[j].second) += step(3 + static_cast<Eigen::Index>(j));
+  }
+}
+
+// Along an axis that gravity hardly reaches |f| is quadratic and a whole step oversteps: halved until it goes down.
+void descend(const std::vector<Pose>& poses, const Nine& start, double noise, const Nine& step, AccelModel& m) {
+  const auto cost = [&](const AccelModel& model) {
+    return (values_of(model) - start).cwiseQuotient(m.before).squaredNorm() +
+           model.residual.squaredNorm() / (noise * noise);
+  };
+  const double now = cost(m);
+  constexpr int halvings = 10;
+  for (int k = 0; k < halvings; ++k) {
+    AccelModel moved = m;
+    move(moved, std::ldexp(1.0, -k) * step);
+    linearise(poses, moved);
+    if (cost(moved) <= now) {
+      m = moved;
+      return;
     }
   }
+}
+
+// What the halves of the poses differ by: noise of a mean, slow noise included. The change of a pose is no noise of the next.
+double noise_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
+  double square = 0.0;
+  for (const Pose& p : poses) {
+    const double half = m.direction(p.accel).normalized().dot(m.T * p.accel_half);
+    square += half * half;
+  }
+  return std::sqrt(square / static_cast<double>(poses.size()));
+}
+
+}  // namespace
+
+AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& poses) {
+  AccelModel m = assumed(input, poses);
+  const Nine start = values_of(m);
+  const auto n = static_cast<double>(poses.size());
+  double noise = 1e-3;
+  for (int round = 0; round < 30; ++round) {
+    linearise(poses, m);
+    // In units of what is assumed before, one observation of the noise's size has the weight of the prior's one.
+    const Eigen::MatrixXd J = m.jacobian * m.before.asDiagonal() / noise;
+    const Eigen::Matrix<double, 9, 9> data = J.transpose() * J;
+    const Eigen::Matrix<double, 9, 9> normal = data + Eigen::Matrix<double, 9, 9>::Identity();
+    const Nine off = (start - values_of(m)).cwiseQuotient(m.before);
+    const Eigen::LLT<Eigen::Matrix<double, 9, 9>> solver(normal);
+    const Nine step = solver.solve(-J.transpose() * m.residual / noise + off);
+    m.sigma = Nine(solver.solve(Eigen::Matrix<double, 9, 9>::Identity()).diagonal()).cwiseSqrt().cwiseProduct(m.before);
+    m.free = n - solver.solve(data).trace();
+    descend(poses, start, noise, step.cwiseProduct(m.before), m);
+    const double seen = std::sqrt(m.residual.squaredNorm() / std::max(1.0, m.free));
+    constexpr double enough = 3.0, least = 1e-7;  // of g
+    noise = std::max(least, std::max(noise_of_means(m, poses), m.free >= enough ? seen : 0.0));
+  }
+  linearise(poses, m);
+  return m;
+}
+
+std::vector<PoseParameter> parameters_of(const AccelModel& m) {
+  constexpr std::array<const char*, 9> names = {"bias_x",          "bias_y",          "bias_z",
+                                                "scale_x",         "scale_y",         "scale_z",
+                                                "misalignment_xy", "misalignment_xz", "misalignment_yz"};
+  const Nine x = values_of(m);
+  std::vector<PoseParameter> all;
+  for (Eigen::Index k = 0; k < 9; ++k) {
+    PoseParameter p;
+    p.name = names[static_cast<std::size_t>(k)];
+    p.determined = !m.held(k) && m.sigma(k) < 0.5 * m.before(k);
+    // Errors of the sensor as it is: u = T (a - b), so a = T^-1 u + b.
+    p.unit = k < 3 ? "raw" : "1";
+    p.value = k < 3 ? x(k) : k < 6 ? 1.0 / (x(k) * m.raw_per_g) - 1.0 : -x(k) * m.raw_per_g;
+    p.sigma = k < 3 ? m.sigma(k) : m.sigma(k) * m.raw_per_g;
+    all.push_back(p);
+  }
+  return all;
 }
 
 }  // namespace selfcal::diagnosis

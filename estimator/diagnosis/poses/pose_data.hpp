@@ -1,7 +1,8 @@
-// Static poses of a hand-held recording, their means, and the accelerometers' calibration. Private to this folder.
+// Static poses of a recording, their means, and the accelerometers' calibration. Private to this folder.
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/poses/poses.hpp"
@@ -9,35 +10,43 @@
 namespace selfcal::diagnosis {
 
 struct Pose {
-  std::size_t first = 0, last = 0;  // samples
+  std::size_t first = 0, last = 0;                         // samples
+  std::vector<std::pair<std::size_t, std::size_t>> quiet;  // of them those without a disturbance
   double middle_s = 0.0;
-  Vector3 gyro, accel;  // means, raw
-  Vector3 gyro_white;   // sigma of the mean by white noise, raw
-  Vector3 u;            // calibrated, g
+  Vector3 gyro, accel;            // means, raw
+  Vector3 gyro_white;             // sigma of the mean by white noise, raw
+  Vector3 gyro_half, accel_half;  // half the difference between the means of both halves, raw
+  Vector3 u = Vector3::Zero();    // calibrated, g
 };
 
-// Stretches of 1 s and more in which both triads scatter by less than three times what the quietest tenth does.
+Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i);
+
+// Stretches in which the accelerometers give zero, which gravity never does, or all six axes one value for half a second.
+std::vector<LeftOut> find_left_out(const PoseInput& input);
+
+// Poses by the motion: stretches of 1 s and more in which both triads scatter little, put together where neither gravity nor
+// the gyros show a turn between them, and without those in which the sensor turns steadily.
 std::vector<Pose> find_poses(const PoseInput& input);
+
+// Axes that stand at the end of their range, which no other value approaches as often.
+std::vector<Clipping> find_clipping(const PoseInput& input);
 
 // u = T (a - b), T upper triangular.
 struct AccelModel {
   Matrix3 T = Matrix3::Identity();
   Vector3 bias = Vector3::Zero();
-  Eigen::VectorXd residual;  // |u| - 1 of the poses
-  Eigen::MatrixXd jacobian;  // of the residual, [poses x 9]
+  Eigen::VectorXd residual;            // |u| - 1 of the poses
+  Eigen::MatrixXd jacobian;            // of the residual, [poses x 9]: bias, then T's xx yy zz xy xz yz
+  Eigen::Matrix<double, 9, 1> sigma;   // of the nine, noise and what was assumed before together
+  Eigen::Matrix<double, 9, 1> before;  // sigma of what is assumed before
+  Eigen::Array<bool, 9, 1> held =
+      Eigen::Array<bool, 9, 1>::Constant(false);  // left as assumed: gravity does not reach them
+  double raw_per_g = 1.0;
+  double free = 0.0;  // degrees of freedom that the residuals have left
   Vector3 direction(const Vector3& raw) const { return T * (raw - bias); }
 };
-AccelModel fit_accelerometers(const std::vector<Pose>& poses);
-
-// Turns between poses: direction of gravity carried by the gyros, w = S (raw - bias - G u) times the unit.
-struct GyroModel {
-  Matrix3 S = Matrix3::Identity();
-  Vector3 bias = Vector3::Zero();  // raw
-  Matrix3 G = Matrix3::Zero();     // raw per g
-};
-// u at the beginning of pose k+1, carried there from pose k, less the accelerometers' u.
-Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to, const GyroModel& model);
-// Fits S to the turns whose number is not `without`.
-void fit_turns(const PoseInput& input, const std::vector<Pose>& poses, std::size_t without, GyroModel& model);
+// With what any accelerometer is before: misaligned by 0.03, its scale and bias within 0.1 and 0.2 g of the nominal ones.
+AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& poses);
+std::vector<PoseParameter> parameters_of(const AccelModel& model);
 
 }  // namespace selfcal::diagnosis

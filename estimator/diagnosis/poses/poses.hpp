@@ -1,11 +1,13 @@
-// Diagnosis of sensors without gimbal read-out and without a visible Earth rate, turned by hand between static poses.
+// Diagnosis of sensors without a visible Earth rate, turned by hand or by a table between static poses.
 //
-// Nothing is known of attitude but what gravity tells: specific force has the size of gravity in every pose; gyros in a
-// pose read their bias and what the pose does to it; and gyros integrated from one pose to the next must carry the
-// direction of gravity along. Noise is what the poses scatter by, so tests are F tests. Effects are the catalogue's.
+// Two references. Gravity: specific force has its size in every pose; gyros in a pose read their bias and what the pose does
+// to it; gyros integrated from one pose to the next must carry its direction along. Angle read-outs, where there are any:
+// what the gyros make of a turn, and how gravity turns in the sensor. Noise is what the poses scatter by, so that tests are
+// F tests, and effects of the pose are tested beside a random walk of the reading. Effects are the catalogue's.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,34 +20,129 @@ struct PoseInput {
   std::vector<double> time_s;                      // increasing
   std::vector<std::array<double, 3>> gyro, accel;  // raw, any unit
   double gyro_unit = 1.0;                          // nominal rad/s per raw unit
-  double gravity = 9.80665;                        // m/s^2, or 1 for an answer in g
+  double accel_unit = 0.0;                         // nominal m/s^2 per raw unit; 0: not known
+  std::vector<double> outer, inner;                // angle read-outs, rad; empty: none
 };
 
 struct PoseEffect {
   const Effect* effect = nullptr;
-  std::vector<std::string> parameters;   // names
-  std::vector<double> value, sigma;      // raw gyro or accelerometer units (per g, ...)
-  double log_p = 0.0;                    // F test, corrected for axes, effects and constants tried
-  std::array<double, 3> held_out_rms{};  // of poses left out in turn, raw units, with this and what was named before
+  double constant = 0.0;                  // NaN: none
+  std::vector<std::string> parameters;    // names
+  std::vector<double> value, sigma;       // raw gyro units (per g, ...); of accelerometers g
+  double log_p = 0.0;                     // F test, corrected for axes, effects and constants tried
+  std::array<double, 3> held_out_rms{};   // of poses left out in turn, raw units, with this and what was named before
+  std::vector<const Effect*> equivalent;  // explain the poses as well: the order of the poses does not tell them apart
+};
+
+// How much of what one effect would do another one does too, over the times and directions of these poses.
+struct Confounded {
+  const Effect* effect = nullptr;
+  const Effect* with = nullptr;
+  double shared = 0.0;  // R^2, beside a constant
+};
+
+// An axis that stands at an end of its range.
+struct Clipping {
+  bool gyro = true;
+  int axis = 0;
+  double limit = 0.0;  // raw units, the larger of both ends
+  std::size_t samples = 0;
+  double first_s = 0.0, last_s = 0.0;  // since the start
+};
+
+// A stretch that no pose and no turn uses: the sensor did not answer in it.
+struct LeftOut {
+  double first_s = 0.0, last_s = 0.0;  // since the start
+  std::size_t samples = 0;
+  std::string words;
+};
+
+// A parameter of the accelerometers or of the gyros with what the poses leave open.
+struct PoseParameter {
+  std::string name, unit;
+  double value = 0.0, sigma = 0.0;
+  bool determined = false;  // sigma less than half of what was assumed before
+};
+
+// Bias and scale of the accelerometers that settle after each turn: r_i exp(-s/tau), or in proportion to the change of
+// specific force along the axis.
+struct Settling {
+  double tau_s = 0.0;
+  bool with_change = false;
+  Vector3 size_g, sigma_g;  // g, or g per g of change
+  double log_p = 0.0;
+};
+
+// Of one axis of a table that carries the sensor.
+struct ReadOutAxis {
+  std::string name;  // outer, inner
+  int rows = 0;      // turns from stop to stop, or steady rates
+  bool steady = false;
+  double turned_deg = 0.0;                                  // all turns together
+  double slowest_deg_per_s = 0.0, fastest_deg_per_s = 0.0;  // of steady rates
+  Vector3 response, sigma;                                  // of the gyros in nominal rad/s per rad/s of the read-out
+  std::optional<PoseParameter> nonlinearity;                // part of the response that grows with the rate, per rad/s
+  double log_p_nonlinear = 0.0;
+};
+
+// The read-outs' clock against the sensors': a read-out that is late has a positive delay.
+struct ReadOutClock {
+  int turns = 0;
+  double delay_s = 0.0, delay_sigma_s = 0.0;    // at the middle of the recording
+  double growth_s = 0.0, growth_sigma_s = 0.0;  // over the recording
+  double least_s = 0.0, most_s = 0.0, scatter_s = 0.0;
+};
+
+// How gravity turns in the sensor while one axis of the table turns.
+struct TableTilt {
+  std::string axis;
+  bool near_vertical = false;              // else the axis lies nearer to the horizontal, and its tilt is not seen
+  double tilt_deg = 0.0, sigma_deg = 0.0;  // of an axis near the vertical against it
+  double log_p_shape = 0.0;                // of twice the angle in the accelerometers, corrected: a nonlinearity
+};
+
+struct ReadOuts {
+  std::vector<ReadOutAxis> axes;
+  std::optional<ReadOutClock> clock;
+  std::optional<TableTilt> tilt;
+  Vector3 gyro_bias = Vector3::Zero(), gyro_bias_sigma = Vector3::Zero();  // raw
+  int disagreeing = 0;  // turns that read-outs and gyros disagree about
 };
 
 struct PoseDiagnosis {
   int poses = 0;
+  bool by_poses =
+      false;  // whether they are enough for a reference: what follows of accelerometers and gyros is then filled
   double static_seconds = 0.0;
+  std::vector<Clipping> clipped;
+  std::vector<LeftOut> left_out;
   // Accelerometers: bias, scale, misalignment fitted to |f| = g.
   double accel_rms_g = 0.0, accel_held_out_rms_g = 0.0;
+  bool accel_tested = false;  // whether there are poses enough to test what the model leaves
   bool accel_adequate = false;
+  double force_at_rest_g = 0.0;   // mean of |f| in nominal units; 0: the unit is not known
+  double gravity_span_deg = 0.0;  // the largest angle between directions of gravity in the sensor
+  std::vector<PoseParameter> accel_parameters;
   std::vector<PoseEffect> accel_tried;  // best first
+  std::optional<Settling> settling;
   // Gyros in the poses.
-  std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
-  std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
-  std::vector<PoseEffect> gyro_tried;         // each alone, best first
-  std::vector<PoseEffect> gyro_named;         // forward selection
+  std::array<double, 3> gyro_bias{}, gyro_bias_sigma{};  // raw units
+  std::array<double, 3> gyro_held_out_rms{};             // bias alone, raw units
+  std::array<double, 3> gyro_white_rms{};                // what white noise would leave of a pose's mean
+  std::vector<PoseEffect> gyro_tried;                    // each alone, best first
+  std::vector<PoseEffect> gyro_named;                    // forward selection
+  std::vector<PoseEffect> gyro_open;                     // what is left beside what is named: coefficients and sigma
+  std::vector<Confounded> confounded;
   // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted.
+  int turns = 0, turns_clipped = 0;
+  std::vector<PoseParameter> gyro_parameters;
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
-  std::vector<std::string> invisible;                                      // in words
-  std::string failure;                                                     // empty: done
+  std::optional<ReadOuts> read_outs;
+  std::string not_by_position;         // why position at rest is no reference, if somebody asked
+  std::vector<std::string> supports;   // what the recording is a reference for, in words
+  std::vector<std::string> invisible;  // in words
+  std::string failure;                 // empty: done
 };
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double false_alarm_rate);

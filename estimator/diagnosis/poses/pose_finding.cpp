@@ -1,0 +1,288 @@
+// Poses by the motion.
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/poses/pose_data.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+using Series = std::vector<std::array<double, 3>>;
+
+// Scatter of windows of `window` samples: root of the sum of the axes' variances.
+std::vector<double> scatter(const Series& series, std::size_t window) {
+  std::vector<double> result;
+  const Vector3 offset = at(series, 0);  // raw counts are large beside their scatter
+  Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const Vector3 in = at(series, i) - offset;
+    sum += in;
+    square += in.cwiseAbs2();
+    if (i + 1 >= window) {
+      const auto n = static_cast<double>(window);
+      result.push_back(std::sqrt(std::max(0.0, (square / n - (sum / n).cwiseAbs2()).sum())));
+      const Vector3 out = at(series, i + 1 - window) - offset;
+      sum -= out;
+      square -= out.cwiseAbs2();
+    }
+  }
+  return result;
+}
+
+double quantile(std::vector<double> values, double share) {
+  const auto k = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), k, values.end());
+  return *k;
+}
+
+// Means over the quiet stretches, and over their halves.
+void take_means(const PoseInput& input, Pose& p) {
+  std::size_t total = 0;
+  for (const auto& [first, last] : p.quiet) {
+    total += last - first;
+  }
+  std::array<Vector3, 2> gyro = {Vector3::Zero(), Vector3::Zero()}, accel = gyro;
+  std::array<double, 2> count{};
+  Vector3 steps = Vector3::Zero();
+  double middle = 0.0, stepped = 0.0;
+  std::size_t k = 0;
+  for (const auto& [first, last] : p.quiet) {
+    for (std::size_t i = first; i < last; ++i, ++k) {
+      const std::size_t half = 2 * k < total ? 0 : 1;
+      gyro[half] += at(input.gyro, i);
+      accel[half] += at(input.accel, i);
+      count[half] += 1.0;
+      middle += input.time_s[i] - input.time_s.front();
+      if (i > first) {
+        steps += (at(input.gyro, i) - at(input.gyro, i - 1)).cwiseAbs2();
+        stepped += 1.0;
+      }
+    }
+  }
+  const auto n = static_cast<double>(total);
+  p.middle_s = middle / n;
+  p.gyro = (gyro[0] + gyro[1]) / n;
+  p.accel = (accel[0] + accel[1]) / n;
+  p.gyro_half = 0.5 * (gyro[1] / count[1] - gyro[0] / count[0]);
+  p.accel_half = 0.5 * (accel[1] / count[1] - accel[0] / count[0]);
+  p.gyro_white = (0.5 * steps / stepped / n).cwiseSqrt();
+}
+
+Pose pose_of(const PoseInput& input, std::size_t first, std::size_t last) {
+  Pose p;
+  p.first = first;
+  p.last = last;
+  p.quiet = {{first, last}};
+  take_means(input, p);
+  return p;
+}
+
+// What counts as quiet: three times the usual scatter of what scatters no more than twelve times as much as the quietest
+// twentieth. A table's drive shakes the sensor in one pose ten times as much as in another; a turn scatters more by far.
+double quiet_limit(const std::vector<double>& scatters) {
+  constexpr double factor = 3.0, reach = 12.0, share = 0.05;
+  const double most = reach * quantile(scatters, share);
+  std::vector<double> still;
+  std::copy_if(scatters.begin(), scatters.end(), std::back_inserter(still), [most](double s) { return s <= most; });
+  return factor * quantile(still, 0.5);
+}
+
+// Of windows that hold a sample of a stretch left out it is beyond any limit.
+void spoil(const PoseInput& input, std::size_t window, std::vector<double>& scatters) {
+  for (const LeftOut& out : find_left_out(input)) {
+    const double start = input.time_s.front();
+    for (std::size_t k = 0; k < scatters.size(); ++k) {
+      if (input.time_s[k] - start <= out.last_s && input.time_s[k + window - 1] - start >= out.first_s) {
+        scatters[k] = HUGE_VAL;
+      }
+    }
+  }
+}
+
+std::vector<Pose> quiet_stretches(const PoseInput& input, std::size_t window) {
+  std::vector<double> gyro = scatter(input.gyro, window), accel = scatter(input.accel, window);
+  spoil(input, window, gyro);
+  spoil(input, window, accel);
+  const double gyro_limit = quiet_limit(gyro), accel_limit = quiet_limit(accel);
+  std::vector<Pose> found;
+  std::size_t begin = 0;
+  bool inside = false;
+  for (std::size_t k = 0; k <= gyro.size(); ++k) {
+    const bool quiet = k < gyro.size() && gyro[k] <= gyro_limit && accel[k] <= accel_limit;
+    if (quiet && !inside) {
+      begin = k;
+    } else if (!quiet && inside && k - begin >= window) {
+      found.push_back(pose_of(input, begin + window / 2, k + window / 2));  // middles of the windows
+    }
+    inside = quiet;
+  }
+  return found;
+}
+
+// Raw accelerometer units of one g: nominal, or half the range of the stretches' means.
+double raw_gravity(const PoseInput& input, const std::vector<Pose>& stretches) {
+  if (input.accel_unit > 0.0) {
+    return 9.80665 / input.accel_unit;
+  }
+  Vector3 low = stretches.front().accel, high = low;
+  for (const Pose& p : stretches) {
+    low = low.cwiseMin(p.accel);
+    high = high.cwiseMax(p.accel);
+  }
+  return 0.5 * (high - low).maxCoeff();
+}
+
+// The sensor stood as it stands: half a degree is what a hand's knock leaves, and what errs |f| by 1e-5.
+bool same_pose(const PoseInput& input, const Pose& a, const Pose& b, double raw_per_g) {
+  constexpr double limit = 0.5 * units::degree;
+  if ((b.accel - a.accel).norm() > limit * raw_per_g) {
+    return false;
+  }
+  const Vector3 bias = 0.5 * (a.gyro + b.gyro);
+  Vector3 turned = Vector3::Zero();
+  for (std::size_t i = a.last; i < b.first; ++i) {
+    turned += (at(input.gyro, i) - bias) * (input.time_s[i] - input.time_s[i - 1]);
+    if (turned.norm() * input.gyro_unit > 20.0 * limit) {
+      return false;  // turned away and back
+    }
+  }
+  return turned.norm() * input.gyro_unit < limit;
+}
+
+std::vector<Pose> put_together(const PoseInput& input, const std::vector<Pose>& stretches) {
+  std::vector<Pose> poses;
+  if (stretches.empty()) {
+    return poses;
+  }
+  const double raw_per_g = raw_gravity(input, stretches);
+  for (const Pose& next : stretches) {
+    if (!poses.empty() && same_pose(input, poses.back(), next, raw_per_g)) {
+      Pose& p = poses.back();
+      p.last = next.last;
+      p.quiet.insert(p.quiet.end(), next.quiet.begin(), next.quiet.end());
+      take_means(input, p);
+    } else {
+      poses.push_back(next);
+    }
+  }
+  return poses;
+}
+
+// A steady turn is as quiet as a pose. Gyros that read a degree a second, and twenty times the usual deviation, away from
+// where they mostly are turn; so do read-outs that move.
+void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
+  Vector3 middle, spread;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> values, off;
+    for (const Pose& p : poses) {
+      values.push_back(p.gyro(axis));
+    }
+    middle(axis) = quantile(values, 0.5);
+    for (const double v : values) {
+      off.push_back(std::abs(v - middle(axis)));
+    }
+    spread(axis) = quantile(off, 0.5);
+  }
+  constexpr double rate = units::degree, deviations = 20.0, read_out = 0.1 * units::degree;
+  std::erase_if(poses, [&](const Pose& p) {
+    const std::size_t third = (p.last - p.first) / 3;  // read-outs may be late or early by the rest
+    for (const std::vector<double>* angle : {&input.outer, &input.inner}) {
+      if (!angle->empty() && std::abs((*angle)[p.last - third - 1] - (*angle)[p.first + third]) > read_out) {
+        return true;
+      }
+    }
+    const Vector3 off = (p.gyro - middle).cwiseAbs();
+    return ((off * input.gyro_unit).array() > rate && off.array() > deviations * spread.array()).any();
+  });
+}
+
+}  // namespace
+
+Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
+  return Eigen::Map<const Vector3>(series[i].data());
+}
+
+std::vector<Pose> find_poses(const PoseInput& input) {
+  const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+  const auto window = static_cast<std::size_t>(std::lround(rate));  // 1 s
+  if (window < 4 || input.time_s.size() < 20 * window) {
+    return {};
+  }
+  std::vector<Pose> poses = put_together(input, quiet_stretches(input, window));
+  if (!poses.empty()) {
+    drop_steady_turns(input, poses);
+  }
+  return poses;
+}
+
+std::vector<LeftOut> find_left_out(const PoseInput& input) {
+  constexpr double least_s = 0.5;
+  constexpr std::array<double, 3> zero{};
+  std::vector<LeftOut> all;
+  const auto add = [&](std::size_t first, std::size_t last, const char* words) {
+    all.push_back({input.time_s[first] - input.time_s.front(), input.time_s[last - 1] - input.time_s.front(),
+                   last - first, words});
+  };
+  const auto runs = [&](auto goes_on, double least, const char* words) {
+    std::size_t first = 0;
+    bool inside = false;
+    for (std::size_t i = 1; i <= input.time_s.size(); ++i) {
+      const bool now = i < input.time_s.size() && goes_on(i);
+      if (now && !inside) {
+        first = i;
+      } else if (!now && inside && input.time_s[i - 1] - input.time_s[first] >= least) {
+        add(first, i, words);
+      }
+      inside = now;
+    }
+  };
+  runs([&](std::size_t i) { return input.accel[i] == zero; }, 0.0, "the accelerometers give zero");
+  runs(
+      [&](std::size_t i) {
+        return input.accel[i] != zero && input.accel[i] == input.accel[i - 1] && input.gyro[i] == input.gyro[i - 1];
+      },
+      least_s, "all axes stand at one value");
+  return all;
+}
+
+std::vector<Clipping> find_clipping(const PoseInput& input) {
+  constexpr std::size_t least = 5;  // samples at the end, ...
+  constexpr double near = 0.01;     // ... and ten times as many as in the hundredth of the range before it
+  constexpr double at_rest = 0.5;   // what stands there for half of the time is no end of a range
+  std::vector<Clipping> all;
+  for (int k = 0; k < 6; ++k) {
+    const Series& series = k < 3 ? input.gyro : input.accel;
+    const auto axis = static_cast<std::size_t>(k % 3);
+    const auto [low, high] = std::minmax_element(series.begin(), series.end(),
+                                                 [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+    const double range = (*high)[axis] - (*low)[axis];
+    Clipping c{k < 3, k % 3, 0.0, 0, 0.0, 0.0};
+    for (const double end : {(*low)[axis], (*high)[axis]}) {
+      std::size_t there = 0, before = 0, first = 0, last = 0;
+      for (std::size_t i = 0; i < series.size(); ++i) {
+        if (series[i][axis] == end) {
+          first = there++ == 0 ? i : first;
+          last = i;
+        } else if (std::abs(series[i][axis] - end) < near * range) {
+          ++before;
+        }
+      }
+      const bool clips =
+          there >= least && there > before && static_cast<double>(there) < at_rest * static_cast<double>(series.size());
+      if (clips) {
+        const double from = input.time_s[first] - input.time_s.front(), to = input.time_s[last] - input.time_s.front();
+        c.first_s = c.samples == 0 ? from : std::min(c.first_s, from);
+        c.last_s = std::max(c.last_s, to);
+        c.samples += there;
+        c.limit = std::max(c.limit, std::abs(end));
+      }
+    }
+    if (c.samples > 0) {
+      all.push_back(c);
+    }
+  }
+  return all;
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,274 @@
+#include "estimator/diagnosis/poses/pose_judgement.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/poses/pose_regression.hpp"
+#include "estimator/statistics/distributions.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+std::vector<double> middles(const std::vector<Pose>& poses) {
+  std::vector<double> time_s;
+  for (const Pose& p : poses) {
+    time_s.push_back(p.middle_s);
+  }
+  return time_s;
+}
+
+bool has(const std::vector<PoseEffect>& list, const Effect* effect) {
+  return std::any_of(list.begin(), list.end(), [effect](const PoseEffect& p) { return p.effect == effect; });
+}
+
+void best_first(std::vector<PoseEffect>& all) {
+  std::stable_sort(all.begin(), all.end(), [](const PoseEffect& a, const PoseEffect& b) { return a.log_p < b.log_p; });
+}
+
+// One axis with and without the columns. Of the pose an effect is asked beside a random walk, for poses that follow one
+// another differ in time too; what changes with time is asked beside white noise, for a walk would be its rival.
+struct Comparison {
+  Regression with;
+  double log_p = 0.0;
+};
+Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                   const std::vector<double>& time_s, bool of_time) {
+  const auto n = y.size();
+  if (of_time) {
+    const Regression with = regress(joined(known, columns), y);
+    return {with, log_p_of(regress(known, y), with, n)};
+  }
+  const Whitener white(known, y, time_s);
+  const Eigen::VectorXd whitened = white(y);
+  Comparison c;
+  c.with = regress(white(joined(known, columns)), whitened);
+  c.log_p = log_p_of(regress(white(known), whitened), c.with, n);
+  c.with.held_out_rms = regress(joined(known, columns), y).held_out_rms;  // in the reading's unit
+  return c;
+}
+
+class Gyros {
+ public:
+  Gyros(const std::vector<Pose>& poses, double duration_s)
+      : poses_(poses), time_s_(middles(poses)), duration_s_(duration_s) {
+    const auto n = static_cast<Eigen::Index>(poses.size());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      known_[axis] = Eigen::MatrixXd::Ones(n, 1);
+      y_[axis].resize(n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        y_[axis](k) = poses[static_cast<std::size_t>(k)].gyro(static_cast<Eigen::Index>(axis));
+      }
+    }
+  }
+
+  // Every effect given what is known already, best first.
+  std::vector<PoseEffect> try_all(const std::vector<PoseEffect>& named) const;
+  void keep(const PoseEffect& chosen);
+  std::array<double, 3> held_out_rms() const {
+    std::array<double, 3> rms{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      rms[axis] = regress(known_[axis], y_[axis]).held_out_rms;
+    }
+    return rms;
+  }
+  void add_bias(PoseDiagnosis& d) const {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Regression r = regress(Eigen::MatrixXd::Ones(y_[axis].size(), 1), y_[axis]);
+      d.gyro_bias[axis] = r.value(0);
+      d.gyro_bias_sigma[axis] = r.sigma(0);
+    }
+  }
+  // Share of `a` that `b` makes too, over the axes.
+  double shared(const PoseEffect& a, const PoseEffect& b) const;
+  bool of_time(const Effect& effect) const {
+    return changes_with_time(effect, duration_s_, 0) || changes_with_time(effect, duration_s_, 1) ||
+           changes_with_time(effect, duration_s_, 2);
+  }
+
+ private:
+  PoseEffect attempt(const Effect& effect, double constant) const;
+
+  const std::vector<Pose>& poses_;
+  std::vector<double> time_s_;
+  double duration_s_;
+  std::array<Eigen::MatrixXd, 3> known_;
+  std::array<Eigen::VectorXd, 3> y_;
+};
+
+PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
+  PoseEffect result;
+  result.effect = &effect;
+  result.constant = constant;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
+    const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, of_time(effect));
+    result.held_out_rms[i] = c.with.held_out_rms;
+    result.log_p = std::min(result.log_p, c.log_p);
+    for (std::size_t j = 0; j < trial.names.size(); ++j) {
+      result.parameters.push_back(trial.names[j]);
+      result.value.push_back(c.with.value(known_[i].cols() + static_cast<Eigen::Index>(j)));
+      result.sigma.push_back(c.with.sigma(known_[i].cols() + static_cast<Eigen::Index>(j)));
+    }
+  }
+  return result;
+}
+
+std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) const {
+  std::vector<PoseEffect> all;
+  double tried = 0.0;
+  for (const Effect& effect : catalogue()) {
+    if (has(named, &effect) || !acts_on(effect, true)) {
+      continue;
+    }
+    PoseEffect best;
+    for (const double constant : effect.constant.tried()) {
+      PoseEffect one = attempt(effect, constant);
+      if (best.parameters.empty() || one.log_p < best.log_p) {
+        best = std::move(one);
+      }
+    }
+    tried += tests_worth(effect, poses_, duration_s_, 0);
+    if (!best.parameters.empty()) {
+      all.push_back(std::move(best));
+    }
+  }
+  for (PoseEffect& p : all) {
+    p.log_p = log_corrected(p.log_p, 3.0 * tried);
+  }
+  best_first(all);
+  return all;
+}
+
+void Gyros::keep(const PoseEffect& chosen) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::MatrixXd& known = known_[static_cast<std::size_t>(axis)];
+    known = joined(known, trial_of(*chosen.effect, chosen.constant, poses_, duration_s_, axis).columns);
+  }
+}
+
+double Gyros::shared(const PoseEffect& a, const PoseEffect& b) const {
+  double largest = 0.0;
+  const auto n = static_cast<Eigen::Index>(poses_.size());
+  const Eigen::MatrixXd ones = Eigen::MatrixXd::Ones(n, 1);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Trial of_a = trial_of(*a.effect, a.constant, poses_, duration_s_, axis);
+    const Trial of_b = trial_of(*b.effect, b.constant, poses_, duration_s_, axis);
+    const Eigen::MatrixXd rivals = joined(ones, of_b.columns);
+    for (Eigen::Index j = 0; j < of_a.columns.cols(); ++j) {
+      const Regression alone = regress(ones, of_a.columns.col(j));
+      const Regression beside = regress(rivals, of_a.columns.col(j));
+      if (alone.square > 0.0) {
+        // Columns explain by chance what they are many for: adjusted R^2.
+        const double free = static_cast<double>(n - 1) / std::max(1.0, static_cast<double>(n - beside.rank));
+        largest = std::max(largest, 1.0 - beside.square / alone.square * free);
+      }
+    }
+  }
+  return largest;
+}
+
+// What stands in for `chosen`: named alone as well, and nothing more once `chosen` is there.
+void add_equivalents(const std::vector<PoseEffect>& before, const std::vector<PoseEffect>& after, double limit,
+                     PoseEffect& chosen) {
+  constexpr double odds = 4.605;  // ln 100, as for the classes of a recording with a gimbal
+  for (const PoseEffect& rival : before) {
+    if (rival.effect == chosen.effect || rival.log_p > limit || rival.log_p > chosen.log_p + odds) {
+      continue;
+    }
+    const auto again =
+        std::find_if(after.begin(), after.end(), [&](const PoseEffect& p) { return p.effect == rival.effect; });
+    if (again != after.end() && again->log_p > limit) {
+      chosen.equivalent.push_back(rival.effect);
+    }
+  }
+}
+
+void add_confounded(const Gyros& gyros, const std::vector<PoseEffect>& tried, PoseDiagnosis& d) {
+  constexpr double much = 0.5;  // half of an effect that another one makes too costs its sigma a factor of 1.4
+  for (const PoseEffect& a : tried) {
+    for (const PoseEffect& b : tried) {
+      if (gyros.of_time(*a.effect) && !gyros.of_time(*b.effect)) {
+        const double shared = gyros.shared(a, b);
+        if (shared > much) {
+          d.confounded.push_back({a.effect, b.effect, shared});
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s, double alpha,
+                          PoseDiagnosis& d) {
+  const auto n = model.residual.size();
+  const Regression plain = regress(model.jacobian, model.residual);
+  d.accel_rms_g = std::sqrt(model.residual.squaredNorm() / static_cast<double>(n));
+  d.accel_held_out_rms_g = plain.held_out_rms;
+  // Three degrees of freedom beside the nine; and where the poses leave one of the nine open, its column is made of the noise of
+  // the readings themselves and explains it.
+  constexpr Eigen::Index least = 12;
+  d.accel_tested = n >= least && std::all_of(d.accel_parameters.begin(), d.accel_parameters.end(),
+                                             [](const PoseParameter& p) { return p.determined; });
+  if (!d.accel_tested) {
+    d.accel_adequate = true;
+    return;
+  }
+  double tried = 0.0;
+  const std::vector<double> time_s = middles(poses);
+  for (const Effect& effect : catalogue()) {
+    if (!acts_on(effect, false)) {
+      continue;
+    }
+    for (const double constant : effect.constant.tried()) {
+      const Trial trial = trial_of(effect, constant, poses, duration_s, 3);
+      if (trial.columns.cols() == 0) {
+        continue;
+      }
+      const Comparison c =
+          compare(model.jacobian, trial.columns, model.residual, time_s, changes_with_time(effect, duration_s, 3));
+      PoseEffect p;
+      p.effect = &effect;
+      p.constant = constant;
+      p.log_p = c.log_p;
+      p.held_out_rms.fill(c.with.held_out_rms);
+      for (std::size_t j = 0; j < trial.names.size(); ++j) {
+        p.parameters.push_back(trial.names[j]);
+        p.value.push_back(c.with.value(9 + static_cast<Eigen::Index>(j)));
+        p.sigma.push_back(c.with.sigma(9 + static_cast<Eigen::Index>(j)));
+      }
+      d.accel_tried.push_back(p);
+    }
+    tried += tests_worth(effect, poses, duration_s, 3);
+  }
+  for (PoseEffect& p : d.accel_tried) {
+    p.log_p = log_corrected(p.log_p, tried);
+  }
+  best_first(d.accel_tried);
+  d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
+}
+
+void judge_gyros(const std::vector<Pose>& poses, double duration_s, double alpha, PoseDiagnosis& d) {
+  Gyros gyros(poses, duration_s);
+  gyros.add_bias(d);
+  d.gyro_held_out_rms = gyros.held_out_rms();
+  const double limit = std::log(alpha);
+  d.gyro_tried = gyros.try_all({});
+  std::vector<PoseEffect> left = d.gyro_tried;
+  while (!left.empty() && left.front().log_p < limit) {
+    PoseEffect chosen = left.front();
+    gyros.keep(chosen);
+    std::vector<PoseEffect> named = d.gyro_named;
+    named.push_back(chosen);
+    const std::vector<PoseEffect> after = gyros.try_all(named);
+    add_equivalents(left, after, limit, chosen);
+    d.gyro_named.push_back(chosen);
+    left = after;
+  }
+  d.gyro_open = left;
+  add_confounded(gyros, d.gyro_tried, d);
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,164 @@
+#include "estimator/diagnosis/poses/pose_regression.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/statistics/distributions.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+EffectContext context_of(double middle_s, const Vector3& u, double duration_s) {
+  EffectContext c;
+  c.start_s = middle_s - 0.5;
+  c.end_s = middle_s + 0.5;
+  c.dt = 1.0;
+  c.angle = c.rate = c.rate_change = c.field_b = Vector3::Zero();
+  c.u = u;
+  c.velocity = c.force = 9.80665 * u;
+  c.C_nb = Matrix3::Identity();
+  c.duration_s = duration_s;
+  return c;
+}
+
+Eigen::RowVectorXd row_of(const Effect& effect, double constant, double middle_s, const Vector3& u, double duration_s,
+                          int axis) {
+  const auto count = static_cast<Eigen::Index>(effect.parameters.size());
+  Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, count), angle = velocity;
+  effect.sensor(context_of(middle_s, u, duration_s), constant, velocity, angle);
+  return axis < 3 ? Eigen::RowVectorXd(angle.row(axis)) : Eigen::RowVectorXd(u.transpose() * velocity);
+}
+
+// White noise and a random walk of this share: covariance of readings at these times.
+Eigen::MatrixXd covariance_of(const std::vector<double>& time_s, double walk) {
+  const auto n = static_cast<Eigen::Index>(time_s.size());
+  Eigen::MatrixXd V = Eigen::MatrixXd::Identity(n, n);
+  const double span = std::max(1e-9, time_s.back() - time_s.front());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto earlier = static_cast<std::size_t>(std::min(i, j));
+      V(i, j) += walk * (time_s[earlier] - time_s.front()) / span;
+    }
+  }
+  return V;
+}
+
+// Restricted likelihood, logarithm, but for a constant.
+double restricted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eigen::MatrixXd& lower) {
+  const auto L = lower.triangularView<Eigen::Lower>();
+  const Eigen::MatrixXd A = L.solve(X);
+  const Eigen::VectorXd b = L.solve(y);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A);
+  const Eigen::Index rank = qr.rank();
+  const double square = (b - A * qr.solve(b)).squaredNorm();
+  const double design = qr.matrixR().topLeftCorner(rank, rank).diagonal().array().abs().log().sum();
+  const auto free = static_cast<double>(y.size() - rank);
+  return -0.5 * free * std::log(std::max(square, 1e-300)) - lower.diagonal().array().log().sum() - design;
+}
+
+}  // namespace
+
+Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis) {
+  const auto n = static_cast<Eigen::Index>(poses.size());
+  const auto count = static_cast<Eigen::Index>(effect.parameters.size());
+  Eigen::MatrixXd all(n, count);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Pose& pose = poses[static_cast<std::size_t>(k)];
+    all.row(k) = row_of(effect, constant, pose.middle_s, pose.u, duration_s, axis);
+  }
+  Trial t{&effect, constant, Eigen::MatrixXd(n, 0), {}};
+  for (Eigen::Index j = 0; j < count; ++j) {
+    if (all.col(j).cwiseAbs().maxCoeff() > 0.0) {
+      t.columns.conservativeResize(Eigen::NoChange, t.columns.cols() + 1);
+      t.columns.rightCols<1>() = all.col(j);
+      t.names.push_back(effect.parameters[static_cast<std::size_t>(j)].name);
+    }
+  }
+  return t;
+}
+
+bool changes_with_time(const Effect& effect, double duration_s, int axis) {
+  const double constant = effect.constant.tried().front();
+  const Vector3 u = Vector3(0.6, 0.48, 0.64);  // any direction that is along no axis
+  const Eigen::RowVectorXd early = row_of(effect, constant, 0.1 * duration_s, u, duration_s, axis);
+  const Eigen::RowVectorXd late = row_of(effect, constant, 0.9 * duration_s, u, duration_s, axis);
+  return (late - early).norm() > 1e-6 * (late.norm() + early.norm());
+}
+
+double tests_worth(const Effect& effect, const std::vector<Pose>& poses, double duration_s, int axis) {
+  const std::vector<double> constants = effect.constant.tried();
+  if (constants.size() < 2) {
+    return 1.0;
+  }
+  Eigen::MatrixXd first(static_cast<Eigen::Index>(poses.size()), static_cast<Eigen::Index>(constants.size()));
+  for (std::size_t k = 0; k < constants.size(); ++k) {
+    const Trial trial = trial_of(effect, constants[k], poses, duration_s, axis);
+    if (trial.columns.cols() == 0) {
+      return 1.0;
+    }
+    Eigen::VectorXd column = trial.columns.col(0);
+    column.array() -= column.mean();
+    first.col(static_cast<Eigen::Index>(k)) = column / std::max(1e-300, column.norm());
+  }
+  const Eigen::VectorXd values =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(first.transpose() * first).eigenvalues().cwiseMax(0.0);
+  const double roots = values.cwiseSqrt().sum();
+  return std::max(1.0, roots * roots / std::max(1e-300, values.sum()));
+}
+
+bool acts_on(const Effect& effect, bool gyro) {
+  return effect.sensor != nullptr && applies(effect, false) && !effect.needs_heading &&
+         effect.triad == (gyro ? Triad::gyro : Triad::accelerometer);
+}
+
+Regression regress(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
+  Regression r;
+  r.rank = qr.rank();
+  r.value = qr.solve(y);
+  const Eigen::VectorXd e = y - X * r.value;
+  const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ()).leftCols(r.rank);
+  r.square = e.squaredNorm();
+  const Eigen::ArrayXd leverage = Q.rowwise().squaredNorm();
+  r.held_out_rms = std::sqrt((e.array() / (1.0 - leverage).max(1e-9)).square().mean());
+  const double variance = r.square / static_cast<double>(std::max<Eigen::Index>(1, y.size() - r.rank));
+  const Eigen::MatrixXd G = X.transpose() * X;
+  r.sigma = (G.completeOrthogonalDecomposition().pseudoInverse().diagonal() * variance).cwiseMax(0.0).cwiseSqrt();
+  return r;
+}
+
+Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd all(a.rows(), a.cols() + b.cols());
+  all << a, b;
+  return all;
+}
+
+double log_p_of(const Regression& without, const Regression& with, Eigen::Index n) {
+  const auto more = static_cast<double>(with.rank - without.rank);
+  const auto left = static_cast<double>(n - with.rank);
+  if (more < 1.0 || left < 1.0) {
+    return 0.0;
+  }
+  return log_f_tail((without.square - with.square) / more / (with.square / left), more, left);
+}
+
+Whitener::Whitener(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const std::vector<double>& time_s) {
+  double best = -HUGE_VAL;
+  for (const double walk : {0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0}) {
+    const Eigen::MatrixXd lower = covariance_of(time_s, walk).llt().matrixL();
+    const double likelihood = restricted(X, y, lower);
+    if (likelihood > best) {
+      best = likelihood;
+      lower_ = lower;
+    }
+  }
+}
+
+Eigen::MatrixXd Whitener::operator()(const Eigen::MatrixXd& columns) const {
+  return lower_.triangularView<Eigen::Lower>().solve(columns);
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,173 @@
+#include "estimator/diagnosis/poses/pose_turns.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace selfcal::diagnosis {
+namespace {
+
+constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+constexpr double scale_before = 0.1;  // sigma of S before the data
+
+// u at the beginning of pose k+1, carried there from pose k, less the accelerometers' u.
+Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to, const GyroModel& model) {
+  Vector3 u = from.u.normalized();
+  for (std::size_t i = from.last; i < to.first; ++i) {
+    const double dt = input.time_s[i] - input.time_s[i - 1];
+    const Vector3 raw = at(input.gyro, i) - model.bias - model.G * u;
+    u = matrix_from_rotation_vector(-(model.S * raw) * input.gyro_unit * dt) * u;
+  }
+  return u - to.u.normalized();
+}
+
+struct TurnFit {
+  double noise = 0.0;  // rad, of a component
+  Eigen::Matrix<double, 9, 1> sigma = Eigen::Matrix<double, 9, 1>::Zero();
+};
+
+// Fits S to `turns` (numbers of the poses that they begin at) but `without`.
+TurnFit fit_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
+                  std::size_t without, GyroModel& model) {
+  TurnFit fit;
+  fit.noise = 0.01;
+  for (int round = 0; round < 4; ++round) {
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(turns.size()), 9);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(J.rows());
+    for (std::size_t t = 0; t < turns.size(); ++t) {
+      const std::size_t k = turns[t];
+      if (k == without) {
+        continue;
+      }
+      const auto row = 3 * static_cast<Eigen::Index>(t);
+      const Vector3 now = direction_error(input, poses[k], poses[k + 1], model);
+      r.segment<3>(row) = now;
+      constexpr double h = 1e-4;
+      for (Eigen::Index j = 0; j < 9; ++j) {
+        GyroModel moved = model;
+        moved.S(j / 3, j % 3) += h;
+        J.block<3, 1>(row, j) = (direction_error(input, poses[k], poses[k + 1], moved) - now) / h;
+      }
+    }
+    Eigen::Matrix<double, 9, 1> off;
+    for (Eigen::Index j = 0; j < 9; ++j) {
+      off(j) = (j % 4 == 0 ? 1.0 : 0.0) - model.S(j / 3, j % 3);
+    }
+    const double weight = fit.noise * fit.noise / (scale_before * scale_before);
+    const Eigen::Matrix<double, 9, 9> normal = J.transpose() * J + weight * Eigen::Matrix<double, 9, 9>::Identity();
+    const Eigen::LLT<Eigen::Matrix<double, 9, 9>> solver(normal);
+    const Eigen::Matrix<double, 9, 1> step = solver.solve(-J.transpose() * r + weight * off);
+    for (Eigen::Index j = 0; j < 9; ++j) {
+      model.S(j / 3, j % 3) += step(j);
+    }
+    // A turn gives two components of a direction.
+    const double free = std::max(1.0, 2.0 * static_cast<double>(turns.size()) - 9.0);
+    fit.noise = std::max(1e-6, std::sqrt((r + J * step).squaredNorm() / free));
+    fit.sigma =
+        Eigen::Matrix<double, 9, 1>(solver.solve(Eigen::Matrix<double, 9, 9>::Identity()).diagonal()).cwiseSqrt() *
+        fit.noise;
+    if (step.cwiseAbs().maxCoeff() < 1e-5) {
+      break;
+    }
+  }
+  return fit;
+}
+
+// Bias, and with `linear` G, from the poses but two.
+GyroModel static_model(const std::vector<Pose>& poses, std::size_t without, bool linear) {
+  std::vector<const Pose*> kept;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (without == none || (k != without && k != without + 1)) {
+      kept.push_back(&poses[k]);
+    }
+  }
+  Eigen::MatrixXd X(static_cast<Eigen::Index>(kept.size()), linear ? 4 : 1);
+  Eigen::MatrixXd y(X.rows(), 3);
+  for (Eigen::Index k = 0; k < X.rows(); ++k) {
+    const Pose& p = *kept[static_cast<std::size_t>(k)];
+    X(k, 0) = 1.0;
+    if (linear) {
+      X.block<1, 3>(k, 1) = p.u.transpose();
+    }
+    y.row(k) = p.gyro.transpose();
+  }
+  const Eigen::MatrixXd solution = X.colPivHouseholderQr().solve(y);
+  GyroModel m;
+  m.bias = solution.row(0).transpose();
+  if (linear) {
+    m.G = solution.bottomRows(3).transpose();
+  }
+  return m;
+}
+
+// Turns without a sample at the end of the gyros' range.
+std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagnosis& d) {
+  std::vector<std::size_t> turns;
+  for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
+    bool clipped = false;
+    for (const Clipping& c : d.clipped) {
+      for (std::size_t i = poses[k].last; c.gyro && i < poses[k + 1].first; ++i) {
+        clipped |= std::abs(input.gyro[i][static_cast<std::size_t>(c.axis)]) >= c.limit;
+      }
+    }
+    const double from = input.time_s[poses[k].last - 1] - input.time_s.front();
+    const double to = input.time_s[poses[k + 1].first] - input.time_s.front();
+    for (const LeftOut& out : d.left_out) {
+      clipped |= out.last_s >= from && out.first_s <= to;
+    }
+    if (clipped) {
+      ++d.turns_clipped;
+    } else {
+      turns.push_back(k);
+    }
+  }
+  return turns;
+}
+
+void add_parameters(const GyroModel& model, const TurnFit& fit, PoseDiagnosis& d) {
+  for (Eigen::Index j = 0; j < 9; ++j) {
+    const bool diagonal = j % 4 == 0;
+    const std::string axes = diagonal ? std::string(1, "xyz"[j / 3]) : std::string{"xyz"[j / 3], "xyz"[j % 3]};
+    // True rate = S times reading: the sensor's own error is the inverse, to first order.
+    const double value = diagonal ? 1.0 / model.S(j / 3, j % 3) - 1.0 : -model.S(j / 3, j % 3);
+    d.gyro_parameters.push_back(
+        {(diagonal ? "scale_" : "misalignment_") + axes, "1", value, fit.sigma(j), fit.sigma(j) < 0.5 * scale_before});
+  }
+}
+
+}  // namespace
+
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, PoseDiagnosis& d) {
+  const std::vector<std::size_t> turns = usable_turns(input, poses, d);
+  d.turns = static_cast<int>(turns.size());
+  if (turns.empty()) {
+    return;
+  }
+  for (const bool with : {false, true}) {
+    GyroModel all = static_model(poses, none, with && linear);
+    const TurnFit fit = fit_turns(input, poses, turns, none, all);
+    double square = 0.0, held_out_square = 0.0;
+    for (const std::size_t k : turns) {
+      square += direction_error(input, poses[k], poses[k + 1], all).squaredNorm();
+      GyroModel rest = static_model(poses, k, with && linear);
+      rest.S = all.S;
+      fit_turns(input, poses, turns, k, rest);
+      held_out_square += direction_error(input, poses[k], poses[k + 1], rest).squaredNorm();
+    }
+    const auto n = static_cast<double>(turns.size());
+    (with ? d.direction_after : d.direction_before) = std::sqrt(square / n);
+    (with ? d.direction_after_held_out : d.direction_before_held_out) = std::sqrt(held_out_square / n);
+    if (with) {
+      add_parameters(all, fit, d);
+    } else if (!linear) {
+      d.direction_after = d.direction_before;
+      d.direction_after_held_out = d.direction_before_held_out;
+      add_parameters(all, fit, d);
+      break;
+    }
+  }
+}
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,20 @@
+// Turns between poses: the direction of gravity carried by the gyros. Private to this folder.
+#pragma once
+
+#include <vector>
+
+#include "estimator/diagnosis/poses/pose_data.hpp"
+
+namespace selfcal::diagnosis {
+
+// w = S (raw - bias - G u) times the unit.
+struct GyroModel {
+  Matrix3 S = Matrix3::Identity();
+  Vector3 bias = Vector3::Zero();  // raw
+  Matrix3 G = Matrix3::Zero();     // raw per g
+};
+
+// Direction of gravity before and after what is named, fitted and held out, into `d`; turns with clipped samples left out.
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, PoseDiagnosis& d);
+
+}  // namespace selfcal::diagnosis

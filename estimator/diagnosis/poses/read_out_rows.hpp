@@ -1,0 +1,45 @@
+// What of a recording read-outs and gyros can be compared in. Private to this folder; equations (R1) to (R4): read_outs.hpp.
+#pragma once
+
+#include <vector>
+
+#include "estimator/diagnosis/poses/pose_data.hpp"
+
+namespace selfcal::diagnosis {
+
+// A part of a pose in which the read-outs rest too.
+struct Stop {
+  std::size_t pose = 0;  // number
+  std::size_t middle = 0;
+  double outer = 0.0, inner = 0.0;  // rad
+};
+std::vector<Stop> find_stops(const PoseInput& input, const std::vector<Pose>& poses);
+
+// From the middle of a stop to that of the next one.
+struct TurnRow {
+  std::size_t first = 0, last = 0;  // samples
+  Vector3 bias;                     // raw, of the poses at its ends
+  Vector3 turned;                   // integral of the gyros less bias, raw times s
+  double outer = 0.0, inner = 0.0;  // turned, rad
+  double inner_angle = 0.0;         // before, rad
+};
+std::vector<TurnRow> turns_between(const PoseInput& input, const std::vector<Pose>& poses,
+                                   const std::vector<Stop>& stops);
+
+// A stretch in which one read-out turns steadily and the other one rests, without its ends.
+struct SteadyRate {
+  std::size_t first = 0, last = 0;  // samples
+  bool outer = true;
+  double rate = 0.0, length_s = 0.0;  // rad/s
+  Vector3 gyro;                       // mean, raw
+  double uneven = 0.0;                // half of what the means of both halves differ by, raw
+};
+std::vector<SteadyRate> find_steady_rates(const PoseInput& input);
+
+struct Delay {
+  double time_s = 0.0, delay_s = 0.0;
+};
+std::vector<Delay> delays_of_turns(const PoseInput& input, const std::vector<TurnRow>& rows, const ReadOuts& found);
+std::vector<Delay> delays_of_steps(const PoseInput& input, const std::vector<SteadyRate>& rates, const ReadOuts& found);
+
+}  // namespace selfcal::diagnosis

@@ -1,0 +1,416 @@
+#include "tools/cli/poses_output.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ids(const std::vector<const diagnosis::Effect*>& effects) { return diagnosis::ids_of(effects); }
+
+Json to_json(const std::vector<diagnosis::PoseEffect>& effects) {
+  Json all = Json::array();
+  for (const diagnosis::PoseEffect& e : effects) {
+    Json j = {{"effect", e.effect->id}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
+    j["parameters"] = Json::array();
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      j["parameters"].push_back({{"name", e.parameters[k]}, {"value", e.value[k]}, {"sigma", e.sigma[k]}});
+    }
+    j["equivalent"] = ids(e.equivalent);
+    if (!std::isnan(e.constant)) {
+      j["constant"] = e.constant;
+    }
+    all.push_back(std::move(j));
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::PoseParameter>& parameters) {
+  Json all = Json::array();
+  for (const diagnosis::PoseParameter& p : parameters) {
+    all.push_back(
+        {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"sigma", p.sigma}, {"determined", p.determined}});
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::Clipping>& clipped) {
+  Json all = Json::array();
+  for (const diagnosis::Clipping& c : clipped) {
+    all.push_back({{"sensor", c.gyro ? "gyro" : "accelerometer"},
+                   {"axis", std::string(1, "xyz"[c.axis])},
+                   {"limit", c.limit},
+                   {"samples", c.samples},
+                   {"first_s", c.first_s},
+                   {"last_s", c.last_s}});
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::LeftOut>& stretches) {
+  Json all = Json::array();
+  for (const diagnosis::LeftOut& out : stretches) {
+    all.push_back({{"first_s", out.first_s}, {"last_s", out.last_s}, {"samples", out.samples}, {"words", out.words}});
+  }
+  return all;
+}
+
+std::string three(const std::array<double, 3>& v, double unit) {
+  return fmt::format("{:.4g}/{:.4g}/{:.4g}", v[0] / unit, v[1] / unit, v[2] / unit);
+}
+
+// Readings in a unit that people know.
+struct Units {
+  double gyro = 1.0, accel = 1.0;
+  const char *gyro_name = "raw units", *accel_name = "raw units";
+};
+
+std::string clipping_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+  std::string text;
+  for (const diagnosis::LeftOut& out : d.left_out) {
+    text += fmt::format("left out: {:.2f} to {:.2f} s, {} sample{}: {}\n", out.first_s, out.last_s, out.samples,
+                        out.samples == 1 ? "" : "s", out.words);
+  }
+  for (const diagnosis::Clipping& c : d.clipped) {
+    text += fmt::format("clipped: {} {} stands at its limit of {:.4g} {} in {} samples, {:.1f} to {:.1f} s\n",
+                        c.gyro ? "gyro" : "accelerometer", "xyz"[c.axis], c.limit / (c.gyro ? shown.gyro : shown.accel),
+                        c.gyro ? shown.gyro_name : shown.accel_name, c.samples, c.first_s, c.last_s);
+  }
+  if (std::any_of(d.clipped.begin(), d.clipped.end(), [](const diagnosis::Clipping& c) { return c.gyro; })) {
+    text += fmt::format("no orientation is carried through clipped samples: {} turn{} between poses left out\n",
+                        d.turns_clipped, d.turns_clipped == 1 ? "" : "s");
+  }
+  return text;
+}
+
+// Parameters that the poses determine, and the names of those that they do not.
+std::string parameters_text(const std::vector<diagnosis::PoseParameter>& parameters, const Units& shown, bool gyro) {
+  std::string text, open;
+  for (const diagnosis::PoseParameter& p : parameters) {
+    if (!p.determined) {
+      open += open.empty() ? "" : ", ";
+      open += p.name;
+    } else if (p.unit == "1") {
+      text += fmt::format("    {:16} {:+9.4f} +- {:.4f} %\n", p.name, 100.0 * p.value, 100.0 * p.sigma);
+    } else {
+      const double unit = gyro ? shown.gyro : shown.accel;
+      text += fmt::format("    {:16} {:+9.4g} +- {:.2g} {}\n", p.name, p.value / unit, p.sigma / unit,
+                          gyro ? shown.gyro_name : shown.accel_name);
+    }
+  }
+  if (!open.empty()) {
+    text += fmt::format("    not determined by these poses: {}\n", open);
+  }
+  return text;
+}
+
+std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+  std::string text = fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms",
+                                 !d.accel_tested    ? "not tested beyond bias, scale and misalignment"
+                                 : d.accel_adequate ? "adequate"
+                                                    : "misfit",
+                                 1e3 * d.accel_rms_g);
+  if (d.accel_tested) {
+    text += fmt::format(", held out {:.3f} mg", 1e3 * d.accel_held_out_rms_g);
+  }
+  if (!d.accel_tried.empty()) {
+    text += fmt::format("; nearest to an effect: {} (log10 p {:.1f})", d.accel_tried.front().effect->id,
+                        d.accel_tried.front().log_p / std::log(10.0));
+  }
+  text += d.force_at_rest_g > 0.0 ? fmt::format("; at rest they read {:.4f} g\n", d.force_at_rest_g) : "\n";
+  text += parameters_text(d.accel_parameters, shown, false);
+  if (d.settling) {
+    const diagnosis::Settling& s = *d.settling;
+    text += fmt::format("  accel_relaxation: settling after each turn, {}exp(-s/{:.0f} s), log10 p {:.1f}\n",
+                        s.with_change ? "change of force times " : "", s.tau_s, s.log_p / std::log(10.0));
+    for (int axis = 0; axis < 3; ++axis) {
+      text += fmt::format("    {:16} {:+9.1f} +- {:.1f} ug{}\n", "xyz"[axis], 1e6 * s.size_g(axis),
+                          1e6 * s.sigma_g(axis), s.with_change ? "/g" : "");
+    }
+  }
+  return text;
+}
+
+std::string effect_text(const diagnosis::PoseEffect& e, const Units& shown) {
+  std::string text;
+  for (std::size_t k = 0; k < e.value.size(); ++k) {
+    text +=
+        fmt::format("    {:4} {:+9.3g} +- {:.2g}\n", e.parameters[k], e.value[k] / shown.gyro, e.sigma[k] / shown.gyro);
+  }
+  return text;
+}
+
+std::string confounded_text(const diagnosis::PoseDiagnosis& d) {
+  std::string text;
+  for (const diagnosis::Confounded& c : d.confounded) {
+    text += fmt::format("{}{} ({:.0f} %) with {}", text.empty() ? "confounded: " : ", ", c.effect->id, 100.0 * c.shared,
+                        c.with->id);
+  }
+  return text.empty() ? text
+                      : text + ": the order of the poses is that of time; the same poses in another order tell\n";
+}
+
+std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+  std::string text = fmt::format("gyros in the poses, {}: bias {} +- {}\n", shown.gyro_name,
+                                 three(d.gyro_bias, shown.gyro), three(d.gyro_bias_sigma, shown.gyro));
+  text += fmt::format("  rms, poses left out in turn: bias alone {} (white noise {})\n",
+                      three(d.gyro_held_out_rms, shown.gyro), three(d.gyro_white_rms, shown.gyro));
+  for (const diagnosis::PoseEffect& e : d.gyro_tried) {
+    text += fmt::format("  with {:28} {}  log10 p {:.1f}\n", e.effect->id, three(e.held_out_rms, shown.gyro),
+                        e.log_p / std::log(10.0));
+  }
+  text += d.gyro_named.empty() ? "nothing named\n" : "named:\n";
+  for (const diagnosis::PoseEffect& e : d.gyro_named) {
+    text += fmt::format("  {}{}{} leaves {}\n", e.effect->id, e.equivalent.empty() ? "" : ", or as well ",
+                        fmt::join(diagnosis::ids_of(e.equivalent), ", "), three(e.held_out_rms, shown.gyro));
+    text += effect_text(e, shown);
+    if (!std::isnan(e.constant)) {
+      text += fmt::format("    {:4} {:9.3g} {}\n", e.effect->constant.name, e.constant, e.effect->constant.unit);
+    }
+    if (!e.equivalent.empty()) {
+      text += "    these poses do not tell them apart; the same poses once more in another order do\n";
+    }
+  }
+  constexpr double narrow = 20.0;  // deg: no pose effect is seen then, and a bound says nothing
+  for (const diagnosis::PoseEffect& e : d.gyro_open) {
+    if (e.effect->linear_in_force && d.gravity_span_deg < narrow) {
+      continue;
+    }
+    double largest = 0.0;
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      largest = std::max(largest, std::abs(e.value[k]) + 2.0 * e.sigma[k]);
+    }
+    text += fmt::format("not seen: {}: coefficients below {:.2g} {} (2 sigma)\n", e.effect->id, largest / shown.gyro,
+                        shown.gyro_name);
+  }
+  text += confounded_text(d);
+  return text;
+}
+
+std::string turns_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+  if (d.turns == 0) {
+    return "no turn between poses is usable: scale factors and misalignment of the gyros are not seen\n";
+  }
+  std::string text = fmt::format(
+      "direction of gravity carried from pose to pose, {} turns: {:.2f} deg rms -> {:.2f}; held out {:.2f} -> {:.2f}\n",
+      d.turns, d.direction_before / units::degree, d.direction_after / units::degree,
+      d.direction_before_held_out / units::degree, d.direction_after_held_out / units::degree);
+  text += parameters_text(d.gyro_parameters, shown, true);
+  return text;
+}
+
+Json array(const Vector3& v) { return Json{v.x(), v.y(), v.z()}; }
+
+// The sensor axis that the table's axis mostly turns.
+Eigen::Index main_axis(const diagnosis::ReadOutAxis& a) {
+  Eigen::Index k = 0;
+  a.response.cwiseAbs().maxCoeff(&k);
+  return k;
+}
+
+// What the gyros read of a turn that is positive about their main axis.
+Vector3 across(const diagnosis::ReadOutAxis& a) {
+  return a.response(main_axis(a)) < 0.0 ? Vector3(-a.response) : a.response;
+}
+
+Json axis_json(const diagnosis::ReadOutAxis& a) {
+  const Eigen::Index k = main_axis(a);
+  Json j = {{"axis", a.name},
+            {"by", a.steady ? "steady rates" : "turns from stop to stop"},
+            {"rows", a.rows},
+            {"turned_deg", a.turned_deg},
+            {"response", array(a.response)},
+            {"response_sigma", array(a.sigma)},
+            {"along", std::string(1, "xyz"[k])},
+            {"reversed", a.response(k) < 0.0},
+            {"of_a_positive_turn", array(across(a))},
+            {"gain", std::abs(a.response(k))},
+            {"gain_sigma", a.sigma(k)}};
+  if (a.nonlinearity) {
+    j["nonlinearity"] = {{"value", a.nonlinearity->value},
+                         {"sigma", a.nonlinearity->sigma},
+                         {"named", a.nonlinearity->determined},
+                         {"log10_p", a.log_p_nonlinear / std::log(10.0)}};
+  }
+  return j;
+}
+
+Json read_outs_json(const diagnosis::ReadOuts& r) {
+  Json axes = Json::array();
+  for (const diagnosis::ReadOutAxis& a : r.axes) {
+    axes.push_back(axis_json(a));
+  }
+  Json j = {{"axes", axes},
+            {"disagreeing", r.disagreeing},
+            {"gyro_bias", array(r.gyro_bias)},
+            {"gyro_bias_sigma", array(r.gyro_bias_sigma)}};
+  if (r.clock) {
+    j["clock"] = {{"turns", r.clock->turns},
+                  {"delay_s", r.clock->delay_s},
+                  {"delay_sigma_s", r.clock->delay_sigma_s},
+                  {"growth_s", r.clock->growth_s},
+                  {"growth_sigma_s", r.clock->growth_sigma_s},
+                  {"least_s", r.clock->least_s},
+                  {"most_s", r.clock->most_s},
+                  {"scatter_s", r.clock->scatter_s}};
+  }
+  if (r.tilt) {
+    j["tilt"] = {{"axis", r.tilt->axis},
+                 {"near_vertical", r.tilt->near_vertical},
+                 {"tilt_deg", r.tilt->tilt_deg},
+                 {"sigma_deg", r.tilt->sigma_deg},
+                 {"log10_p_shape", r.tilt->log_p_shape / std::log(10.0)}};
+  }
+  return j;
+}
+
+std::string axis_text(const diagnosis::ReadOutAxis& a) {
+  const Eigen::Index k = main_axis(a);
+  std::string text = fmt::format(
+      "  {} axis, {} {}{}: gyro {}{} {:+.2f} +- {:.2f} %", a.name, a.rows, a.steady ? "steady rates" : "turns",
+      a.steady ? fmt::format(" of {:.0f} to {:.0f} deg/s", a.slowest_deg_per_s, a.fastest_deg_per_s)
+               : fmt::format(", {:.0f} deg in all", a.turned_deg),
+      a.response(k) < 0.0 ? "-" : "", "xyz"[k], 100.0 * (std::abs(a.response(k)) - 1.0), 100.0 * a.sigma(k));
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (i != k) {
+      text += fmt::format(", {} {:+.2f} +- {:.2f} %", "xyz"[i], 100.0 * across(a)(i), 100.0 * a.sigma(i));
+    }
+  }
+  text += " of the turn\n";
+  if (a.nonlinearity) {
+    text += fmt::format("    gyro_scale_nonlinearity {}: {:+.2g} +- {:.2g} % at {:.0f} deg/s\n",
+                        a.nonlinearity->determined ? "named" : "not seen",
+                        100.0 * a.nonlinearity->value * a.fastest_deg_per_s * units::degree,
+                        100.0 * a.nonlinearity->sigma * a.fastest_deg_per_s * units::degree, a.fastest_deg_per_s);
+  }
+  return text;
+}
+
+std::string read_outs_text(const diagnosis::ReadOuts& r, const Units& shown) {
+  std::string text = "angle read-outs:\n";
+  for (const diagnosis::ReadOutAxis& a : r.axes) {
+    text += axis_text(a);
+  }
+  if (std::any_of(r.axes.begin(), r.axes.end(), [](const diagnosis::ReadOutAxis& a) { return a.steady; })) {
+    const Vector3 bias = r.gyro_bias / shown.gyro, sigma = r.gyro_bias_sigma / shown.gyro;
+    text += fmt::format("  bias beside the steady rates {:.3g}/{:.3g}/{:.3g} +- {:.2g}/{:.2g}/{:.2g} {}\n", bias.x(),
+                        bias.y(), bias.z(), sigma.x(), sigma.y(), sigma.z(), shown.gyro_name);
+  }
+  if (r.clock) {
+    text += fmt::format(
+        "  clock: the read-outs are {} by {:.3f} +- {:.3f} s at mid-recording, {:+.3f} +- {:.3f} s more over it; "
+        "single turns {:+.2f} to {:+.2f} s, scatter {:.3f} s\n",
+        r.clock->delay_s < 0.0 ? "early" : "late", std::abs(r.clock->delay_s), r.clock->delay_sigma_s,
+        r.clock->growth_s, r.clock->growth_sigma_s, r.clock->least_s, r.clock->most_s, r.clock->scatter_s);
+  }
+  if (r.tilt) {
+    text += fmt::format("  accelerometers about the {} axis: what varies with twice its angle: log10 p {:.1f}\n",
+                        r.tilt->axis, r.tilt->log_p_shape / std::log(10.0));
+  }
+  if (r.tilt && r.tilt->near_vertical) {
+    text += fmt::format("  {} axis leans by {:.3f} +- {:.3f} deg against the vertical, by the accelerometers\n",
+                        r.tilt->axis, r.tilt->tilt_deg, r.tilt->sigma_deg);
+  } else if (r.tilt) {
+    text += fmt::format("  {} axis lies near the horizontal: its tilt and a bias along it look alike\n", r.tilt->axis);
+  }
+  if (r.disagreeing > 0) {
+    text += fmt::format("  {} turn{} that gyros and read-outs disagree about left out\n", r.disagreeing,
+                        r.disagreeing == 1 ? "" : "s");
+  }
+  return text;
+}
+
+}  // namespace
+
+nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
+  Json settling;
+  if (d.settling) {
+    settling = {{"effect", "accel_relaxation"},           {"tau_s", d.settling->tau_s},
+                {"with_change", d.settling->with_change}, {"size_g", array(d.settling->size_g)},
+                {"sigma_g", array(d.settling->sigma_g)},  {"log10_p", d.settling->log_p / std::log(10.0)}};
+  }
+  Json confounded = Json::array();
+  for (const diagnosis::Confounded& c : d.confounded) {
+    confounded.push_back({{"effect", c.effect->id}, {"with", c.with->id}, {"shared", c.shared}});
+  }
+  return {{"mismatch", poses_mismatch(d)},
+          {"poses", d.poses},
+          {"static_s", d.static_seconds},
+          {"by_poses", d.by_poses},
+          {"supports", d.supports},
+          {"not_by_position", d.not_by_position},
+          {"read_outs", d.read_outs ? read_outs_json(*d.read_outs) : Json()},
+          {"clipped", to_json(d.clipped)},
+          {"left_out", to_json(d.left_out)},
+          {"accelerometers",
+           {{"adequate", d.accel_adequate},
+            {"tested", d.accel_tested},
+            {"rms_g", d.accel_rms_g},
+            {"held_out_rms_g", d.accel_held_out_rms_g},
+            {"force_at_rest_g", d.force_at_rest_g},
+            {"gravity_span_deg", d.gravity_span_deg},
+            {"parameters", to_json(d.accel_parameters)},
+            {"settling", settling},
+            {"tried", to_json(d.accel_tried)}}},
+          {"gyros",
+           {{"bias", d.gyro_bias},
+            {"bias_sigma", d.gyro_bias_sigma},
+            {"held_out_rms", d.gyro_held_out_rms},
+            {"white_rms", d.gyro_white_rms},
+            {"parameters", to_json(d.gyro_parameters)},
+            {"tried", to_json(d.gyro_tried)},
+            {"findings", to_json(d.gyro_named)},
+            {"open", to_json(d.gyro_open)},
+            {"confounded", confounded}}},
+          {"gravity_direction_deg",
+           {{"turns", d.turns},
+            {"turns_clipped", d.turns_clipped},
+            {"before", d.direction_before / units::degree},
+            {"after", d.direction_after / units::degree},
+            {"held_out_before", d.direction_before_held_out / units::degree},
+            {"held_out_after", d.direction_after_held_out / units::degree}}},
+          {"invisible", d.invisible}};
+}
+
+bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
+  const bool nonlinear =
+      d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
+                                 [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
+  return !d.accel_adequate || !d.gyro_named.empty() || d.settling.has_value() || nonlinear;
+}
+
+std::string poses_text(const diagnosis::PoseDiagnosis& d, bool si) {
+  Units shown;
+  if (si) {
+    shown = {units::degree, 9.80665e-3, "deg/s", "mg"};
+  }
+  std::string text = fmt::format("{} static poses, {:.0f} s in all\n", d.poses, d.static_seconds);
+  for (const std::string& words : d.supports) {
+    text += fmt::format("reference: {}\n", words);
+  }
+  text += clipping_text(d, shown);
+  if (d.read_outs) {
+    text += read_outs_text(*d.read_outs, shown);
+  }
+  if (d.by_poses) {
+    text += accelerometers_text(d, shown);
+    text += gyros_text(d, shown);
+    text += turns_text(d, shown);
+  }
+  if (!d.not_by_position.empty()) {
+    text += fmt::format("invisible: the 24 parameters by the position at rest: {}\n", d.not_by_position);
+  }
+  for (const std::string& words : d.invisible) {
+    text += fmt::format("invisible: {}\n", words);
+  }
+  return text;
+}
+
+}  // namespace selfcal::cli
