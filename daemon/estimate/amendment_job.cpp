@@ -156,7 +156,9 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   if (files.size() > 1) {
     answer.together = put_together(files, *rest, answer.found);
   }
-  answer.average = discovery::average_over_classes(rest->recordings(), answer.found, 8, stop);
+  if (confirmed(&answer.found)) {
+    answer.average = discovery::average_over_classes(rest->recordings(), answer.found, 8, stop);
+  }
   progress();
   discovery::ExperimentLimits limits;
   limits.rotation_s = request.config.rotation_s;

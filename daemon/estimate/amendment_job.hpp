@@ -32,7 +32,7 @@ struct AmendmentRequest {
 struct BeyondAnswer {
   discovery::Discovery found;
   std::optional<Together> together;  // several
-  discovery::ClassAverage average;   // the 24 over all laws that the recordings leave open
+  discovery::ClassAverage average;   // where laws are `confirmed`: the 24 over all that the recordings leave open
   std::optional<discovery::NextExperiment> next;
 };
 
