@@ -1,4 +1,4 @@
-// selfcal hub init | migrate | check | admit | forget: the depot's database, for whoever keeps it.
+// selfcal hub init | migrate | check | admit | forget: the depot's database, for whoever keeps it; outbox: what of a set is there.
 #include <fmt/format.h>
 #include <openssl/rand.h>
 
@@ -7,7 +7,9 @@
 #include <memory>
 
 #include "daemon/hub/hub_schema.hpp"
+#include "daemon/hub/outbox.hpp"
 #include "daemon/hub/recording_folder.hpp"
+#include "daemon/store/database_copies.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/hub_option.hpp"
 
@@ -15,7 +17,7 @@ namespace selfcal::cli {
 namespace {
 
 struct Arguments {
-  std::string hub, recordings, name, kind = "set", serial, reason;
+  std::string hub, recordings, name, kind = "set", serial, reason, state_directory = "/var/lib/selfcal";
 };
 
 using Connection = hub::Connection;
@@ -114,6 +116,24 @@ Expected<int> forget(Connection& connection, const Arguments& arguments) {
   return 0;
 }
 
+// Of this set, from its own database: the hub need not be there. Status 1 where something was refused.
+Expected<int> outbox(const Arguments& arguments) {
+  const auto outbox = hub::Outbox::open(database_path(arguments.state_directory));
+  if (!outbox) {
+    return tl::unexpected(outbox.error());
+  }
+  const auto counts = (*outbox)->counts();
+  const auto refused = (*outbox)->refused();
+  if (!counts || !refused) {
+    return tl::unexpected(counts ? refused.error() : counts.error());
+  }
+  fmt::print("sent {}, refused {}, waiting {}\n", counts->sent, counts->refused, counts->waiting);
+  for (const hub::RefusedRun& run : *refused) {
+    fmt::print("run {}: {}\n", run.run, run.reason);
+  }
+  return refused->empty() ? 0 : 1;
+}
+
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<Arguments>();
   struct Below {
@@ -138,7 +158,13 @@ CommandRun configure(Options& options) {
   forgotten.text("SERIAL", arguments->serial, "of the unit", Needed::yes);
   forgotten.text("--reason", arguments->reason, "kept with the trace");
   forgotten.text("--recordings", arguments->recordings, "shared folder, from which its recordings are removed too");
-  return [arguments, all]() -> Expected<int> {
+  auto own = std::make_shared<Options>(
+      options.command("outbox", "what this set has sent, and what was refused; status 1 if something was"));
+  own->text("--state-directory", arguments->state_directory, "of the service");
+  return [arguments, all, own]() -> Expected<int> {
+    if (own->chosen()) {
+      return outbox(*arguments);
+    }
     for (const Below& below : *all) {
       if (below.options.chosen()) {
         auto connection = Connection::open(hub_connection_string(arguments->hub));
