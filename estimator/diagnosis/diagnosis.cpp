@@ -199,8 +199,7 @@ DiagnosisOutcome Diagnoser::run() {
     leave_unjudged();
     return {std::move(d_), {}};
   }
-  const auto turns = [](const SegmentSummary& s) { return s.rotation; };
-  if (std::any_of(d_.calibration.segments.begin(), d_.calibration.segments.end(), turns)) {
+  if (turned(d_.calibration)) {
     name();
   } else {
     judge_noise_alone();

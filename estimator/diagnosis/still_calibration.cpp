@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/still_calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -25,10 +26,18 @@ CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions op
 
 }  // namespace
 
+bool turned(const CalibrationResult& result) {
+  return std::any_of(result.segments.begin(), result.segments.end(),
+                     [](const SegmentSummary& s) { return s.rotation; });
+}
+
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop) {
   constexpr double largest_still_sigma = 3e-6;  // m: a calibration that asks for more does so because of an omission
   CalibrationOutcome outcome = calibrate(data, options, {}, stop);
-  if (outcome.result && !outcome.result->moored && !outcome.result->noise_of_drift && !options.noise.position_sigma &&
+  // Noise fitted to the drift takes up what was left out; where the sensors turned it is left to the steps of the search, which fit
+  // a coarse quantum beside what is named (noise/velocity_noise.hpp).
+  const bool of_still_drift = outcome.result && outcome.result->noise_of_drift && !turned(*outcome.result);
+  if (outcome.result && !outcome.result->moored && !of_still_drift && !options.noise.position_sigma &&
       outcome.result->position_sigma > largest_still_sigma) {
     options.noise.position_sigma = largest_still_sigma;
     outcome = calibrate(data, options, {}, stop);
