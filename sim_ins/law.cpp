@@ -52,6 +52,9 @@ std::string as_mu_parser_reads(const std::string& expression) {
       continue;
     }
     const std::size_t before = text.find_last_not_of(' ');
+    if (c == '(' && before != std::string::npos) {
+      text.resize(before + 1);  // between a function's name and its argument it reads no blank
+    }
     if (c == '-' && before != std::string::npos && text[before] == '~') {
       text.erase(before);  // two signs are none, blanks between them or not
       continue;

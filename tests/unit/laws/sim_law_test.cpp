@@ -57,6 +57,7 @@ TEST(SimLaw, BothEvaluatorsAgree) {
                            "8/4/2",
                            "--fx",
                            "- \t-fx*-- -fy",
+                           "exp \t(-since/45.2) * ( so - 1 )",
                            "1.5e-3*n"}) {
     const auto expression = laws::Expression::parse(text);
     auto evaluator = sim::LawEvaluator::compile(text);
