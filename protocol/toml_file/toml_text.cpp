@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <optional>
 #include <vector>
 
@@ -48,7 +49,24 @@ struct Fault {
 // one around it: the stack ends first. None of our files has more than three parts.
 constexpr int most_dots = 16;
 
-// The first byte that is not UTF-8, or not ASCII where TOML wants ASCII, and the first key of too many parts.
+// Where the header of a table that begins at `at` has something else than a key: toml++ takes a key for granted there, and goes
+// on into undefined behaviour. What is well here is `]`, which it refuses itself.
+std::optional<std::size_t> header_without_key(std::string_view text, std::size_t at) {
+  constexpr std::string_view blanks = " \t";
+  const auto skip = [&](std::size_t k) { return std::min(text.find_first_not_of(blanks, k), text.size()); };
+  std::size_t k = skip(at + 1);
+  if (k < text.size() && text[k] == '[') {
+    k = skip(k + 1);
+  }
+  const auto begins_key = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("_-\"']").find(c) != std::string_view::npos;
+  };
+  return k < text.size() && !begins_key(text[k]) ? std::optional(k) : std::nullopt;
+}
+
+// The first byte that is not UTF-8, or not ASCII where TOML wants ASCII, the first key of too many parts, and the first header
+// without a key.
 std::optional<Fault> first_fault(std::string_view text) {
   const auto of_byte = [&](std::size_t k) {
     return Fault{k, fmt::format("byte 0x{:02X} is not UTF-8, outside a string and a comment, or of plane 15",
@@ -60,11 +78,13 @@ std::optional<Fault> first_fault(std::string_view text) {
   if (const auto reserved = first_of_plane_15(text)) {
     return of_byte(*reserved);
   }
-  int dots = 0;
+  int dots = 0, depth = 0;  // of arrays and inline tables
+  bool line_begins = true;
   for (std::size_t k = 0; k < text.size();) {
     constexpr std::string_view between_keys = "=[{,\n";
     if (text[k] == '#' || opens_string(text, k)) {
       k = past_string_or_comment(text, k);
+      line_begins = false;
       continue;
     }
     if (static_cast<unsigned char>(text[k]) >= 0x80) {
@@ -74,6 +94,15 @@ std::optional<Fault> first_fault(std::string_view text) {
     if (dots > most_dots) {
       return Fault{k, fmt::format("a key of more than {} parts", most_dots + 1)};
     }
+    const bool header = text[k] == '[' && line_begins && depth == 0;
+    if (header) {
+      if (const auto other = header_without_key(text, k)) {
+        return Fault{*other, "the header of a table without a key"};
+      }
+    }
+    const bool opens = text[k] == '[' || text[k] == '{', closes = text[k] == ']' || text[k] == '}';
+    depth = header ? 0 : opens ? depth + 1 : closes ? std::max(0, depth - 1) : depth;
+    line_begins = text[k] == '\n' || (line_begins && (text[k] == ' ' || text[k] == '\t' || text[k] == '\r'));
     ++k;
   }
   return std::nullopt;

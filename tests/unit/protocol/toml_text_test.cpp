@@ -92,8 +92,21 @@ TEST(TomlText, KeysHaveAFewPartsOnly) {
 }
 
 // toml++ quotes what it met, line ends and all.
+// Arrays may begin a line as headers do, and hold anything.
+TEST(TomlText, ArraysOnLinesOfTheirOwnAreNoHeaders) {
+  const auto table =
+      parse_toml("a = [\n  [\n    [.5e1 , 2],\n  ],\n[ {b = 1} ]\n]\n[ t ]\n[[ \"u v\" ]]\n[-x]\n", "t.toml");
+  EXPECT_FALSE(table);  // .5 is no number of TOML: found by the parser, behind the look at headers
+  EXPECT_THAT(table.error().message, ::testing::HasSubstr("t.toml:3"));
+  const auto good =
+      parse_toml("a = [\n  [\n    [0.5e1 , 2],\n  ],\n[ {b = 1} ]\n]\n[ t ]\n[[ \"u v\" ]]\n[-x]\n", "t.toml");
+  ASSERT_TRUE(good) << good.error().message;
+  EXPECT_TRUE(good->contains("u v") && good->contains("-x"));
+}
+
 TEST(TomlText, ErrorsAreOneLine) {
-  for (const char* text : {"a = [1,\n\n", "a = \"x\ny\"\n", "a = 1\na = 2\n", "a = \x01\n", "\n[\n]\n"}) {
+  for (const char* text : {"a = [1,\n\n", "a = \"x\ny\"\n", "a = 1\na = 2\n", "a = \x01\n", "\n[\n]\n", "[=]\n",
+                           "[[\n]]\n", " [ .a]\n", "[\t# no key\n]\n", "a = [[1], [2]]\n[[ {b} ]]\n", "[]\n", "["}) {
     const auto table = parse_toml(text, "t.toml");
     ASSERT_FALSE(table) << text;
     EXPECT_EQ(table.error().message.find('\n'), std::string::npos) << table.error().message;
