@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t mebibyte = 1 << 20;
-constexpr std::size_t longest_schedule = 64 * 1024;  // bytes; 255 positions are some 10 KiB
+constexpr std::size_t longest_schedule = 65'536;  // bytes; 255 positions are some 10 KiB
 constexpr std::size_t most_together =
     7;  // beside the one amended: time and memory of the search grow with their number
 // A request keeps a session alive for S3, 5 s: one that a run or another tester left behind must be able to end.
@@ -397,7 +397,7 @@ const RunRecord* Service::record(const std::string& ins) const {
 // Without asking the INS.
 std::string Service::bus_words(const Session& session) const {
   const can::Link link = can::link_of(session.config.interface);
-  const std::string words = can::link_text(session.config.interface, link);
+  std::string words = can::link_text(session.config.interface, link);
   if (link != can::Link::up || !session.active()) {
     return words;
   }

@@ -142,6 +142,7 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
     return std::nullopt;
   }
   std::vector<DiagnosedFile> files;
+  files.reserve(taken.size());
   for (const auto& t : taken) {
     files.push_back({t->file, t->data, t->diagnosis});
   }

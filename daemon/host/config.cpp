@@ -177,6 +177,7 @@ class Reader {
       }
       if (known == nullptr) {
         std::vector<std::string_view> names;
+        names.reserve(std::size(keys));
         for (const auto& candidate : keys) {
           names.push_back(candidate.name);
         }

@@ -137,6 +137,7 @@ tl::unexpected<Error> Connection::failed(const pg_result* result) {
 
 Expected<Rows> Connection::ask(const std::string& sql, const std::vector<Value>& values) {
   std::vector<const char*> pointers;
+  pointers.reserve(values.size());
   for (const Value& value : values) {
     pointers.push_back(value ? value->c_str() : nullptr);
   }

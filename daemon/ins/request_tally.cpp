@@ -20,7 +20,7 @@ std::string_view action_name(std::uint8_t action) {
 }  // namespace
 
 std::string request_name(std::span<const std::uint8_t> request) {
-  const std::string service(uds::service_name(request.front()));
+  std::string service(uds::service_name(request.front()));
   ByteReader in(request.subspan(1));
   switch (request.front()) {
     case uds::service::read_data:
