@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "protocol/error.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
@@ -178,7 +179,7 @@ void Options::texts(const char* names, std::vector<std::string>& values, const c
 void Options::choice(const char* names, std::string& value, std::vector<std::string> known, const char* help) {
   add_value(
       *app_->app, names, help, "TEXT",
-      [&value, known](const std::string& text, const std::string& name) {
+      [&value, known = std::move(known)](const std::string& text, const std::string& name) {
         if (std::find(known.begin(), known.end(), text) == known.end()) {
           refuse(fmt::format("{} {}: one of {} is expected{}", name, shortened(text), fmt::join(known, ", "),
                              did_you_mean(text, known)));

@@ -214,7 +214,9 @@ std::optional<AxisFit> gyros_from_rest_to_rest(const TriadColumns& gyro, const M
   const double total = sum_of_most(change);
   Contest contest;
   std::vector<AxisFit> best_of(axis_rotations().size());
-  for (double factor = 0.5; factor < 2.0; factor *= 1.05) {
+  constexpr int factors = 29;  // from a half to two, 5 % apart
+  for (int step = 0; step < factors; ++step) {
+    const double factor = 0.5 * std::pow(1.05, step);
     for (const double sign : {1.0, -1.0}) {
       // Of a turned instrument the rotation turns with it: R exp(theta) R^T.
       std::vector<Matrix3> turned;
