@@ -19,8 +19,10 @@ constexpr double contradicts = 2.25;       // mean square beyond which two witne
 
 const std::vector<ReadOutOrder>& all_read_out_orders() {
   static const std::vector<ReadOutOrder> all = [] {
+    constexpr int all_ways = 32;
     std::vector<ReadOutOrder> orders;
-    for (int k = 0; k < 32; ++k) {
+    orders.reserve(all_ways);
+    for (int k = 0; k < all_ways; ++k) {
       orders.push_back({(k & 1) != 0, (k & 2) != 0 ? -1 : 1, (k & 4) != 0 ? -1 : 1, (k & 8) != 0, (k & 16) != 0});
     }
     return orders;
