@@ -12,6 +12,7 @@ namespace {
 
 std::vector<double> middles(const std::vector<Pose>& poses) {
   std::vector<double> time_s;
+  time_s.reserve(poses.size());
   for (const Pose& p : poses) {
     time_s.push_back(p.middle_s);
   }

@@ -130,6 +130,7 @@ std::optional<Settling> find_settling(const PoseInput& input, const std::vector<
 
 void take_out(const Settling& settling, const PoseInput& input, const AccelModel& model, std::vector<Pose>& poses) {
   std::vector<Vector3> u;
+  u.reserve(poses.size());
   for (const Pose& p : poses) {
     u.push_back(p.u);
   }

@@ -138,6 +138,7 @@ struct RateRow {
 // A rate that was less steady counts less: by what its halves differ by, beside what they usually differ by.
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> weighted(const std::vector<RateRow>& rows) {
   std::vector<double> uneven;
+  uneven.reserve(rows.size());
   for (const RateRow& row : rows) {
     uneven.push_back(row.uneven);
   }

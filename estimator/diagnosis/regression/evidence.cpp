@@ -106,7 +106,9 @@ RandomWalk test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, i
       time_h.push_back(0.5 * (map[k].start_s + map[k].end_s) / 3600.0);
     }
   }
-  const auto [J, b] = e.given(columns, others);
+  const Normal given = e.given(columns, others);
+  const Eigen::MatrixXd& J = given.information;
+  const Eigen::VectorXd& b = given.score;
   const auto n = static_cast<Eigen::Index>(time_h.size());
   Eigen::MatrixXd K(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -45,6 +45,7 @@ LinearModel LinearModel::about(const RecordingContext& context, const OperatingP
   LinearModel model;
   model.variants_ = alternatives;
   std::vector<Candidate> candidates;
+  candidates.reserve(alternatives.size());
   for (const Variant& v : alternatives) {
     candidates.push_back({v.effect, v.constant, 0, 0});
   }
