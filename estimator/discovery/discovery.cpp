@@ -370,6 +370,7 @@ class Search {
     }
     std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) { return a.cost < b.cost; });
     std::vector<ClassMember> result;
+    result.reserve(members.size());
     for (Member& m : members) {
       result.push_back(std::move(m.member));
     }

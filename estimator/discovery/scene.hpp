@@ -37,6 +37,7 @@ inline std::vector<std::unique_ptr<Scene>> scenes_of(std::span<const UnitRecordi
 
 inline std::vector<LawRecording> laws_on(const std::vector<std::unique_ptr<Scene>>& scenes) {
   std::vector<LawRecording> all;
+  all.reserve(scenes.size());
   for (const auto& scene : scenes) {
     all.push_back({scene->motion, scene->table, scene->input});
   }

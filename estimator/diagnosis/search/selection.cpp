@@ -67,7 +67,7 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
       walk = &test;
     }
   }
-  if (!significance.holds(detected)) {
+  if (!significance.holds(detected) || (walk == nullptr && equation == nullptr)) {
     return std::nullopt;
   }
   if (walk != nullptr && equation != nullptr &&

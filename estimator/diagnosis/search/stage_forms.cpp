@@ -47,6 +47,7 @@ struct Beside {
 // Each form's coefficients have the sizes of its effect's.
 Beside project(const RecordingContext& context, const Stage& s, std::vector<Carried>& forms) {
   std::vector<Candidate> candidates;
+  candidates.reserve(forms.size());
   for (const Carried& f : forms) {
     candidates.push_back(f.candidate);
   }
