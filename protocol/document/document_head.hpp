@@ -29,7 +29,9 @@ inline constexpr Schema request{
     "selfcal.request"};  // what a request to the service led to: a run begun, an abort asked
 inline constexpr Schema investigation{"selfcal.investigation"};
 inline constexpr Schema bus{"selfcal.bus"};
-inline constexpr Schema database{"selfcal.database"};  // answer of `selfcal db`
+inline constexpr Schema conformance{"selfcal.conformance"};  // answer of `selfcal device check`
+inline constexpr Schema probe{"selfcal.probe"};              // answer of `selfcal device probe`
+inline constexpr Schema database{"selfcal.database"};        // answer of `selfcal db`
 
 // The file that a document answers for. An empty name stands for none.
 struct InputFile {

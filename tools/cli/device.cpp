@@ -1,44 +1,35 @@
-// selfcal device new | lint | describe | dbc: what an INS speaks, by its profile.
+// selfcal device new | lint | describe | dbc | check | probe: what an INS speaks, by its profile.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cstdio>
+#include <unistd.h>
+
 #include <memory>
 
 #include "protocol/ins_interface/dbc.hpp"
-#include "protocol/profile/built_in_text.hpp"
 #include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/device/bus_commands.hpp"
+#include "tools/cli/device/new_profile.hpp"
 
 namespace selfcal::cli {
 namespace {
 
 struct Arguments {
-  std::string file, name = "my_ins";
+  std::string file;
   bool html = false;
 };
 
-// Our own INS's, under another name: whole, and to be changed line by line with lint at hand.
-Expected<int> begin(const Arguments& arguments) {
-  const std::string_view text = profile::built_in_text();
-  const std::string head = "name = \"selfcal\"";
-  const std::size_t at = text.find(head);
-  fmt::print(
-      "# What an INS speaks. It begins as selfcal's own INS; change what yours has otherwise, and delete what it does "
-      "not tell.\n"
-      "#\n"
-      "# A field: at (byte, from 0), type (u8 u16 u24 u32 u64 i8 i16 i24 i32 i64 f32 f64, ascii with length), count "
-      "(elements),\n"
-      "# byte_order, first_bit and bits (of an unsigned integer), scale, offset, unit, codes (words to numbers), "
-      "constant.\n"
-      "# A field that is no role's needs a constant: magic numbers, versions, reserved bytes.\n"
-      "#\n"
-      "#   selfcal device lint FILE        every fault, with its line\n"
-      "#   selfcal device describe FILE    what it says, with pictures of the bytes\n"
-      "#   sim_ins --profile FILE          a virtual INS that speaks so\n"
-      "name = \"{}\"{}",
-      arguments.name, text.substr(at + head.size()));
+// On a terminal, where no option tells, it asks.
+Expected<int> begin(device::NewProfile& answers, bool told) {
+  if (!told && ::isatty(STDIN_FILENO) == 1 && ::isatty(STDERR_FILENO) == 1) {
+    device::ask(answers);
+  }
+  const auto text = device::new_profile(answers);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  fmt::print("{}", *text);
   return 0;
 }
 
@@ -57,21 +48,8 @@ Expected<int> lint(const Arguments& arguments) {
   return 1;
 }
 
-// As an error is told: one line.
-Expected<profile::ProfilePtr> load(const std::string& file) {
-  auto profile = profile::load_profile(file);
-  if (profile) {
-    return profile;
-  }
-  const std::string& faults = profile.error().message;
-  const auto more = std::ranges::count(faults, '\n');
-  return fail(profile.error().kind,
-              faults.substr(0, faults.find('\n')) +
-                  (more > 0 ? fmt::format(" (and {} more: selfcal device lint)", more) : std::string()));
-}
-
 Expected<int> describe(const Arguments& arguments) {
-  const auto profile = load(arguments.file);
+  const auto profile = device::chosen_profile(arguments.file);
   if (!profile) {
     return tl::unexpected(profile.error());
   }
@@ -80,7 +58,7 @@ Expected<int> describe(const Arguments& arguments) {
 }
 
 Expected<int> write_dbc(const Arguments& arguments) {
-  const auto profile = load(arguments.file);
+  const auto profile = device::chosen_profile(arguments.file);
   if (!profile) {
     return tl::unexpected(profile.error());
   }
@@ -89,10 +67,44 @@ Expected<int> write_dbc(const Arguments& arguments) {
   return 0;
 }
 
+void configure_check(Options& options, device::CheckArguments& arguments) {
+  options.text("INTERFACE", arguments.interface, "CAN interface, for example can0", Needed::yes);
+  options.text("--profile", arguments.profile, "what the INS speaks, TOML; without it selfcal's own");
+  options.text("--key-file", arguments.key_file, "key that opens the lock, 32 hexadecimal digits");
+  options.flag("--write", arguments.write, "try also what writes, restarts the INS or sends a wrong key");
+  options.flag("--all", arguments.all, "what was sent and came also where a requirement holds");
+  options.flag("--json", arguments.json, "as JSON");
+}
+
+void configure_new(Options& options, device::NewProfile& answers) {
+  options.text("--name", answers.name, "of the INS");
+  options.choice("--addressing", answers.addressing, {"normal", "normal-29", "normal-fixed"}, "of ISO 15765-2");
+  options.can_identifier("--request-id", answers.request, "CAN identifier, tester to INS, hexadecimal");
+  options.can_identifier("--response-id", answers.response, "INS to tester, hexadecimal");
+  options.can_identifier("--functional-id", answers.functional, "tester to all, hexadecimal");
+  options.can_identifier("--ins-address", answers.ins_address, "normal-fixed: address of the INS, hexadecimal");
+  options.can_identifier("--tester-address", answers.tester_address,
+                         "normal-fixed: address of the tester, hexadecimal");
+  options.choice("--byte-order", answers.byte_order, {"big", "little"}, "of its numbers");
+  options.choice("--security", answers.security, {"aes-cmac", "none"}, "what opens its lock");
+}
+
+void configure_probe(Options& options, device::ProbeArguments& arguments) {
+  options.text("INTERFACE", arguments.interface, "CAN interface, for example can0", Needed::yes);
+  options.text("--profile", arguments.profile, "whose address is asked first, TOML; without it selfcal's own");
+  options.flag("--only", arguments.only, "ask no other address");
+  options.can_identifier("--first-did", arguments.first_did, "first data identifier to read, hexadecimal");
+  options.can_identifier("--last-did", arguments.last_did, "last one, hexadecimal");
+  options.number("--listen", arguments.listen_s, range::waiting, "listen so long before anything is sent");
+  options.flag("--json", arguments.json, "as JSON");
+}
+
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<Arguments>();
-  auto new_options = std::make_shared<Options>(options.command("new", "a profile to begin with, on standard output"));
-  new_options->text("--name", arguments->name, "of the INS");
+  auto new_options = std::make_shared<Options>(
+      options.command("new", "a profile to begin with, on standard output; without options it asks at a terminal"));
+  auto answers = std::make_shared<device::NewProfile>();
+  configure_new(*new_options, *answers);
   auto lint_options = std::make_shared<Options>(
       options.command("lint", "every fault of a profile, a line each; status 1 if there is one"));
   lint_options->text("FILE", arguments->file, "profile, TOML", Needed::yes);
@@ -102,9 +114,23 @@ CommandRun configure(Options& options) {
   describe_options->flag("--html", arguments->html, "as one HTML page; without it Markdown");
   auto dbc_options = std::make_shared<Options>(options.command("dbc", "identifiers and status frames as a DBC"));
   dbc_options->text("FILE", arguments->file, "profile, TOML", Needed::yes);
-  return [arguments, new_options, lint_options, describe_options, dbc_options]() -> Expected<int> {
+  auto checking = std::make_shared<device::CheckArguments>();
+  auto check_options = std::make_shared<Options>(options.command(
+      "check", "whether an INS does what its profile, ISO 14229-1 and ISO 15765-2 ask; status 1 if not"));
+  configure_check(*check_options, *checking);
+  auto probing = std::make_shared<device::ProbeArguments>();
+  auto probe_options = std::make_shared<Options>(options.command(
+      "probe", "which addresses answer on a bus and what they tell, by reading alone; status 1 if none"));
+  configure_probe(*probe_options, *probing);
+  return [=]() -> Expected<int> {
+    if (probe_options->chosen()) {
+      return device::probe(*probing);
+    }
+    if (check_options->chosen()) {
+      return device::check(*checking);
+    }
     if (new_options->chosen()) {
-      return begin(*arguments);
+      return begin(*answers, *answers != device::NewProfile{});
     }
     if (dbc_options->chosen()) {
       return write_dbc(*arguments);

@@ -1,0 +1,152 @@
+// RequestUpload, TransferData, RequestTransferExit: the oldest page of the latest run.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/profile/records.hpp"
+#include "protocol/uds/messages.hpp"
+#include "tools/cli/device/conformance.hpp"
+
+namespace selfcal::cli::device {
+namespace {
+
+using uds::Nrc;
+constexpr std::string_view upload = "ISO 14229-1, 14.3", transfer = "ISO 14229-1, 14.4", leave = "ISO 14229-1, 14.5";
+
+Bytes begin_request(const profile::Profile& p, std::uint32_t page) {
+  const profile::Raw& raw = p.raw;
+  const auto bytes = static_cast<std::uint32_t>(raw.page.bytes);
+  return uds::upload_request(raw.by_page ? page : page * bytes, bytes, {raw.address_bytes, raw.size_bytes});
+}
+
+std::string fault_of_page(const profile::Profile& p, ByteView bytes, std::uint32_t number, std::uint32_t run_id) {
+  if (bytes.size() != p.raw.page.bytes) {
+    return fmt::format("{} bytes of a page of {}", bytes.size(), p.raw.page.bytes);
+  }
+  const profile::Layout& layout = p.raw.page;
+  if (layout.checksum && profile::stored_checksum(layout, bytes) != profile::computed_checksum(layout, bytes)) {
+    return "wrong checksum";
+  }
+  const auto page = profile::decode_page(p, bytes);
+  if (!page) {
+    return page.error().message;
+  }
+  return page->sequence == number && page->run_id == run_id
+             ? ""
+             : fmt::format("page {} of run {}, page {} of run {} expected", page->sequence, page->run_id, number,
+                           run_id);
+}
+
+// One upload from its beginning to its end, in which each block answers several requirements.
+class Upload {
+ public:
+  Upload(Conformance& c, const ins::DirectoryRecord& directory) : c_(c), p_(c.profile()), directory_(directory) {}
+
+  void run() {
+    const Requirement begun{"upload.begin", upload, "The upload of a page begins, and the longest block is told.",
+                            Mode::open};
+    const auto response = c_.answered(begun, begin_request(p_, directory_.first_page), 0, [&](ByteView bytes) {
+      const auto told = uds::read_upload_response(bytes);
+      longest_ = told.value_or(0);
+      return !told ? told.error().message : longest_ <= uds::transfer_overhead ? "a block without data" : "";
+    });
+    if (!response) {
+      return;
+    }
+    first_block();
+    wrong_counter();
+    rest();
+  }
+
+ private:
+  Exchange block(std::uint8_t number) { return c_.tester().ask(uds::transfer_request(number)); }
+
+  void first_block() {
+    const Exchange first = block(1);
+    const auto data = uds::read_transfer_response(first.response, 1);
+    page_ = data ? Bytes(data->begin(), data->end()) : Bytes{};
+    const bool fits = first.response.size() <= longest_ && !page_.empty();
+    c_.judged({"transfer.block", transfer, "A block repeats its counter and is no longer than was told."}, "36 01",
+              fmt::format("76 01 and data, {} bytes at most", longest_),
+              first.kind == Exchange::Kind::positive
+                  ? fmt::format("{}, {} bytes", hex(first.response), first.response.size())
+                  : words(first),
+              fits);
+    const Exchange again = block(1);
+    c_.judged({"transfer.repeat", transfer, "The block before is told again where it is asked for again."},
+              "36 01 again", "the same data", again.response == first.response ? "the same data" : words(again),
+              again.kind == Exchange::Kind::positive && again.response == first.response);
+  }
+
+  void wrong_counter() {
+    constexpr std::uint8_t wrong = 7;
+    const Exchange exchange = block(wrong);
+    c_.judged({"transfer.counter", transfer, "A block counter that is neither the next nor the last one is refused."},
+              fmt::format("36 {:02X} after 36 01", wrong), "wrongBlockSequenceCounter (0x73)", words(exchange),
+              exchange.kind == Exchange::Kind::negative &&
+                  exchange.nrc == static_cast<std::uint8_t>(Nrc::wrong_block_sequence_counter));
+  }
+
+  void rest() {
+    std::uint8_t number = 1;
+    std::string fault;
+    while (fault.empty() && !page_.empty() && page_.size() < p_.raw.page.bytes) {
+      const Exchange next = block(++number);
+      const auto data = uds::read_transfer_response(next.response, number);
+      if (!data || data->empty()) {
+        fault = words(next);
+      } else {
+        page_.insert(page_.end(), data->begin(), data->end());
+      }
+    }
+    fault = fault.empty() ? fault_of_page(p_, page_, directory_.first_page, directory_.run_id) : fault;
+    c_.judged({"transfer.page", "profile, page", "The data are the page that was asked for, whole."},
+              fmt::format("36 01 to 36 {:02X}", number),
+              fmt::format("page {} of run {}", directory_.first_page, directory_.run_id),
+              fault.empty() ? "that page" : fault, fault.empty());
+    const Exchange beyond = block(static_cast<std::uint8_t>(number + 1));
+    c_.judged({"transfer.end", transfer, "After the last block there is none."}, fmt::format("36 {:02X}", number + 1),
+              "requestSequenceError (0x24)", words(beyond),
+              beyond.kind == Exchange::Kind::negative &&
+                  beyond.nrc == static_cast<std::uint8_t>(Nrc::request_sequence_error));
+    const Exchange end = c_.tester().ask(uds::transfer_exit_request());
+    c_.judged({"transfer.exit", leave, "The upload ends."}, "37", "77", words(end),
+              end.kind == Exchange::Kind::positive);
+  }
+
+  Conformance& c_;
+  const profile::Profile& p_;
+  ins::DirectoryRecord directory_;
+  std::uint32_t longest_ = 0;
+  Bytes page_;
+};
+
+}  // namespace
+
+void try_raw_data(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  c.refused({"transfer.none", transfer, "Without an upload there is no block.", Mode::open}, uds::transfer_request(1),
+            {Nrc::request_sequence_error});
+  c.refused({"transfer.no_exit", leave, "Without an upload there is none to end.", Mode::open},
+            uds::transfer_exit_request(), {Nrc::request_sequence_error});
+  const Exchange told = c.tester().ask(uds::read_request(*p.directory.did));
+  const auto record = uds::read_read_response(told.response, *p.directory.did);
+  const auto directory = record ? profile::decode_directory(p, *record) : tl::unexpected(record.error());
+  Bytes format = begin_request(p, 0);
+  format[1] = 0x11;
+  c.refused({"upload.format", upload, "Compressed or encrypted data are refused.", Mode::open}, format,
+            {Nrc::request_out_of_range});
+  constexpr Requirement begin{"upload.begin", upload, "The upload of a page begins, and the longest block is told.",
+                              Mode::open};
+  if (!directory) {
+    return c.not_tried(begin, fmt::format("the directory cannot be read: {}", words(told)));
+  }
+  c.refused({"upload.range", upload, "Pages that are not there are refused.", Mode::open},
+            begin_request(p, directory->pages_written + 1), {Nrc::request_out_of_range});
+  if (directory->pages_written <= directory->first_page) {
+    return c.not_tried(begin, "the INS holds no raw data");
+  }
+  Upload(c, *directory).run();
+}
+
+}  // namespace selfcal::cli::device

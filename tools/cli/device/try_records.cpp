@@ -1,0 +1,107 @@
+// ReadDataByIdentifier: every record of the profile, and what is none.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/profile/records.hpp"
+#include "protocol/uds/messages.hpp"
+#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/unused_number.hpp"
+
+namespace selfcal::cli::device {
+namespace {
+
+using uds::Nrc;
+constexpr std::string_view clause = "ISO 14229-1, 10.2";
+
+std::string fault_of_text(ByteView record) {
+  for (const std::uint8_t byte : record) {
+    if (byte != 0 && (byte < 0x20 || byte > 0x7E)) {
+      return "not printable ASCII";
+    }
+  }
+  return record.empty() ? "empty" : "";
+}
+
+template <typename Record>
+std::string fault_of(const Expected<Record>& record) {
+  return record ? "" : record.error().message;
+}
+
+std::string fault_of_set(const profile::Profile& p, ByteView record) {
+  const auto set = profile::decode_coefficients(p, record);
+  if (!set) {
+    return set.error().message;
+  }
+  return p.set.checksum && profile::stored_checksum(p.set, record) != profile::computed_checksum(p.set, record)
+             ? "wrong checksum"
+             : "";
+}
+
+// A record that the INS may not have yet: conditionsNotCorrect then.
+enum class May : std::uint8_t { be_there, be_absent };
+
+void try_record(Conformance& c, std::string_view record_name, std::optional<std::uint16_t> did, May may,
+                const Conformance::Judge& judge) {
+  if (!did) {
+    return;
+  }
+  const std::string id = fmt::format("read.{}", record_name);
+  const std::string sentence =
+      fmt::format("{} is read in the default session, as the profile lays it out.", record_name);
+  const Requirement requirement{id, clause, sentence};
+  const Bytes request = uds::read_request(*did);
+  const auto of_record = [&](ByteView response) { return judge(response.subspan(3)); };
+  if (may == May::be_there) {
+    c.answered(requirement, request, 2, of_record);
+    return;
+  }
+  if (!c.ready(requirement)) {
+    return;
+  }
+  const Exchange exchange = c.tester().ask(request);
+  const bool absent = exchange.kind == Exchange::Kind::negative &&
+                      exchange.nrc == static_cast<std::uint8_t>(Nrc::conditions_not_correct);
+  const auto told = uds::read_read_response(exchange.response, *did);
+  const bool blank = told && std::ranges::all_of(*told, [](std::uint8_t b) { return b == 0xFF; });
+  const std::string fault = absent || blank ? "" : told ? judge(*told) : told.error().message;
+  c.judged(requirement, hex(request), "the record, or conditionsNotCorrect (0x22) where there is none",
+           fault.empty() ? words(exchange) : fmt::format("{}: {}", words(exchange), fault), fault.empty());
+}
+
+}  // namespace
+
+void try_records(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  try_record(c, "serial", p.serial, May::be_there, fault_of_text);
+  try_record(c, "software", p.software, May::be_there, fault_of_text);
+  try_record(c, "state", p.state.did, May::be_there, [&](ByteView b) { return fault_of(profile::decode_state(p, b)); });
+  try_record(c, "schedule", p.schedule.did, May::be_absent,
+             [&](ByteView b) { return fault_of(profile::decode_schedule(p, b)); });
+  try_record(c, "site", p.site.did, May::be_there, [&](ByteView b) { return fault_of(profile::decode_site(p, b)); });
+  try_record(c, "directory", p.directory.did, May::be_there,
+             [&](ByteView b) { return fault_of(profile::decode_directory(p, b)); });
+  try_record(c, "sample_format", p.sample_format.did, May::be_there,
+             [&](ByteView b) { return fault_of(profile::decode_sample_format(p, b)); });
+  const auto of_set = [&](ByteView b) { return fault_of_set(p, b); };
+  try_record(c, "set_in_force", p.set_in_force, May::be_there, of_set);
+  try_record(c, "set_inactive", p.set_inactive, May::be_absent, of_set);
+  try_record(c, "set_factory", p.set_factory, May::be_absent, of_set);
+
+  c.refused({"read.unknown", clause, "An identifier that is none is refused."}, uds::read_request(unused_did),
+            {Nrc::request_out_of_range});
+  c.refused({"read.too_short", clause, "Half an identifier is refused."}, Bytes{0x22, 0xF1},
+            {Nrc::incorrect_message_length});
+  c.refused({"read.too_long", clause, "An identifier and a half are refused."},
+            Bytes{0x22, static_cast<std::uint8_t>(p.serial >> 8U), static_cast<std::uint8_t>(p.serial), 0x00},
+            {Nrc::incorrect_message_length});
+  if (p.bus.status) {
+    constexpr Requirement status{"status.frame", "profile, bus.status", "The state frame comes by itself."};
+    constexpr double within_s = 3.0;
+    const auto frame = c.tester().other(*p.bus.status, within_s);
+    c.judged(status, "nothing", fmt::format("a frame with identifier {:X} within {:g} s", *p.bus.status, within_s),
+             frame ? hex(frame->payload()) : "nothing", frame.has_value());
+  }
+}
+
+}  // namespace selfcal::cli::device

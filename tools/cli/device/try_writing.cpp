@@ -1,0 +1,180 @@
+// WriteDataByIdentifier, the slots, and ECUReset: what changes something. No set is put in force.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "protocol/profile/records.hpp"
+#include "protocol/uds/messages.hpp"
+#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/unused_number.hpp"
+
+namespace selfcal::cli::device {
+namespace {
+
+using uds::Nrc;
+using uds::RoutineAction;
+constexpr std::string_view writing = "ISO 14229-1, 10.7", routines = "ISO 14229-1, 13.2", reset = "ISO 14229-1, 9.3";
+
+Bytes without_last(Bytes request) {
+  request.pop_back();
+  return request;
+}
+
+// The schedule that the INS has; where it has none, one move there and back, which is never begun.
+Bytes schedule_of(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const Exchange told = c.tester().ask(uds::read_request(*p.schedule.did));
+  if (const auto record = uds::read_read_response(told.response, *p.schedule.did)) {
+    return {record->begin(), record->end()};
+  }
+  ins::ScheduleRecord schedule;
+  schedule.rotation_ms = 10000;
+  schedule.positions = {{0, 0, 60000}, {90000, 0, 60000}, {0, 0, 60000}};
+  return profile::encode(p, schedule).value_or(Bytes{});
+}
+
+// Written, and read back.
+void try_write(Conformance& c, const Requirement& requirement, std::uint16_t did, ByteView record) {
+  if (!c.ready(requirement)) {
+    return;
+  }
+  const Bytes request = uds::write_request(did, record);
+  const Exchange written = c.tester().ask(request);
+  const Exchange told = c.tester().ask(uds::read_request(did));
+  const auto back = uds::read_read_response(told.response, did);
+  const bool same = back && std::ranges::equal(*back, record);
+  c.judged(requirement, fmt::format("{}, then {}", hex(request), hex(uds::read_request(did))),
+           "6E and the identifier, then the record as it was written",
+           written.kind != Exchange::Kind::positive ? words(written)
+           : same                                   ? "the record as it was written"
+                                                    : words(told),
+           written.kind == Exchange::Kind::positive && same);
+}
+
+void try_schedule(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  if (!p.schedule.did || !c.permission().write) {
+    return c.not_tried({"write.schedule", writing, "The schedule is written."}, "needs --write");
+  }
+  const Bytes schedule = schedule_of(c);
+  const Bytes request = uds::write_request(*p.schedule.did, schedule);
+  if (p.security.needed) {
+    c.refused({"write.locked", writing, "While the lock is closed nothing is written.", Mode::session, true}, request,
+              {Nrc::security_access_denied});
+  }
+  c.refused({"write.session", "ISO 14229-1, 7.5", "In the default session nothing is written.", Mode::standard, true},
+            request, {Nrc::service_not_supported_in_session});
+  c.refused({"write.too_short", writing, "A record that is too short is refused.", Mode::open, true},
+            without_last(request), {Nrc::incorrect_message_length});
+  c.refused({"write.unknown", writing, "An identifier that is none is not written.", Mode::open, true},
+            uds::write_request(unused_did, Bytes{0}), {Nrc::request_out_of_range});
+  c.refused({"write.read_only", writing, "A record that is only read is not written.", Mode::open, true},
+            uds::write_request(*p.state.did, Bytes(p.state.layout.bytes, 0)), {Nrc::request_out_of_range});
+  try_write(c, {"write.schedule", writing, "The schedule is written, and read back as written.", Mode::open, true},
+            *p.schedule.did, schedule);
+}
+
+bool erased(Conformance& c) {
+  const Exchange told = c.tester().ask(uds::read_request(*c.profile().set_inactive));
+  const auto record = uds::read_read_response(told.response, *c.profile().set_inactive);
+  return told.kind == Exchange::Kind::negative ||
+         (record && std::ranges::all_of(*record, [](std::uint8_t byte) { return byte == 0xFF; }));
+}
+
+void try_erase(Conformance& c, const Requirement& requirement) {
+  if (!c.ready(requirement)) {
+    return;
+  }
+  const Bytes request = uds::routine_request(RoutineAction::start, *c.profile().erase.id);
+  const Exchange exchange = c.tester().ask(request);
+  const bool blank = exchange.kind == Exchange::Kind::positive && erased(c);
+  c.judged(requirement, hex(request) + ", then the inactive set is read", "71 01, then 0x22 or all FF",
+           exchange.kind != Exchange::Kind::positive ? words(exchange)
+           : blank                                   ? "erased"
+                                                     : "a set is still told",
+           blank);
+}
+
+// A set that is the one in force, in the inactive slot; erased afterwards.
+void try_set(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const Exchange told = p.set_in_force ? c.tester().ask(uds::read_request(*p.set_in_force)) : Exchange{};
+  const auto record =
+      p.set_in_force ? uds::read_read_response(told.response, *p.set_in_force) : tl::unexpected(Error{});
+  constexpr Requirement written{"set.write", writing,
+                                "A set is written into the inactive slot, and read back as written.", Mode::open, true};
+  if (!record || !p.set_inactive || !c.permission().write) {
+    return c.not_tried(written, c.permission().write ? "no set in force can be read" : "needs --write");
+  }
+  const Bytes set(record->begin(), record->end());
+  if (p.erase.id) {
+    try_erase(c, {"set.erase", routines, "The inactive slot is erased.", Mode::open, true});
+  }
+  c.refused({"set.too_short", writing, "A set that is too short is refused.", Mode::open, true},
+            without_last(uds::write_request(*p.set_inactive, set)), {Nrc::incorrect_message_length});
+  if (p.set.checksum) {
+    Bytes spoilt = set;
+    spoilt[p.set.checksum->field.at] ^= 0x01U;
+    c.refused(
+        {"set.checksum", "profile, coefficients.checksum", "A set with a wrong checksum is refused.", Mode::open, true},
+        uds::write_request(*p.set_inactive, spoilt), {Nrc::request_out_of_range});
+  }
+  try_write(c, written, *p.set_inactive, set);
+  if (p.commit.id && p.set.checksum && !p.commit.start.fields.empty()) {
+    Bytes spoilt = set;
+    spoilt[p.set.checksum->field.at] ^= 0x01U;
+    c.refused(
+        {"commit.checksum", "profile, commit.start", "A set is not put in force by another one's checksum.", Mode::open,
+         true},
+        uds::routine_request(RoutineAction::start, *p.commit.id, profile::commit_start(p, spoilt).value_or(Bytes{})),
+        {Nrc::request_out_of_range});
+  }
+  if (p.erase.id) {
+    c.refused({"set.not_erased", writing, "A slot that is not erased is not written.", Mode::open, true},
+              uds::write_request(*p.set_inactive, set),
+              {Nrc::general_programming_failure, Nrc::conditions_not_correct, Nrc::request_out_of_range});
+    try_erase(c, {"set.erase_again", routines, "The slot is erased again.", Mode::open, true});
+  }
+}
+
+void try_reset(Conformance& c) {
+  constexpr int start_up_s = 30;
+  const Bytes request = uds::reset_request(uds::ResetType::hard);
+  if (c.profile().security.needed) {
+    c.refused({"reset.locked", reset, "While the lock is closed there is no restart.", Mode::session, true}, request,
+              {Nrc::security_access_denied});
+  }
+  constexpr Requirement done{"reset.restart", reset, "The INS restarts, and begins in the default session.", Mode::open,
+                             true};
+  if (!c.ready(done)) {
+    return;
+  }
+  const Exchange exchange = c.tester().ask(request);
+  bool back = false;
+  for (int second = 0; exchange.kind == Exchange::Kind::positive && !back && second < start_up_s; ++second) {
+    c.tester().quiet(1.0);
+    c.tester().put(Bytes{2, uds::service::tester_present, 0});
+    back = c.tester().receive(uds::service::tester_present, 0.5).kind == Exchange::Kind::positive;
+  }
+  const Exchange after = back ? c.tester().ask(Bytes{0x31, 0x03}) : Exchange{};
+  const bool standard = after.kind == Exchange::Kind::negative &&
+                        (after.nrc == static_cast<std::uint8_t>(Nrc::service_not_supported_in_session) ||
+                         after.nrc == static_cast<std::uint8_t>(Nrc::sub_function_not_supported_in_session));
+  c.judged(done, fmt::format("{}, then 3E 00, then 31 03", hex(request)),
+           fmt::format("51 01, an answer within {} s, then serviceNotSupportedInActiveSession (0x7F)", start_up_s),
+           exchange.kind != Exchange::Kind::positive ? words(exchange)
+           : !back                                   ? "no answer after it"
+                                                     : words(after),
+           standard);
+}
+
+}  // namespace
+
+void try_writing(Conformance& c) {
+  try_schedule(c);
+  try_set(c);
+  try_reset(c);
+}
+
+}  // namespace selfcal::cli::device
