@@ -1,0 +1,126 @@
+"""`selfcal device probe` finds what is there, and sends nothing but TesterPresent, the default session and reading."""
+import json
+import socket
+import struct
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+from pathlib import Path
+
+import case
+
+PROFILES = case.ROOT / "config" / "profiles"
+
+
+class Bus(threading.Thread):
+    """Every frame of an interface."""
+
+    def __init__(self, interface):
+        super().__init__(daemon=True)
+        self.can = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self.can.bind((interface,))
+        self.can.settimeout(0.2)
+        self.frames, self.over = [], False
+
+    def run(self):
+        while not self.over:
+            try:
+                frame = self.can.recv(16)
+            except TimeoutError:
+                continue
+            identifier, length = struct.unpack("=IB", frame[:5])
+            self.frames.append((identifier, frame[8:8 + length]))
+
+    def end(self):
+        self.over = True
+        self.join()
+        self.can.close()
+        return self.frames
+
+
+def sent_by_tester(frames, answering):
+    """Frames on identifiers other than those of nodes that answer or speak by themselves."""
+    return [(i, d) for i, d in frames if i not in answering]
+
+
+def harmless(data):
+    """A single frame with one of the three requests, or flow control."""
+    if data[0] >> 4 == 3:
+        return True
+    request = data[1:1 + data[0]]
+    return data[0] >> 4 == 0 and (request in (b"\x3E\x00", b"\x10\x01") or (len(request) == 3 and request[0] == 0x22))
+
+
+class DeviceProbe(unittest.TestCase):
+    def probe(self, *options):
+        done = subprocess.run([case.bench.BIN / "selfcal", "device", "probe", "vcan0", "--json", *map(str, options)],
+                              capture_output=True, text=True, timeout=200, check=False)
+        if not done.stdout:
+            raise AssertionError(done.stderr)
+        self.assertFalse(case.schema_validator.text_faults(done.stdout))
+        return done.returncode, json.loads(done.stdout)
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="selfcal_probe.")
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.key = self.folder / "ins.key"
+        self.key.touch(mode=0o600)
+        self.key.write_text("00" * 16 + "\n", encoding="ascii")
+
+    def start_ins(self, profile):
+        server = subprocess.Popen([case.bench.BIN / "sim_ins", "--interface", "vcan0", "--key", self.key, "--profile",
+                                   PROFILES / profile, "--flash", self.folder / f"{profile}.flash"],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(server.wait)
+        self.addCleanup(server.terminate)
+
+    def test_two_ins_on_one_bus(self):
+        """One at the address asked first, one that only its normal fixed address gives away."""
+        self.start_ins("selfcal.toml")
+        self.start_ins("example.toml")
+        time.sleep(2.0)
+        bus = Bus("vcan0")
+        bus.start()
+        status, document = self.probe()
+        frames = bus.end()
+        self.assertEqual(status, 0)
+        self.assertEqual([(f["request_id"], f["response_id"], f["extended_id"]) for f in document["found"]],
+                         [(0x640, 0x648, False), (0x18DA2AF1, 0x18DAF12A, True)])
+        self.assertEqual([h["id"] for h in document["heard"]], [0x650, 0x651])
+        records = {d["did"]: bytes.fromhex(d["record"]) for d in document["found"][0]["dids"]}
+        self.assertEqual(set(records), {0xF18C, 0xF195})
+        self.assertEqual(records[0xF195], b"sim_ins 1.0")
+        self.assertEqual(document["found"][1]["dids"], [])
+
+        extended = socket.CAN_EFF_FLAG
+        sent = sent_by_tester(frames, {0x648, 0x650, 0x651, 0x18DAF12A | extended})
+        services = {}
+        for identifier, data in sent:
+            self.assertTrue(harmless(data), f"{identifier:X}: {data.hex(' ')}")
+            services[data[1]] = services.get(data[1], 0) + (data[0] >> 4 == 0)
+        print(f"{len(sent)} frames of the tester:", ", ".join(f"service {s:02X} {n} times" for s, n in sorted(services.items())),
+              "and no other", flush=True)
+        self.assertGreater(len(sent), 256 + 2 * 32)
+        # The control: what a calibration sends is not harmless.
+        for forbidden in (b"\x02\x10\x03", b"\x02\x27\x01", b"\x04\x2E\xF1\x8C\x00", b"\x04\x31\x01\x02\x00", b"\x10\x12\x27\x02"):
+            self.assertFalse(harmless(forbidden))
+
+    def test_identifiers_in_a_range(self):
+        self.start_ins("example.toml")
+        time.sleep(2.0)
+        status, document = self.probe("--profile", PROFILES / "example.toml", "--only", "--first-did", "FD00", "--last-did",
+                                      "FD32", "--listen", "0.1")
+        self.assertEqual(status, 0)
+        told = {d["did"] for d in document["found"][0]["dids"]}
+        self.assertEqual(told, {0xFD00, 0xFD01, 0xFD10, 0xFD11, 0xFD12, 0xFD20, 0xFD21, 0xFD30, 0xFD31, 0xFD32})
+
+    def test_an_empty_bus(self):
+        status, document = self.probe("--only", "--listen", "0.1")
+        self.assertEqual((status, document["found"], document["heard"]), (case.ANSWER_IS_NO, [], []))
+
+
+if __name__ == "__main__":
+    unittest.main()
