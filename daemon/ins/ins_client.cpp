@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "protocol/flash/page.hpp"
+#include "daemon/ins/kept_form.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
 #include "protocol/uds/security.hpp"
@@ -79,27 +79,6 @@ Answer<Record> decoded(const InsPort& port, const profile::Profile& profile, con
     return protocol_error(port, record.error());
   }
   return std::move(*record);
-}
-
-// A page as the service keeps it.
-Expected<Bytes> as_kept(const profile::Profile& profile, std::span<const std::uint8_t> told) {
-  const profile::Layout& layout = profile.raw.page;
-  if (layout.checksum && profile::stored_checksum(layout, told) != profile::computed_checksum(layout, told)) {
-    return fail(ErrorKind::device, "wrong CRC");
-  }
-  const auto page = profile::decode_page(profile, told);
-  if (!page) {
-    return tl::unexpected(page.error());
-  }
-  flash::PageBytes bytes;
-  flash::encode_page(*page, bytes);
-  return Bytes(bytes.begin(), bytes.end());
-}
-
-// A set of coefficients as the service keeps it.
-Bytes kept(const ins::Coefficients& set) {
-  const auto bytes = ins::encode(set);
-  return {bytes.begin(), bytes.end()};
 }
 
 std::string text(const Bytes& bytes) {
@@ -252,14 +231,35 @@ Task<Answer<ins::SiteRecord>> InsClient::read_site() {
   co_return decoded(port_, *profile_, bytes, profile::decode_site);
 }
 
+// As the INS tells it: one record, or field by field.
+Task<Answer<Bytes>> InsClient::told_set(SetOf which) {
+  if (!profile_->field_by_field) {
+    const bool second = which == SetOf::inactive && profile_->slots;
+    co_return co_await read_record(second ? *profile_->set_inactive : *profile_->set_in_force);
+  }
+  Bytes set;
+  for (const profile::Field& field : profile_->set.fields) {
+    const Answer<Bytes> part = co_await read_record(*field.did);
+    if (!part) {
+      co_return part;
+    }
+    if (part->size() != field.end() - field.at) {
+      co_return protocol_error(
+          port_, {ErrorKind::device, fmt::format("coefficients: {} has {} bytes, {} expected", field.name, part->size(),
+                                                 field.end() - field.at)});
+    }
+    set.insert(set.end(), part->begin(), part->end());
+  }
+  co_return set;
+}
+
 Task<Answer<Bytes>> InsClient::read_set(SetOf which) {
-  Answer<Bytes> told =
-      co_await read_record(which == SetOf::in_force ? *profile_->set_in_force : *profile_->set_inactive);
+  Answer<Bytes> told = co_await told_set(which);
   if (!told) {
     co_return told;
   }
   const auto set = profile::decode_coefficients(*profile_, *told);
-  co_return set ? kept(*set) : std::move(*told);
+  co_return set ? set_as_kept(*set) : std::move(*told);
 }
 
 // To a fixed point: where the INS's numbers are in other units, a conversion there and back moves the last bit, and the next
@@ -274,7 +274,7 @@ Answer<Bytes> InsClient::as_held(const ins::Coefficients& set) const {
       return protocol_error(port_, again.error());
     }
     if (*again == held) {
-      return kept(held);
+      return set_as_kept(held);
     }
     held = *again;
   }
@@ -306,7 +306,19 @@ Task<Answer<Done>> InsClient::write_inactive(Bytes set) {
   if (!bytes) {
     co_return protocol_error(port_, bytes.error());
   }
-  co_return co_await write_record(*profile_->set_inactive, std::move(*bytes));
+  if (!profile_->field_by_field) {
+    co_return co_await write_record(profile_->slots ? *profile_->set_inactive : *profile_->set_in_force,
+                                    std::move(*bytes));
+  }
+  for (const profile::Field& field : profile_->set.fields) {
+    const auto at = bytes->begin() + static_cast<std::ptrdiff_t>(field.at);
+    const auto written =
+        co_await write_record(*field.did, Bytes(at, at + static_cast<std::ptrdiff_t>(field.end() - field.at)));
+    if (!written) {
+      co_return written;
+    }
+  }
+  co_return Done{};
 }
 
 Task<Answer<Done>> InsClient::commit(Bytes set) {
@@ -387,6 +399,43 @@ Task<Answer<Bytes>> InsClient::next_block(std::uint8_t block, std::uint32_t long
 }
 
 Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
+  return profile_->raw.way == profile::Raw::Way::memory ? read_memory(first, count, std::move(on_page))
+                                                        : upload_pages(first, count, std::move(on_page));
+}
+
+// Page by page, each in as many requests as the INS tells bytes at once.
+Task<Answer<Done>> InsClient::read_memory(std::uint32_t first, std::uint32_t count, OnPage on_page) {
+  const profile::Raw& raw = profile_->raw;
+  const std::uint64_t page_bytes = raw.page.bytes;
+  const std::uint64_t end = raw.first_address + (std::uint64_t{first} + count) * page_bytes;
+  if (((end - 1) >> (8 * raw.address_bytes)) != 0) {
+    co_return protocol_error(
+        port_, {ErrorKind::device,
+                fmt::format("ReadMemoryByAddress: address {:X} does not fit {} bytes", end - 1, raw.address_bytes)});
+  }
+  for (std::uint32_t page = first; page < first + count; ++page) {
+    Bytes data;
+    while (data.size() < page_bytes) {
+      const auto address = static_cast<std::uint32_t>(raw.first_address + page * page_bytes + data.size());
+      const auto wanted =
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(raw.longest_read, page_bytes - data.size()));
+      const Answer<Bytes> response = co_await ask(
+          uds::memory_request(address, wanted, {raw.address_bytes, raw.size_bytes}), std::size_t{wanted} + 1);
+      if (!response) {
+        co_return tl::unexpected(response.error());
+      }
+      const auto part = uds::read_memory_response(*response, wanted);
+      if (!part) {
+        co_return protocol_error(port_, part.error());
+      }
+      data.insert(data.end(), part->begin(), part->end());
+    }
+    on_page(page, page_as_kept(*profile_, data));
+  }
+  co_return Done{};
+}
+
+Task<Answer<Done>> InsClient::upload_pages(std::uint32_t first, std::uint32_t count, OnPage on_page) {
   const profile::Raw& raw = profile_->raw;
   const std::size_t page_bytes = raw.page.bytes;
   const std::size_t wanted = std::size_t{count} * page_bytes;
@@ -424,7 +473,7 @@ Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, O
     }
     data.insert(data.end(), part->begin(), part->end());
     for (; (whole + 1) * page_bytes <= data.size(); ++whole) {
-      on_page(first + whole, as_kept(*profile_, std::span(data).subspan(whole * page_bytes, page_bytes)));
+      on_page(first + whole, page_as_kept(*profile_, std::span(data).subspan(whole * page_bytes, page_bytes)));
     }
   }
   response = co_await ask(uds::transfer_exit_request(), longest_other);

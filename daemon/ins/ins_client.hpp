@@ -46,6 +46,8 @@ class InsClient {
   Answer<Bytes> as_held(const ins::Coefficients& set) const;
   Task<Answer<Done>> erase_inactive();
   bool erases() const { return profile_->erase.id.has_value(); }
+  // Without slots the inactive set is the one that is written over the set in force.
+  bool has_slots() const { return profile_->slots; }
   Task<Answer<Done>> write_inactive(Bytes set);
   Task<Answer<Done>> commit(Bytes set);
 
@@ -68,6 +70,9 @@ class InsClient {
 
  private:
   Task<Answer<Bytes>> ask(Bytes payload, std::size_t longest_answer);
+  Task<Answer<Bytes>> told_set(SetOf which);
+  Task<Answer<Done>> read_memory(std::uint32_t first, std::uint32_t count, OnPage on_page);
+  Task<Answer<Done>> upload_pages(std::uint32_t first, std::uint32_t count, OnPage on_page);
   Task<Answer<Bytes>> next_block(std::uint8_t block, std::uint32_t longest);
   Task<Answer<Done>> command(uds::RoutineAction action, std::uint16_t id, Expected<Bytes> option);
 

@@ -32,6 +32,9 @@ std::string key_path(const InsConfig& config) {
 }  // namespace
 
 Expected<UnlockKey> load_unlock_key(const InsConfig& config) {
+  if (!config.profile->security.needed) {
+    return UnlockKey{};
+  }
   const std::string path = key_path(config);
   if (path.empty()) {
     return fail(ErrorKind::bad_input,

@@ -188,6 +188,7 @@ bool CalibrationRun::holds(Guard guard) const {
     case Guard::new_set_in_force: return data_.new_set_in_force();
     case Guard::abort_pending: return journal_.record.abort_wanted;
     case Guard::failure_pending: return !journal_.record.abort_wanted;
+    case Guard::no_slots: return !data_.config.profile->slots;
   }
   return false;
 }
@@ -238,6 +239,7 @@ Task<Step> CalibrationRun::step(Action action) {
     case Action::read_in_force: return coefficients_.read_in_force();
     case Action::end_check: return navigation_.end_check();
     case Action::stop_gimbal: return rotation_.stop_gimbal();
+    case Action::put_back: return coefficients_.put_back();
     default: return connection_.recover_link(lost_at_);
   }
 }

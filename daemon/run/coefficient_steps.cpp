@@ -197,4 +197,41 @@ Task<Step> CoefficientSteps::read_in_force() {
   co_return Event::set_confirmed;
 }
 
+Task<Step> CoefficientSteps::put_back() {
+  if (journal_.record.reason.empty()) {
+    journal_.fail_with(fmt::format("{}: the INS was away while its coefficients were written: they are not trusted",
+                                   data_.config.interface));
+  }
+  const auto kept = store_.set(journal_.record.id, SetRole::previous);
+  if (!kept || !*kept) {
+    co_return local_trouble(kept ? Error{ErrorKind::internal, "the old set was not kept"} : kept.error());
+  }
+  const Bytes old = **kept;
+  if (auto same = co_await connection_.check_serial(); !same) {
+    co_return tl::unexpected(same.error());
+  }
+  if (auto written = co_await client_.write_inactive(old); !written) {
+    co_return tl::unexpected(written.error());
+  }
+  const auto told = co_await client_.read_set(InsClient::SetOf::inactive);
+  if (!told) {
+    co_return tl::unexpected(told.error());
+  }
+  if (*told != old) {
+    co_return protocol_error("the old coefficients were put back, and those read back are others");
+  }
+  if (auto restarted = co_await reset_ins(); !restarted) {
+    co_return restarted;
+  }
+  if (auto taken = co_await connection_.take_stock(); !taken) {
+    co_return tl::unexpected(taken.error());
+  }
+  if (data_.in_force != old) {
+    co_return protocol_error("the old coefficients were put back, and others are in force after the restart");
+  }
+  data_.old_set_put_back = true;
+  journal_.remember("ins", "the old coefficients were put back, and are in force after a restart");
+  co_return Event::set_put_back;
+}
+
 }  // namespace selfcal

@@ -17,6 +17,8 @@ class CoefficientSteps : public RunSteps {
   Task<Step> commit();
   Task<Step> reset_ins();
   Task<Step> read_in_force();
+  // Of an INS without slots: the set that was in force before the run, written again, read back and in force after a restart.
+  Task<Step> put_back();
 
  private:
   Task<Answer<Done>> check_erased();

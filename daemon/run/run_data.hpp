@@ -42,6 +42,7 @@ struct RunData {
   std::vector<std::string> objections;  // of the gate
   Bytes new_set;
   bool commit_asked = false;
+  bool old_set_put_back = false;
 
   bool new_set_in_force() const { return !new_set.empty() && in_force == new_set; }
 };

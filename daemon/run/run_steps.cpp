@@ -63,6 +63,12 @@ std::chrono::nanoseconds RunSteps::ins_time(double seconds) const {
 std::string RunSteps::what_the_ins_holds() const { return selfcal::what_the_ins_holds(data_, budget_.main_path()); }
 
 std::string what_the_ins_holds(const RunData& data, State main_path) {
+  if (data.old_set_put_back) {
+    return "the old set was put back and is in force";
+  }
+  if (!data.config.profile->slots && main_path >= State::writing && main_path < State::checking_new) {
+    return "the INS has no second slot: part of the new set may stand over the old one, which is kept here";
+  }
   if (data.new_set_in_force()) {
     return "the new set is in force";
   }

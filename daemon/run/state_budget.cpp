@@ -47,6 +47,7 @@ double work_s(State state, const InsConfig& config, double page_s) {
     case State::committing: return requests(6) + flash_s;
     case State::resetting: return requests(8) + ins_s(restart_s) + flash_s;
     case State::confirming: return requests(4);
+    case State::putting_back: return requests(20) + ins_s(restart_s) + 2 * flash_s;
     default: return 0.0;  // an end
   }
 }

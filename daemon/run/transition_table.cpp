@@ -57,6 +57,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::checking_new, E::link_lost, G::always, A::recover_link, S::checking_new},
     {S::ending_check, E::link_lost, G::always, A::recover_link, S::ending_check},
     {S::stopping, E::link_lost, G::always, A::recover_link, S::stopping},
+    {S::putting_back, E::link_lost, G::always, A::recover_link, S::putting_back},
 
     {S::connecting, E::recovered, G::always, A::identify, S::connecting},
     {S::unlocking, E::recovered, G::always, A::unlock, S::unlocking},
@@ -74,6 +75,8 @@ constexpr auto table = std::to_array<Transition>({
     {S::judging, E::recovered, G::always, A::judge, S::judging},
     {S::checking_old, E::recovered, G::always, A::measure_drift_old, S::checking_old},
     {S::erasing, E::recovered, G::always, A::erase_inactive_slot, S::erasing},
+    // Half of the new set may stand over the old one.
+    {S::writing, E::recovered, G::no_slots, A::put_back, S::putting_back},
     {S::writing, E::recovered, G::always, A::erase_inactive_slot, S::erasing},
     {S::verifying, E::recovered, G::always, A::read_back, S::verifying},
     {S::committing, E::recovered, G::new_set_in_force, A::reset_ins, S::resetting},
@@ -88,6 +91,9 @@ constexpr auto table = std::to_array<Transition>({
     {S::stopping, E::recovered, G::always, A::stop_gimbal, S::stopping},
     {S::stopping, E::gimbal_stopped, G::abort_pending, A::conclude, S::aborted},
     {S::stopping, E::gimbal_stopped, G::always, A::conclude, S::failed},
+    {S::putting_back, E::recovered, G::always, A::put_back, S::putting_back},
+    {S::putting_back, E::set_put_back, G::abort_pending, A::conclude, S::aborted},
+    {S::putting_back, E::set_put_back, G::always, A::conclude, S::failed},
 
     {S::connecting, E::abort_requested, G::always, A::conclude, S::aborted},
     {S::unlocking, E::abort_requested, G::always, A::conclude, S::aborted},
@@ -101,7 +107,9 @@ constexpr auto table = std::to_array<Transition>({
     // An INS that goes on checking would refuse the next run.
     {S::checking_old, E::abort_requested, G::always, A::end_check, S::ending_check},
     {S::erasing, E::abort_requested, G::always, A::conclude, S::aborted},
+    {S::writing, E::abort_requested, G::no_slots, A::put_back, S::putting_back},
     {S::writing, E::abort_requested, G::always, A::conclude, S::aborted},
+    {S::verifying, E::abort_requested, G::no_slots, A::put_back, S::putting_back},
     {S::verifying, E::abort_requested, G::always, A::conclude, S::aborted},
     // From the commit on there is no old state to go back to half-way: the last steps run to their end.
     {S::committing, E::abort_requested, G::always, A::decline_abort, S::committing},
@@ -110,6 +118,7 @@ constexpr auto table = std::to_array<Transition>({
     {S::checking_new, E::abort_requested, G::always, A::end_check, S::ending_check},
     {S::ending_check, E::abort_requested, G::always, A::decline_abort, S::ending_check},
     {S::stopping, E::abort_requested, G::always, A::decline_abort, S::stopping},
+    {S::putting_back, E::abort_requested, G::always, A::decline_abort, S::putting_back},
 
     {S::connecting, E::step_failed, G::always, A::conclude, S::failed},
     {S::unlocking, E::step_failed, G::always, A::conclude, S::failed},
@@ -122,14 +131,20 @@ constexpr auto table = std::to_array<Transition>({
     {S::judging, E::step_failed, G::always, A::conclude, S::failed},
     {S::checking_old, E::step_failed, G::always, A::end_check, S::ending_check},
     {S::erasing, E::step_failed, G::always, A::conclude, S::failed},
+    {S::writing, E::step_failed, G::no_slots, A::put_back, S::putting_back},
     {S::writing, E::step_failed, G::always, A::conclude, S::failed},
+    {S::verifying, E::step_failed, G::no_slots, A::put_back, S::putting_back},
     {S::verifying, E::step_failed, G::always, A::conclude, S::failed},
+    {S::committing, E::step_failed, G::no_slots, A::put_back, S::putting_back},
     {S::committing, E::step_failed, G::always, A::conclude, S::failed},
+    {S::resetting, E::step_failed, G::no_slots, A::put_back, S::putting_back},
     {S::resetting, E::step_failed, G::always, A::conclude, S::failed},
+    {S::confirming, E::step_failed, G::no_slots, A::put_back, S::putting_back},
     {S::confirming, E::step_failed, G::always, A::conclude, S::failed},
     {S::checking_new, E::step_failed, G::always, A::end_check, S::ending_check},
     {S::ending_check, E::step_failed, G::always, A::conclude, S::failed},
     {S::stopping, E::step_failed, G::always, A::conclude, S::failed},
+    {S::putting_back, E::step_failed, G::always, A::conclude, S::failed},
 
     {S::connecting, E::link_gone, G::always, A::conclude, S::failed},
     {S::unlocking, E::link_gone, G::always, A::conclude, S::failed},
@@ -148,17 +163,18 @@ constexpr auto table = std::to_array<Transition>({
     {S::checking_new, E::link_gone, G::always, A::conclude, S::failed},
     {S::ending_check, E::link_gone, G::always, A::conclude, S::failed},
     {S::stopping, E::link_gone, G::always, A::conclude, S::failed},
+    {S::putting_back, E::link_gone, G::always, A::conclude, S::failed},
 });
 
 constexpr std::array event_names{
     "begin",          "identified",     "unlocked",       "schedule_accepted", "rotation_started",
     "tolerances_met", "rotation_ended", "pages_complete", "estimate_ready",    "judged",
     "drift_measured", "slot_erased",    "set_written",    "set_verified",      "set_committed",
-    "ins_restarted",  "set_confirmed",  "gimbal_stopped", "check_ended",       "link_lost",
-    "recovered",      "link_gone",      "step_failed",    "abort_requested"};
+    "ins_restarted",  "set_confirmed",  "gimbal_stopped", "check_ended",       "set_put_back",
+    "link_lost",      "recovered",      "link_gone",      "step_failed",       "abort_requested"};
 constexpr std::array guard_names{
     "always",  "rollback",           "amendment",        "gimbal_turning", "rotation_complete", "gate_refused",
-    "dry_run", "drift_check_wanted", "new_set_in_force", "abort_pending",  "failure_pending"};
+    "dry_run", "drift_check_wanted", "new_set_in_force", "abort_pending",  "failure_pending",   "no_slots"};
 constexpr std::array action_names{"none",
                                   "identify",
                                   "unlock",
@@ -179,12 +195,13 @@ constexpr std::array action_names{"none",
                                   "measure_drift_new",
                                   "end_check",
                                   "stop_gimbal",
+                                  "put_back",
                                   "recover_link",
                                   "decline_abort",
                                   "conclude"};
 
 static_assert(event_names.size() == static_cast<std::size_t>(Event::abort_requested) + 1);
-static_assert(guard_names.size() == static_cast<std::size_t>(Guard::failure_pending) + 1);
+static_assert(guard_names.size() == static_cast<std::size_t>(Guard::no_slots) + 1);
 static_assert(action_names.size() == static_cast<std::size_t>(Action::conclude) + 1);
 
 }  // namespace

@@ -33,6 +33,7 @@ enum class Event {
   set_confirmed,
   gimbal_stopped,
   check_ended,
+  set_put_back,
   link_lost,    // no answer, or the interface went down
   recovered,    // identified and unlocked again
   link_gone,    // not recovered within the stated time
@@ -52,6 +53,7 @@ enum class Guard {
   new_set_in_force,  // slot in force holds this run's set
   abort_pending,     // an operator asked for this end
   failure_pending,   // no operator asked for it: a step failed
+  no_slots,          // what is written is written over the set in force
 };
 
 enum class Action {
@@ -75,6 +77,7 @@ enum class Action {
   measure_drift_new,
   end_check,
   stop_gimbal,
+  put_back,
   recover_link,
   decline_abort,
   conclude,

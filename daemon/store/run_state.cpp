@@ -5,10 +5,11 @@
 namespace selfcal {
 namespace {
 
-constexpr std::array state_names{
-    "connecting",   "unlocking",    "scheduling", "starting",  "rotating",  "ending_early", "draining",  "estimating",
-    "judging",      "checking_old", "erasing",    "writing",   "verifying", "committing",   "resetting", "confirming",
-    "checking_new", "ending_check", "stopping",   "completed", "refused",   "failed",       "aborted"};
+constexpr std::array state_names{"connecting",   "unlocking",    "scheduling",   "starting",   "rotating",
+                                 "ending_early", "draining",     "estimating",   "judging",    "checking_old",
+                                 "erasing",      "writing",      "verifying",    "committing", "resetting",
+                                 "confirming",   "checking_new", "ending_check", "stopping",   "putting_back",
+                                 "completed",    "refused",      "failed",       "aborted"};
 constexpr std::array state_words{"looking for the INS",
                                  "unlocking the INS",
                                  "writing the schedule",
@@ -28,6 +29,7 @@ constexpr std::array state_words{"looking for the INS",
                                  "measuring the drift with the new coefficients",
                                  "ending the navigation check of the INS",
                                  "stopping the gimbal",
+                                 "putting the old coefficients back",
                                  "completed",
                                  "refused: nothing was written",
                                  "failed",

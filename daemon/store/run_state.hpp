@@ -27,6 +27,7 @@ enum class State {
   checking_new,  // free-inertial drift with the new set
   ending_check,  // navigation check to be ended on the INS before the run ends
   stopping,      // gimbal to be stopped before the run ends
+  putting_back,  // an INS without slots: its old set to be written again before the run ends
   completed,     // end: done (also a dry run)
   refused,       // end: the answer is no, nothing was written
   failed,        // end: trouble

@@ -109,6 +109,7 @@ std::string scale_text(const Field& field, const RecordRole& role) {
 
 std::vector<Row> rows_of(const std::vector<Field>& fields, const RecordRole& role) {
   std::vector<Row> rows;
+  rows.reserve(fields.size());
   for (const Field& field : fields) {
     rows.push_back(
         {field.name,
@@ -246,7 +247,12 @@ class Document {
     add(p_.site.did, "site", "read");
     add(p_.directory.did, "directory", "read");
     add(p_.sample_format.did, "sample format", "read");
-    add(p_.set_in_force, "coefficients in force, as taken at power-on", "read");
+    add(p_.set_in_force,
+        p_.slots ? "coefficients in force, as taken at power-on" : "coefficients, used from the next power-on on",
+        p_.slots ? "read" : "read, write");
+    for (const Field& field : p_.set.fields) {
+      add(field.did, fmt::format("coefficients: {}", field.name), "read, write");
+    }
     add(p_.set_inactive, "coefficients in the slot not in force; erased: negative response 0x22, or all 0xFF",
         "read, write");
     add(p_.set_factory, "coefficients of the factory", "read");
@@ -276,7 +282,27 @@ class Document {
         "A_yx f_x, df_z += A_zx f_x + A_zy f_y; dw = drift + K_G w per axis, then dw_x += G_xy w_y + G_xz w_z and so "
         "on. Of the "
         "fields, values is all 24: bias xyz, drift xyz, K+ xyz, K- xyz, A yx zx zy, K_G xyz, G xy xz yx yz zx zy.");
-    write_record(out_, p_.set, set_role());
+    if (!p_.slots) {
+      out_.say(
+          "There is one set: what is written stands over the one before, is told as written, and is used from the next "
+          "power-on "
+          "on. The factory's need not be told.");
+    }
+    if (p_.field_by_field) {
+      write_fields_one_by_one();
+    } else {
+      write_record(out_, p_.set, set_role());
+    }
+  }
+
+  void write_fields_one_by_one() {
+    out_.say("Each field is a record of its own, read and written by its identifier; version is written last.");
+    std::vector<Row> rows = rows_of(p_.set.fields, set_role());
+    for (Row& row : rows) {
+      const auto field = std::ranges::find(p_.set.fields, row[0], &Field::name);
+      row[1] = fmt::format("0x{:04X}", field->did.value_or(0));
+    }
+    out_.table({"field", "identifier", "type", "byte order", "one count is", "meaning"}, rows);
   }
 
   void write_routine(const Routine& routine, std::string_view table, std::string_view words, bool has_result) {
@@ -306,6 +332,26 @@ class Document {
   void write_upload() {
     const Raw& raw = p_.raw;
     out_.heading("Raw data");
+    if (raw.way == Raw::Way::memory) {
+      out_.say(
+          fmt::format("23 {:X}{:X} ADDRESS SIZE, big-endian, {} and {} bytes, in the session: the response is 63 and "
+                      "SIZE bytes of the memory "
+                      "from ADDRESS on, {} at most. Page p of the latest run begins at 0x{:X} + p * {}. What is not in "
+                      "pages that are "
+                      "written is refused (0x31). Pages are told while the gimbal still turns.",
+                      raw.size_bytes, raw.address_bytes, raw.address_bytes, raw.size_bytes, raw.longest_read,
+                      raw.first_address, raw.page.bytes));
+    } else {
+      write_upload_services();
+    }
+    out_.heading("Record page: samples of the IMU");
+    out_.say(
+        "Every page but the last of a run is full. Sample i of the run ends i + 1 sample intervals after its start.");
+    write_record(out_, raw.page, record_role("page"));
+  }
+
+  void write_upload_services() {
+    const Raw& raw = p_.raw;
     out_.say(
         fmt::format("35 00 {:X}{:X} ADDRESS SIZE, big-endian, {} and {} bytes. ADDRESS is {}, SIZE a multiple of {} in "
                     "bytes. The response is 75 40 "
@@ -317,10 +363,6 @@ class Document {
                     raw.by_page ? "the number of a page of the run"
                                 : fmt::format("{} times the number of a page of the run", raw.page.bytes),
                     raw.page.bytes));
-    out_.heading("Record page: samples of the IMU");
-    out_.say(
-        "Every page but the last of a run is full. Sample i of the run ends i + 1 sample intervals after its start.");
-    write_record(out_, raw.page, record_role("page"));
   }
 
   void write_axes() {

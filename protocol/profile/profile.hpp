@@ -47,10 +47,14 @@ struct Routine {
   Layout result;  // of requestRoutineResults
 };
 
-// One of the 24 in the INS's record: which element of which field.
+// The raw data: how their pages are asked for, and what they hold.
 struct Raw {
   Layout page;
-  bool by_page = true;  // RequestUpload's address counts pages; else bytes
+  enum class Way : std::uint8_t { upload, memory };
+  Way way = Way::upload;            // RequestUpload, or ReadMemoryByAddress
+  bool by_page = true;              // RequestUpload's address counts pages; else bytes
+  std::uint32_t first_address = 0;  // of ReadMemoryByAddress: where page 0 of the run begins
+  std::uint32_t longest_read = 0;   // bytes that it tells at once
   std::size_t address_bytes = 4, size_bytes = 4;
   // Our axis k is the INS's axis index[k], times sign[k].
   std::array<std::size_t, 3> axis{0, 1, 2};
@@ -68,6 +72,9 @@ struct Profile {
   Security security;
   std::uint16_t serial = 0, software = 0;
   Record state, schedule, site, directory, sample_format;
+  // Without slots a set is written over the one in force, and used from the next power-on on.
+  bool slots = true;
+  bool field_by_field = false;  // each field of a set has an identifier of its own (Field::did), in the order of `set`
   std::optional<std::uint16_t> set_in_force, set_inactive, set_factory;
   Layout set;
   Routine rotate, erase, commit, navigation_check;

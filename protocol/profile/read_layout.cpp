@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "protocol/toml_file/nearest_word.hpp"
 
@@ -129,10 +130,16 @@ bool check_constant(Section& section, const Field& field, double value) {
   return fits;
 }
 
-void read_field(Section& section, const RoleField* role, ByteOrder order, Field& field) {
+void read_field(Section& section, const RoleField* role, ByteOrder order, bool field_by_field, Field& field) {
   field.line = section.line();
   field.meaning = role == nullptr ? std::string_view() : role->meaning;
-  field.at = section.whole("at", 0, longest_record - 1, true).value_or(0);
+  if (field_by_field) {
+    if (const auto did = section.whole("did", 1, 0xFFFF, true)) {
+      field.did = static_cast<std::uint16_t>(*did);
+    }
+  } else {
+    field.at = section.whole("at", 0, longest_record - 1, true).value_or(0);
+  }
   read_type(section, order, 255, field);
   read_bits(section, field);
   field.count = section.whole("count", 1, 64).value_or(1);
@@ -206,8 +213,9 @@ void check_extents(Section& section, std::string_view prefix, const std::vector<
   }
 }
 
-void read_fields_of(Section& section, const RecordRole& role, bool repeated, ByteOrder order,
+void read_fields_of(Section& section, const RecordRole& role, bool repeated, ByteOrder order, bool field_by_field,
                     std::vector<Field>& fields) {
+  std::size_t next = 0;
   for (const std::string& name : section.keys()) {
     const RoleField* known = find_role(role, name);
     Section table = section.table(name);
@@ -230,7 +238,10 @@ void read_fields_of(Section& section, const RecordRole& role, bool repeated, Byt
     }
     Field field;
     field.name = name;
-    read_field(table, known, order, field);
+    read_field(table, known, order, field_by_field, field);
+    if (field_by_field) {
+      field.at = std::exchange(next, next + field.type.bytes * field.count);
+    }
     fields.push_back(std::move(field));
   }
 }
@@ -249,7 +260,7 @@ void read_repetition(Section& section, const RecordRole& role, ByteOrder order, 
     section.fault("count", fmt::format("no such field: {}", each.count));
   }
   Section fields = section.table("fields", true);
-  read_fields_of(fields, role, true, order, each.fields);
+  read_fields_of(fields, role, true, order, false, each.fields);
   std::vector<Extent> extents;
   for (const Field& field : each.fields) {
     extents.push_back(extent_of(field));
@@ -320,23 +331,30 @@ void check_record(Section& section, const Layout& layout) {
 
 }  // namespace
 
-void read_layout(Section& section, const RecordRole& role, ByteOrder order, Record& record) {
+void read_layout(Section& section, const RecordRole& role, ByteOrder order, Record& record, bool field_by_field) {
   Layout& layout = record.layout;
   layout.record = role.table;
   std::ranges::replace(layout.record, '_', ' ');
   const bool may_be_open = std::ranges::any_of(role.fields, &RoleField::repeated);
   Section fields = section.table("fields");
-  layout.bytes = section.whole("bytes", 1, longest_record, fields.there() && !may_be_open).value_or(0);
-  layout.fill = static_cast<std::uint8_t>(section.whole("fill", 0, 255).value_or(0));
-  read_fields_of(fields, role, false, order, layout.fields);
+  if (!field_by_field) {
+    layout.bytes = section.whole("bytes", 1, longest_record, fields.there() && !may_be_open).value_or(0);
+    layout.fill = static_cast<std::uint8_t>(section.whole("fill", 0, 255).value_or(0));
+  }
+  read_fields_of(fields, role, false, order, field_by_field, layout.fields);
+  if (field_by_field) {
+    layout.bytes = layout.fields.empty() ? 0 : layout.fields.back().end();
+  }
   Section each = section.table("each", may_be_open && section.there());
   if (!may_be_open && each.there()) {
     section.fault("each", fmt::format("nothing is repeated in {}", role.table));
   } else {
     read_repetition(each, role, order, layout);
   }
-  Section checksum = section.table("checksum");
-  read_checksum(checksum, order, layout);
+  if (!field_by_field) {
+    Section checksum = section.table("checksum");
+    read_checksum(checksum, order, layout);
+  }
   Section given = section.table("given");
   read_given(given, role, record);
   if (fields.there() || each.there()) {

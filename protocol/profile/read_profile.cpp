@@ -28,9 +28,12 @@ class Numbers {
  public:
   explicit Numbers(std::string_view what) : what_(what) {}
   void take(Section& section, std::string_view key, std::uint64_t number) {
-    const auto [other, fresh] = taken_.emplace(number, section.path_of(key));
+    take(section.faults(), section.line_of(key), section.path_of(key), number);
+  }
+  void take(Faults& faults, std::size_t line, const std::string& path, std::uint64_t number) {
+    const auto [other, fresh] = taken_.emplace(number, path);
     if (!fresh) {
-      section.fault(key, fmt::format("{} 0x{:04X} is that of {} already", what_, number, other->second));
+      faults.add(line, path, fmt::format("{} 0x{:04X} is that of {} already", what_, number, other->second));
     }
   }
 
@@ -171,11 +174,25 @@ class ProfileReader {
     if (!section.there()) {
       return;
     }
-    profile_.set_in_force = did(section, "in_force", true);
-    profile_.set_inactive = did(section, "inactive", true);
-    profile_.set_factory = did(section, "factory", false);
+    profile_.slots = section.flag("slots").value_or(true);
+    profile_.field_by_field = section.flag("field_by_field").value_or(false);
+    if (profile_.field_by_field && profile_.slots) {
+      section.fault("field_by_field", "each field has one identifier: an INS with slots needs two");
+    }
+    if (!profile_.field_by_field) {
+      profile_.set_in_force = did(section, "in_force", true);
+    }
+    if (profile_.slots) {
+      profile_.set_inactive = did(section, "inactive", true);
+      profile_.set_factory = did(section, "factory", false);
+    }
     Record record;
-    read_layout(section, set_role(), order_, record);
+    read_layout(section, set_role(), order_, record, profile_.field_by_field);
+    for (const Field& field : record.layout.fields) {
+      if (field.did) {
+        dids_.take(faults_, field.line, fmt::format("coefficients.fields.{}.did", field.name), *field.did);
+      }
+    }
     section.only_these();
     if (!record.given.empty()) {
       section.fault("given", "a set has no such values");
@@ -218,6 +235,11 @@ class ProfileReader {
     read_routine("erase", profile_.erase, false, false, false);
     read_routine("commit", profile_.commit, false, false, false);
     read_routine("navigation_check", profile_.navigation_check, false, true, true);
+    for (const auto& [name, routine] : {std::pair("erase", &profile_.erase), std::pair("commit", &profile_.commit)}) {
+      if (routine->id && !profile_.slots) {
+        root_.fault(name, "an INS without slots has none to erase or to commit");
+      }
+    }
     Section commit(faults_, nullptr, "commit.start", root_.line_of("commit"));
     if (profile_.commit.start.find("checksum") != nullptr && !profile_.set.checksum) {
       commit.fault("fields.checksum", "the record of coefficients has none");
@@ -232,8 +254,31 @@ class ProfileReader {
     }
   }
 
+  // ReadMemoryByAddress: pages of the run one behind the other.
+  void read_memory(Section& memory) {
+    Raw& raw = profile_.raw;
+    raw.way = Raw::Way::memory;
+    raw.by_page = false;
+    raw.address_bytes = memory.whole("address_bytes", 1, 4).value_or(4);
+    raw.size_bytes = memory.whole("size_bytes", 1, 4).value_or(2);
+    const auto largest = [](std::size_t bytes) { return (std::uint64_t{1} << (8 * bytes)) - 1; };
+    raw.first_address =
+        static_cast<std::uint32_t>(memory.whole("address", 0, largest(raw.address_bytes), true).value_or(0));
+    constexpr std::uint64_t shortest = 32, longest = 4094;  // ISO-TP's 12 bits of length, less the service
+    raw.longest_read = static_cast<std::uint32_t>(
+        memory.whole("longest", shortest, std::min(longest, largest(raw.size_bytes)), true).value_or(shortest));
+    memory.only_these();
+  }
+
   void read_raw() {
-    Section upload = root_.table("upload", true);
+    Section memory = root_.table("memory");
+    if (memory.there()) {
+      read_memory(memory);
+    }
+    Section upload = root_.table("upload", !memory.there());
+    if (upload.there() && memory.there()) {
+      upload.fault("", "and memory: the raw data are asked for in one way");
+    }
     if (upload.there()) {
       profile_.raw.by_page = upload.word("address", address_units, true).value_or("page") == "page";
       profile_.raw.address_bytes = upload.whole("address_bytes", 1, 4).value_or(4);

@@ -61,6 +61,31 @@ std::uint8_t code(auto value) { return static_cast<std::uint8_t>(value); }
 std::uint8_t format_code(UploadFormat format) { return code(format.size_bytes << 4U | format.address_bytes); }
 std::uint8_t key_level(std::uint8_t seed_level) { return code(seed_level + 1U); }
 
+Bytes with_range(Bytes request, std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
+  for (const auto& [value, count] : {std::pair(address, format.address_bytes), std::pair(bytes, format.size_bytes)}) {
+    for (std::size_t i = count; i-- > 0;) {
+      request.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    }
+  }
+  return request;
+}
+
+// Address and size behind `head` bytes, in a request of just that length.
+tl::expected<UploadRange, Nrc> parse_range(ByteView request, std::size_t head, UploadFormat format) {
+  if (request.size() != head + format.address_bytes + format.size_bytes) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  const auto number = [](ByteView bytes) {
+    std::uint32_t value = 0;
+    for (const std::uint8_t byte : bytes) {
+      value = value << 8U | byte;
+    }
+    return value;
+  };
+  return UploadRange{number(request.subspan(head, format.address_bytes)),
+                     number(request.subspan(head + format.address_bytes))};
+}
+
 }  // namespace
 
 Bytes session_request(Session session) { return message(service::session_control, code(session)); }
@@ -78,13 +103,10 @@ Bytes routine_request(RoutineAction action, std::uint16_t routine, ByteView opti
   return with_tail(message(service::routine_control, code(action), routine), option);
 }
 Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
-  Bytes request = message(service::request_upload, no_compression, format_code(format));
-  for (const auto& [value, count] : {std::pair(address, format.address_bytes), std::pair(bytes, format.size_bytes)}) {
-    for (std::size_t i = count; i-- > 0;) {
-      request.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-    }
-  }
-  return request;
+  return with_range(message(service::request_upload, no_compression, format_code(format)), address, bytes, format);
+}
+Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
+  return with_range(message(service::read_memory, format_code(format)), address, bytes, format);
 }
 Bytes transfer_request(std::uint8_t block) { return message(service::transfer_data, block); }
 Bytes transfer_exit_request() { return message(service::transfer_exit); }
@@ -145,12 +167,32 @@ Expected<std::uint32_t> read_upload_response(ByteView response) {
   return longest;
 }
 
+Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes) {
+  if (const auto checked = check(response, service::read_memory, {}, 2); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  if (response.size() != 1 + std::size_t{bytes}) {
+    return fail(ErrorKind::device,
+                fmt::format("ReadMemoryByAddress: {} bytes in answer to a request for {}", response.size() - 1, bytes));
+  }
+  return response.subspan(1);
+}
+
 Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block) {
   return check_code(response, service::transfer_data, block, 2).map([&] { return response.subspan(2); });
 }
 
 Expected<ByteView> read_transfer_exit_response(ByteView response) {
   return check(response, service::transfer_exit, {}, 1).map([&] { return response.subspan(1); });
+}
+
+tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadFormat format) {
+  constexpr std::size_t shortest = 4;  // service, format, one byte each of address and length
+  if (request.size() < shortest) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  return request[1] == format_code(format) ? parse_range(request, 2, format)
+                                           : tl::unexpected(Nrc::request_out_of_range);
 }
 
 tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format) {
@@ -161,18 +203,7 @@ tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadForm
   if (request[1] != no_compression || request[2] != format_code(format)) {
     return tl::unexpected(Nrc::request_out_of_range);
   }
-  if (request.size() != 3 + format.address_bytes + format.size_bytes) {  // for this format
-    return tl::unexpected(Nrc::incorrect_message_length);
-  }
-  const auto number = [](ByteView bytes) {
-    std::uint32_t value = 0;
-    for (const std::uint8_t byte : bytes) {
-      value = value << 8U | byte;
-    }
-    return value;
-  };
-  return UploadRange{number(request.subspan(3, format.address_bytes)),
-                     number(request.subspan(3 + format.address_bytes))};
+  return parse_range(request, 3, format);
 }
 
 tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request) {
@@ -218,6 +249,7 @@ void transfer_response(std::uint8_t block, ByteView data, Bytes& out) {
   out.assign({positive(service::transfer_data), block});
   out.insert(out.end(), data.begin(), data.end());
 }
+Bytes memory_response(ByteView data) { return with_tail(message(positive(service::read_memory)), data); }
 Bytes transfer_exit_response(ByteView parameters) {
   return with_tail(message(positive(service::transfer_exit)), parameters);
 }

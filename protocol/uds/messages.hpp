@@ -34,6 +34,7 @@ struct UploadFormat {
   std::size_t address_bytes = 4, size_bytes = 4;
 };
 Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
+Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
 Bytes transfer_request(std::uint8_t block);  // 1 first; after 0xFF comes 0x00
 Bytes transfer_exit_request();
 
@@ -53,6 +54,7 @@ struct SessionTimings {
 [[nodiscard]] Expected<ByteView> read_routine_response(ByteView response, RoutineAction action,
                                                        std::uint16_t routine);  // the status record
 [[nodiscard]] Expected<std::uint32_t> read_upload_response(ByteView response);  // longest TransferData response, bytes
+[[nodiscard]] Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes);   // the data, so many
 [[nodiscard]] Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block);  // the data
 [[nodiscard]] Expected<ByteView> read_transfer_exit_response(ByteView response);                 // the parameter record
 
@@ -70,6 +72,7 @@ struct RoutineCall {
   ByteView option;
 };
 [[nodiscard]] tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format = {});
+[[nodiscard]] tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadFormat format = {});
 [[nodiscard]] tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request);
 
 // Responses, as the server writes them
@@ -80,6 +83,7 @@ Bytes read_response(std::uint16_t did, ByteView record);
 Bytes write_response(std::uint16_t did);
 Bytes routine_response(const RoutineCall& call, ByteView status = {});
 Bytes upload_response(std::uint32_t max_block);
+Bytes memory_response(ByteView data);
 // Service, counter, data, into a buffer that is kept: 16 MB go this way.
 void transfer_response(std::uint8_t block, ByteView data, Bytes& out);
 Bytes transfer_exit_response(ByteView parameters = {});

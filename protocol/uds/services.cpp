@@ -9,6 +9,7 @@ std::string_view service_name(std::uint8_t service) {
     case service::session_control: return "DiagnosticSessionControl";
     case service::ecu_reset: return "ECUReset";
     case service::read_data: return "ReadDataByIdentifier";
+    case service::read_memory: return "ReadMemoryByAddress";
     case service::security_access: return "SecurityAccess";
     case service::write_data: return "WriteDataByIdentifier";
     case service::routine_control: return "RoutineControl";

@@ -11,6 +11,7 @@ namespace service {
 inline constexpr std::uint8_t session_control = 0x10;
 inline constexpr std::uint8_t ecu_reset = 0x11;
 inline constexpr std::uint8_t read_data = 0x22;
+inline constexpr std::uint8_t read_memory = 0x23;
 inline constexpr std::uint8_t security_access = 0x27;
 inline constexpr std::uint8_t write_data = 0x2E;
 inline constexpr std::uint8_t routine_control = 0x31;

@@ -31,13 +31,14 @@ constexpr std::uint16_t values(std::initializer_list<unsigned> list) {
   }
   return static_cast<std::uint16_t>(bits);
 }
-constexpr std::array<ServiceRule, 10> service_rules = {{
+constexpr std::array<ServiceRule, 11> service_rules = {{
     {service::session_control, true, 2, values({1, 2, 3})},
     {service::ecu_reset, false, 2, values({1, 2})},
     {service::read_data, true, 3, 0},
     {service::security_access, false, 2, values({uds::security_seed_level, uds::security_key_level})},
     {service::write_data, false, 4, 0},
     {service::routine_control, false, 2, values({1, 2, 3})},
+    {service::read_memory, false, 4, 0},
     {service::request_upload, false, 5, 0},
     {service::transfer_data, false, 2, 0},
     {service::transfer_exit, false, 1, 0},
@@ -112,7 +113,10 @@ std::optional<uds::Bytes> Diagnostics::take_answer() {
 // Figures 5 and 6, without security, which here belongs to sub-functions, identifiers and routines.
 Nrc Diagnostics::general_objection(View request) const {
   const auto rule = std::ranges::find(service_rules, request[0], &ServiceRule::id);
-  if (rule == service_rules.end()) {
+  const bool by_memory = profile_->raw.way == profile::Raw::Way::memory;
+  const bool uploads = request[0] == service::request_upload || request[0] == service::transfer_data ||
+                       request[0] == service::transfer_exit;
+  if (rule == service_rules.end() || (by_memory ? uploads : request[0] == service::read_memory)) {
     return Nrc::service_not_supported;
   }
   if (session_ == uds::Session::standard && !rule->in_default_session) {
@@ -148,6 +152,7 @@ Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& res
     case service::read_data: return read_data(request);
     case service::write_data: return write_data(request);
     case service::routine_control: return routine(request);
+    case service::read_memory: return upload_.memory(request);
     case service::request_upload: return upload_.request(request);
     case service::transfer_data: return upload_.transfer(request, response);
     case service::transfer_exit: return upload_.exit(request);
@@ -200,7 +205,14 @@ bool Diagnostics::knows(std::uint16_t did) const {
   const std::array dids{
       std::optional(p.serial), std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
       p.directory.did,         p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
-  return std::ranges::find(dids, std::optional(did)) != dids.end();
+  return std::ranges::find(dids, std::optional(did)) != dids.end() || field_of(did) != nullptr;
+}
+
+// Of a set that is told field by field.
+const profile::Field* Diagnostics::field_of(std::uint16_t did) const {
+  const auto& fields = profile_->set.fields;
+  const auto found = std::ranges::find(fields, std::optional(did), &profile::Field::did);
+  return found == fields.end() ? nullptr : &*found;
 }
 
 // nullopt: nothing is there yet, or the profile's fields do not hold it.
@@ -226,8 +238,14 @@ std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
   if (id == p.site.did) {
     return told(instrument_.site());
   }
+  if (const profile::Field* field = field_of(id)) {
+    const auto set = told(instrument_.coefficients().stored());
+    return set ? std::optional(uds::Bytes(set->begin() + static_cast<std::ptrdiff_t>(field->at),
+                                          set->begin() + static_cast<std::ptrdiff_t>(field->end())))
+               : std::nullopt;
+  }
   if (id == p.set_in_force) {
-    return told(instrument_.coefficients().in_force());
+    return told(p.slots ? instrument_.coefficients().in_force() : instrument_.coefficients().stored());
   }
   if (id == p.set_inactive) {
     return told_if_there(instrument_.coefficients().inactive());
@@ -254,7 +272,8 @@ Diagnostics::Reply Diagnostics::read_data(View request) {
 Diagnostics::Reply Diagnostics::write_data(View request) {
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
   const profile::Profile& p = *profile_;
-  if (id != p.schedule.did && id != p.site.did && id != p.set_inactive) {
+  const bool of_set = p.slots ? id == p.set_inactive : id == p.set_in_force || field_of(id) != nullptr;
+  if (id != p.schedule.did && id != p.site.did && !of_set) {
     return no(Nrc::request_out_of_range);
   }
   if (!unlocked()) {
@@ -263,7 +282,8 @@ Diagnostics::Reply Diagnostics::write_data(View request) {
   const View record = request.subspan(3);
   const Reply written = id == p.schedule.did ? write_schedule(record)
                         : id == p.site.did   ? write_site(record)
-                                             : write_coefficients(record);
+                        : p.slots            ? write_coefficients(record)
+                                             : write_over_set(id, record);
   return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
 }
 
@@ -311,6 +331,29 @@ Diagnostics::Reply Diagnostics::write_coefficients(View record) {
   if (!instrument_.coefficients().write_inactive(*set)) {
     return no(Nrc::general_programming_failure);  // not erased
   }
+  return uds::Bytes{};
+}
+
+// Without slots: the whole set, or the field that has this identifier.
+Diagnostics::Reply Diagnostics::write_over_set(std::uint16_t id, View record) {
+  const profile::Field* field = field_of(id);
+  const std::size_t bytes = field != nullptr ? field->end() - field->at : profile_->set.bytes;
+  if (record.size() != bytes) {
+    return no(Nrc::incorrect_message_length);
+  }
+  auto whole = profile::encode(*profile_, instrument_.coefficients().stored());
+  if (!whole) {
+    return no(Nrc::conditions_not_correct);
+  }
+  std::ranges::copy(record, whole->begin() + static_cast<std::ptrdiff_t>(field != nullptr ? field->at : 0));
+  const auto set = profile::decode_coefficients(*profile_, *whole);
+  if (!set) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (instrument_.busy()) {
+    return no(Nrc::conditions_not_correct);
+  }
+  instrument_.coefficients().write_over(*set);
   return uds::Bytes{};
 }
 

@@ -91,6 +91,25 @@ uds::Bytes RawUpload::data(const Upload& upload) {
   return data;
 }
 
+Reply RawUpload::memory(std::span<const std::uint8_t> request) {
+  const profile::Raw& raw = profile_->raw;
+  const auto range = uds::parse_memory_request(request, {raw.address_bytes, raw.size_bytes});
+  if (!range) {
+    return tl::unexpected(range.error());
+  }
+  const ins::DirectoryRecord directory = raw_.directory();
+  const std::uint64_t begin = raw.first_address + std::uint64_t{directory.first_page} * page_bytes();
+  const std::uint64_t end = raw.first_address + std::uint64_t{directory.pages_written} * page_bytes();
+  if (range->bytes == 0 || range->bytes > raw.longest_read || range->address < begin ||
+      std::uint64_t{range->address} + range->bytes > end) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  const std::uint32_t at = range->address - raw.first_address;
+  Reply reply = uds::memory_response(data(Upload{0, at + range->bytes, at, 1, range->bytes}));
+  pages_served_ = std::max(pages_served_, (at + range->bytes) / page_bytes());
+  return reply;
+}
+
 Reply RawUpload::exit(std::span<const std::uint8_t> request) {
   if (request.size() != 1) {
     return tl::unexpected(Nrc::incorrect_message_length);

@@ -26,6 +26,8 @@ class RawUpload {
   [[nodiscard]] uds::Reply request(std::span<const std::uint8_t> request);
   // Fills `response`, whose capacity is kept; an empty reply is a positive one.
   [[nodiscard]] uds::Reply transfer(std::span<const std::uint8_t> request, uds::Bytes& response);
+  // ReadMemoryByAddress (ISO 14229-1, 10.3), where the profile's raw data are asked for so.
+  [[nodiscard]] uds::Reply memory(std::span<const std::uint8_t> request);
   [[nodiscard]] uds::Reply exit(std::span<const std::uint8_t> request);
 
  private:

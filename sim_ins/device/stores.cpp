@@ -96,6 +96,18 @@ void CoefficientStore::commit_inactive() {
   program_word(flash_, block_of(inactive_slot()) * flash_block_bytes + mark_offset, mark);
 }
 
+ins::Coefficients CoefficientStore::stored() const {
+  return (committed(ins::Slot::a) ? read(ins::Slot::a) : factory()).value_or(ins::Coefficients{});
+}
+
+void CoefficientStore::write_over(const ins::Coefficients& set) {
+  const std::size_t at = block_of(ins::Slot::a) * flash_block_bytes;
+  const auto record = ins::encode(set);
+  flash_.erase(block_of(ins::Slot::a));
+  flash_.program(at, record);
+  program_word(flash_, at + mark_offset, ins::stored_crc(record) ^ mark_key);
+}
+
 void CounterStore::power_on() {
   counters_ = {};
   for (std::size_t copy = 0; copy < 2; ++copy) {

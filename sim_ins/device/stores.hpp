@@ -44,6 +44,11 @@ class CoefficientStore {
   std::optional<std::uint32_t> inactive_crc() const;  // of the record there, if it is whole
   void commit_inactive();                             // which must be whole
 
+  // Of an INS without slots, which has one place for its set (slot A) and its factory's: what is in force from the next
+  // power-on on. A power cut while it is written over leaves the factory's.
+  ins::Coefficients stored() const;
+  void write_over(const ins::Coefficients& set);
+
  private:
   std::optional<ins::Coefficients> read(ins::Slot slot) const;
   bool committed(ins::Slot slot) const;

@@ -259,7 +259,7 @@ std::string profile_page() {
   std::string text = "# Profile\n\n" + made_from("protocol/profile/roles");
   text +=
       R"(What an INS speaks, in TOML. [Your INS in an hour](your-ins.md) shows how one is made, `selfcal device lint` tells what is wrong with
-it, and `config/profiles` holds two. Unknown keys are faults.
+it, and `config/profiles` holds three. Unknown keys are faults.
 
 | table | keys |
 |---|---|
@@ -270,9 +270,10 @@ it, and `config/profiles` holds two. Unknown keys are faults.
 | `security` | `method` aes-cmac or none; `level` of requestSeed, odd |
 | `identity` | `serial`, `software`: data identifiers of ASCII |
 | `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
-| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record |
+| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at` |
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
-| `upload` | `address` page or byte; `address_bytes`, `size_bytes` |
+| `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
+| `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
 | `page` | a record |
 | `axes` | `imu`, `gimbal`: ours, in the INS's words, `-` for the other way round |
 

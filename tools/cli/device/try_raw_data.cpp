@@ -1,4 +1,4 @@
-// RequestUpload, TransferData, RequestTransferExit: the oldest page of the latest run.
+// RequestUpload, TransferData, RequestTransferExit, or ReadMemoryByAddress: the oldest page of the latest run.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -121,17 +121,82 @@ class Upload {
   Bytes page_;
 };
 
+Expected<ins::DirectoryRecord> directory_of(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const Exchange told = c.tester().ask(uds::read_request(*p.directory.did));
+  const auto record = uds::read_read_response(told.response, *p.directory.did);
+  return record ? profile::decode_directory(p, *record)
+                : fail(ErrorKind::device, fmt::format("the directory cannot be read: {}", words(told)));
+}
+
+constexpr std::string_view memory = "ISO 14229-1, 10.3";
+
+Bytes memory_request(const profile::Profile& p, std::uint64_t address, std::uint32_t bytes) {
+  return uds::memory_request(static_cast<std::uint32_t>(address), bytes, {p.raw.address_bytes, p.raw.size_bytes});
+}
+
+// A page, in as many requests as it takes.
+void try_page_of_memory(Conformance& c, const ins::DirectoryRecord& directory) {
+  const profile::Profile& p = c.profile();
+  const profile::Raw& raw = p.raw;
+  constexpr Requirement whole{"memory.page", memory, "The data are the page that was asked for, whole.", Mode::open};
+  if (directory.pages_written <= directory.first_page) {
+    return c.not_tried(whole, "the INS holds no raw data");
+  }
+  if (!c.ready(whole)) {
+    return;
+  }
+  const std::uint64_t begin = raw.first_address + std::uint64_t{directory.first_page} * raw.page.bytes;
+  Bytes page;
+  std::string fault;
+  while (fault.empty() && page.size() < raw.page.bytes) {
+    const auto wanted =
+        static_cast<std::uint32_t>(std::min<std::size_t>(raw.longest_read, raw.page.bytes - page.size()));
+    const Exchange told = c.tester().ask(memory_request(p, begin + page.size(), wanted));
+    const auto data = uds::read_memory_response(told.response, wanted);
+    if (data) {
+      page.insert(page.end(), data->begin(), data->end());
+    } else {
+      fault = fmt::format("{}: {}", words(told), data.error().message);
+    }
+  }
+  fault = fault.empty() ? fault_of_page(p, page, directory.first_page, directory.run_id) : fault;
+  c.judged(whole, fmt::format("{} and so on", hex(memory_request(p, begin, raw.longest_read))),
+           fmt::format("page {} of run {}", directory.first_page, directory.run_id),
+           fault.empty() ? "that page" : fault, fault.empty());
+}
+
+void try_memory(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const auto directory = directory_of(c);
+  constexpr Requirement range{"memory.range", memory, "Memory outside the pages is refused.", Mode::open};
+  if (!directory) {
+    return c.not_tried(range, directory.error().message);
+  }
+  const std::uint64_t beyond = p.raw.first_address + (std::uint64_t{directory->pages_written} + 1) * p.raw.page.bytes;
+  c.refused(range, memory_request(p, beyond, 1), {Nrc::request_out_of_range});
+  Bytes format = memory_request(p, p.raw.first_address, 1);
+  format[1] = 0x11;
+  c.refused({"memory.format", memory, "Another format of address and size is refused.", Mode::open}, format,
+            {Nrc::request_out_of_range, Nrc::incorrect_message_length});
+  c.refused({"memory.session", "ISO 14229-1, 7.5", "In the default session no memory is told."},
+            memory_request(p, p.raw.first_address, 1),
+            {Nrc::service_not_supported_in_session, Nrc::security_access_denied});
+  try_page_of_memory(c, *directory);
+}
+
 }  // namespace
 
 void try_raw_data(Conformance& c) {
   const profile::Profile& p = c.profile();
+  if (p.raw.way == profile::Raw::Way::memory) {
+    return try_memory(c);
+  }
   c.refused({"transfer.none", transfer, "Without an upload there is no block.", Mode::open}, uds::transfer_request(1),
             {Nrc::request_sequence_error});
   c.refused({"transfer.no_exit", leave, "Without an upload there is none to end.", Mode::open},
             uds::transfer_exit_request(), {Nrc::request_sequence_error});
-  const Exchange told = c.tester().ask(uds::read_request(*p.directory.did));
-  const auto record = uds::read_read_response(told.response, *p.directory.did);
-  const auto directory = record ? profile::decode_directory(p, *record) : tl::unexpected(record.error());
+  const auto directory = directory_of(c);
   Bytes format = begin_request(p, 0);
   format[1] = 0x11;
   c.refused({"upload.format", upload, "Compressed or encrypted data are refused.", Mode::open}, format,
@@ -139,7 +204,7 @@ void try_raw_data(Conformance& c) {
   constexpr Requirement begin{"upload.begin", upload, "The upload of a page begins, and the longest block is told.",
                               Mode::open};
   if (!directory) {
-    return c.not_tried(begin, fmt::format("the directory cannot be read: {}", words(told)));
+    return c.not_tried(begin, directory.error().message);
   }
   c.refused({"upload.range", upload, "Pages that are not there are refused.", Mode::open},
             begin_request(p, directory->pages_written + 1), {Nrc::request_out_of_range});

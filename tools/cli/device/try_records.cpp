@@ -88,6 +88,12 @@ void try_records(Conformance& c) {
   try_record(c, "set_inactive", p.set_inactive, May::be_absent, of_set);
   try_record(c, "set_factory", p.set_factory, May::be_absent, of_set);
 
+  for (const profile::Field& field : p.set.fields) {
+    try_record(c, field.name, field.did, May::be_there, [&](ByteView b) -> std::string {
+      const std::size_t bytes = field.end() - field.at;
+      return b.size() == bytes ? "" : fmt::format("{} bytes, {} expected", b.size(), bytes);
+    });
+  }
   c.refused({"read.unknown", clause, "An identifier that is none is refused."}, uds::read_request(unused_did),
             {Nrc::request_out_of_range});
   c.refused({"read.too_short", clause, "Half an identifier is refused."}, Bytes{0x22, 0xF1},

@@ -96,6 +96,23 @@ void try_erase(Conformance& c, const Requirement& requirement) {
            blank);
 }
 
+// Of an INS without slots: what is there already, or of a set that is told field by field its first field.
+void try_writing_over(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const std::uint16_t did = p.field_by_field ? p.set.fields.front().did.value_or(0) : p.set_in_force.value_or(0);
+  constexpr Requirement written{"set.write_over", writing, "What is there is written again, and read back as written.",
+                                Mode::open, true};
+  const Exchange told = c.tester().ask(uds::read_request(did));
+  const auto record = uds::read_read_response(told.response, did);
+  if (!record) {
+    return c.not_tried(written, fmt::format("it cannot be read: {}", words(told)));
+  }
+  const Bytes held(record->begin(), record->end());
+  c.refused({"set.too_short", writing, "A record of coefficients that is too short is refused.", Mode::open, true},
+            without_last(uds::write_request(did, held)), {Nrc::incorrect_message_length});
+  try_write(c, written, did, held);
+}
+
 // A set that is the one in force, in the inactive slot; erased afterwards.
 void try_set(Conformance& c) {
   const profile::Profile& p = c.profile();
@@ -173,7 +190,7 @@ void try_reset(Conformance& c) {
 
 void try_writing(Conformance& c) {
   try_schedule(c);
-  try_set(c);
+  c.profile().slots ? try_set(c) : try_writing_over(c);
   try_reset(c);
 }
 
