@@ -5,6 +5,7 @@ A fenced block says in its info string where its commands are run:
   sh service  with virtual INS and service on vcan (service_commands_test)
   sh package  on a minimal Debian with systemd: the lines stand in tools/package/README.md too, and tests/systemd/run types them
   sh depot    with a hub of its own: tests/hub/handbook_test
+  sh ins      with an INS of somebody else's on vcan0: own_ins_test; the service has what the page's `toml ins` block says
   sh demo     tools/demo and tests/run themselves
 `# status N` behind a command is its exit status, 0 where nothing is said. A block `output` after it is what it prints; a
 line `...` stands for lines left out."""
@@ -13,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-KINDS = {"sh", "sh service", "sh package", "sh depot", "sh demo"}
+KINDS = {"sh", "sh service", "sh package", "sh depot", "sh ins", "sh demo"}
 PAGES = [ROOT / "README.md", ROOT / "tools" / "package" / "man" / "selfcal.1", *sorted((ROOT / "tools" / "handbook").glob("*.md"))]
 
 

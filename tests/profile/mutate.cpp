@@ -116,6 +116,11 @@ const std::vector<Way>& ways() {
       {"scale that is none", R"(scale = [-\w.]+)", {"scale = 0", "scale = nan", "scale = \"1\""}},
       {"constant that does not fit", R"(constant = \w+)", {"constant = 1e30", "constant = -5", "constant = 0.5"}},
       {"signed count as unsigned", R"re((delta_\w+ = \{ at = \d+, type = )"i)re", {"$1\"u"}},
+      {"identifier of a field twice", R"(\{ did = 0x[0-9A-F]+)", {"{ did = @SERIAL@"}},
+      {"slots, and one identifier", R"(^slots = false)", {"slots = true"}, true},
+      {"field by field, and not", R"(^field_by_field = true)", {"field_by_field = false"}, true},
+      {"memory in no or too many bytes", R"(^longest = \d+)", {"longest = 0", "longest = 70000"}},
+      {"memory beyond its address", R"(^address = 0x\w+)", {"address = 0x180000000"}},
       {"unknown section", R"(^\[(\w+)\])", {"[$1s]", "[my_$1]"}},
       {"broken TOML", R"( \}$)", {""}, false, R"(^#)"},
       {"broken text", R"re(= "(\w[^"]*)")re", {"= \"$1"}, false, R"(\{)"}};
@@ -239,7 +244,8 @@ Lines read(const std::string& path) {
 
 int trial(std::size_t count, std::uint64_t seed) {
   const std::vector<Lines> profiles{read(SELFCAL_SOURCE_DIR "/config/profiles/selfcal.toml"),
-                                    read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml")};
+                                    read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"),
+                                    read(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml")};
   Random random(seed);
   std::set<std::string> seen;
   std::map<std::string, int> by_way;

@@ -65,6 +65,22 @@ TEST(TransitionTable, ANavigationCheckIsEndedBeforeARunEnds) {
   }
 }
 
+// What was written may stand over the old set: every way to a failure or abort leads through putting it back; only a link
+// that is gone for good, and a putting back that cannot be done, end without.
+TEST(TransitionTable, WithoutSlotsTheOldSetIsPutBackBeforeARunEnds) {
+  const auto no_slots = [](Guard guard) { return guard == Guard::always || guard == Guard::no_slots; };
+  for (const State state : {State::writing, State::verifying, State::committing, State::resetting, State::confirming}) {
+    for (const Event event : {Event::step_failed, Event::abort_requested, Event::recovered}) {
+      const Transition* row = find_transition(state, event, no_slots);
+      ASSERT_NE(row, nullptr) << name(state) << " " << name(event);
+      EXPECT_FALSE(is_final(row->next)) << name(state) << " " << name(event);
+      EXPECT_TRUE(event != Event::step_failed || row->action == Action::put_back) << name(state);
+    }
+  }
+  // Half of a set that was being written is never built upon.
+  EXPECT_EQ(find_transition(State::writing, Event::recovered, no_slots)->action, Action::put_back);
+}
+
 // Rotation is commanded from one place only, and never upon recovery.
 TEST(TransitionTable, NoSecondRotationOnTopOfAFirst) {
   int starts = 0;

@@ -271,5 +271,54 @@ TEST(Profile, OneFactorInPlaceOfTwoKeepsTheMeanOfBothSlopes) {
   EXPECT_DOUBLE_EQ(read->value[9], -156.5e-6);
 }
 
+// Without slots, field by field, from memory.
+TEST(MemoryProfile, HasAnIdentifierForEachFieldAndOneFactor) {
+  const auto profile = load_profile(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  const Profile& p = **profile;
+  EXPECT_FALSE(p.slots);
+  EXPECT_TRUE(p.field_by_field);
+  EXPECT_EQ(p.set.fields.size(), 22U);
+  EXPECT_EQ(p.set.bytes, 2U + 12 * 4 + 9 * 4);
+  EXPECT_EQ(p.set.fields.back().name, "version");  // written last
+  EXPECT_EQ(p.raw.way, Raw::Way::memory);
+  EXPECT_EQ(p.raw.page.most_repetitions(), 63U);  // (2048 - 12) / 32
+  ins::Coefficients set;
+  set.version = 3;
+  const std::size_t plus = 6, minus = 9;  // K+ and K- of x, behind three biases and three drifts
+  set.value[plus] = 101e-6;
+  set.value[minus] = -99e-6;
+  const auto bytes = encode(p, set);
+  ASSERT_TRUE(bytes);
+  const Field* factor = p.set.find("accel_scale_x");
+  EXPECT_EQ(factor->did, 0x4107);
+  // (101 + 99) / 2 ppm in counts of 0.001 ppm: 100,000.
+  EXPECT_EQ((Bytes(bytes->begin() + static_cast<std::ptrdiff_t>(factor->at),
+                   bytes->begin() + static_cast<std::ptrdiff_t>(factor->end()))),
+            (Bytes{0x00, 0x01, 0x86, 0xA0}));
+  const auto held = decode_coefficients(p, *bytes);
+  ASSERT_TRUE(held);
+  EXPECT_NEAR(held->value[plus], 100e-6, 1e-15);
+  EXPECT_NEAR(held->value[minus], -100e-6, 1e-15);
+}
+
+// Each fault is told with its line; what cannot be together is.
+TEST(MemoryProfile, WhatDoesNotFitTogetherIsRefused) {
+  std::ifstream in(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml");
+  std::stringstream content;
+  content << in.rdbuf();
+  const std::string whole = content.str();
+  const auto fault = [&](std::string_view was, std::string_view is) { return complaint(with(whole, was, is)); };
+  ASSERT_EQ(complaint(whole), "");
+  EXPECT_THAT(fault("slots = false", "slots = true"), testing::HasSubstr("an INS with slots needs two"));
+  EXPECT_THAT(fault("did = 0x4102", "did = 0x4101"),
+              testing::HasSubstr("0x4101 is that of coefficients.fields.accel_bias_x.did already"));
+  EXPECT_THAT(fault("did = 0x4102, ", ""), testing::HasSubstr("coefficients.fields.accel_bias_y.did: missing"));
+  EXPECT_THAT(fault("[memory]", "[upload]\naddress = \"page\"\n\n[memory]"),
+              testing::HasSubstr("asked for in one way"));
+  EXPECT_THAT(fault("longest = 512", "longest = 70000"), testing::HasSubstr("memory.longest"));
+  EXPECT_THAT(fault("[memory]", "[erase]\nroutine = 0x4202\n\n[memory]"), testing::HasSubstr("without slots"));
+}
+
 }  // namespace
 }  // namespace selfcal::profile

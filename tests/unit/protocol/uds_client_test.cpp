@@ -253,8 +253,24 @@ TEST(UdsMessages, RequestsAreLiteral) {
   EXPECT_EQ(write_request(0x0202, Bytes{1}), (Bytes{0x2E, 2, 2, 1}));
   EXPECT_EQ(routine_request(RoutineAction::start, 0x0301, Bytes{0, 0, 0, 5}), (Bytes{0x31, 1, 3, 1, 0, 0, 0, 5}));
   EXPECT_EQ(upload_request(0x01020304, 0x1000), (Bytes{0x35, 0, 0x44, 1, 2, 3, 4, 0, 0, 0x10, 0}));
+  EXPECT_EQ(memory_request(0x80000102, 0x200, {4, 2}), (Bytes{0x23, 0x24, 0x80, 0, 1, 2, 2, 0}));
   EXPECT_EQ(transfer_request(255), (Bytes{0x36, 255}));
   EXPECT_EQ(transfer_exit_request(), (Bytes{0x37}));
+}
+
+TEST(UdsMessages, ReadMemoryByAddress) {
+  const auto range = parse_memory_request(Bytes{0x23, 0x24, 0x80, 0, 1, 2, 2, 0}, {4, 2});
+  ASSERT_TRUE(range);
+  EXPECT_EQ(range->address, 0x80000102U);
+  EXPECT_EQ(range->bytes, 0x200U);
+  EXPECT_EQ(parse_memory_request(Bytes{0x23, 0x14, 0x80, 0, 1, 2, 2}, {4, 2}).error(), Nrc::request_out_of_range);
+  EXPECT_EQ(parse_memory_request(Bytes{0x23, 0x24, 0x80, 0, 1, 2, 2}, {4, 2}).error(), Nrc::incorrect_message_length);
+  EXPECT_EQ(parse_memory_request(Bytes{0x23, 0x24}, {4, 2}).error(), Nrc::incorrect_message_length);
+  EXPECT_EQ(memory_response(Bytes{7, 8}), (Bytes{0x63, 7, 8}));
+  const Bytes response{0x63, 7, 8};
+  EXPECT_EQ(read_memory_response(response, 2)->size(), 2U);
+  EXPECT_EQ(read_memory_response(response, 3).error().message,
+            "ReadMemoryByAddress: 2 bytes in answer to a request for 3");
 }
 
 TEST(UdsMessages, ResponsesAreReadAndChecked) {

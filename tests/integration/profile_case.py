@@ -1,0 +1,57 @@
+"""What the tests of profiles share: benches under a profile, with the virtual INS or with a server of somebody else's."""
+import subprocess
+import sys
+import time
+
+import case
+
+PROFILES = case.ROOT / "config" / "profiles"
+FOREIGN = case.ROOT / "tests" / "foreign"
+SPEED, DWELL_S = 60.0, 20.0
+SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml does not tell
+
+
+class UnderProfile(case.OnBench):
+    def calibrate(self, unit):
+        run = unit.wait_for_end(unit.start_run("--schedule", "horizontal", "--force", "short dwell"))
+        self.assertEqual((run["state"], run["exit_status"]), ("completed", case.DONE), run["reason"])
+        return run
+
+    def bench_of(self, profile, **ins):
+        site = SITE if profile == "memory.toml" else {}
+        return self.bench(speed=SPEED, ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins,
+                          sim_options=["--profile", PROFILES / profile])
+
+    def assert_same(self, run, own, what):
+        """To a tenth of sigma: the same sensor data through other bytes. What differs is the gimbal's read-out, rounded to
+        20 arcseconds twice, and the time of a page's temperature."""
+        largest = max(abs(a["value"] - b["value"]) / b["sigma"]
+                      for a, b in zip(run["result"]["parameters"], own["result"]["parameters"], strict=True))
+        print(f"{what} against our own INS: 24 values, largest difference {largest:.1e} sigma", flush=True)
+        self.assertLess(largest, 0.1)
+
+    def bench_with(self, server, profile, own, *more):
+        """A bench on which a server of somebody else's is the INS, with the data of the virtual one."""
+        unit = self.bench_of(profile)
+        recording = unit.folder / "direct.h5"
+        unit.selfcal("simulate", "--config", unit.folder / "sim.toml", "--schedule", "horizontal", "--dwell", DWELL_S,
+                     "--seed", unit.seed, "-o", recording)
+        memory = unit.folder / "memory.json"
+        log = open(unit.folder / "foreign.log", "wb")
+        self.addCleanup(log.close)
+        command = [sys.executable, "-B", FOREIGN / server, unit.interface, recording, *own(unit), SPEED, memory, *more]
+        process = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.terminate)
+        end = time.monotonic() + 60
+        while not memory.exists() and time.monotonic() < end:
+            time.sleep(0.1)
+        unit.start_daemon()
+        return unit, memory
+
+    def calibrate_or_tell(self, unit):
+        try:
+            return self.calibrate(unit)
+        except BaseException:
+            print((unit.folder / "foreign.log").read_text(encoding="utf-8"), flush=True)
+            raise
