@@ -32,6 +32,7 @@ inline constexpr Schema bus{"selfcal.bus"};
 inline constexpr Schema conformance{"selfcal.conformance"};  // answer of `selfcal device check`
 inline constexpr Schema probe{"selfcal.probe"};              // answer of `selfcal device probe`
 inline constexpr Schema database{"selfcal.database"};        // answer of `selfcal db`
+inline constexpr Schema batch{"selfcal.batch"};              // `selfcal batch status`
 
 // The file that a document answers for. An empty name stands for none.
 struct InputFile {

@@ -4,6 +4,7 @@
 #include <openssl/evp.h>
 
 #include <array>
+#include <cassert>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -16,6 +17,16 @@ constexpr std::size_t piece_bytes = 65536;
 
 tl::unexpected<Error> unreadable(const std::filesystem::path& path) {
   return fail(ErrorKind::bad_input, fmt::format("{}: cannot read: {}", path.string(), std::strerror(errno)));
+}
+
+using Digest = std::array<unsigned char, EVP_MAX_MD_SIZE>;
+
+std::string hexadecimal(const Digest& digest, unsigned int length) {
+  std::string text;
+  for (unsigned int k = 0; k < length; ++k) {
+    text += fmt::format("{:02x}", digest[k]);
+  }
+  return text;
 }
 
 }  // namespace
@@ -38,16 +49,21 @@ Expected<std::string> sha256_of_file(const std::filesystem::path& path) {
   if (std::ferror(file.get()) != 0) {
     return unreadable(path);
   }
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  Digest digest{};
   unsigned int length = 0;
   if (!good || EVP_DigestFinal_ex(context.get(), digest.data(), &length) != 1) {
     return fail(ErrorKind::internal, "OpenSSL cannot compute SHA-256");
   }
-  std::string text;
-  for (unsigned int k = 0; k < length; ++k) {
-    text += fmt::format("{:02x}", digest[k]);
-  }
-  return text;
+  return hexadecimal(digest, length);
+}
+
+std::string sha256_of_text(std::string_view text) {
+  Digest digest{};
+  unsigned int length = 0;
+  const int good = EVP_Digest(text.data(), text.size(), digest.data(), &length, EVP_sha256(), nullptr);
+  assert(good == 1);
+  static_cast<void>(good);
+  return hexadecimal(digest, length);
 }
 
 }  // namespace selfcal

@@ -4,6 +4,8 @@
 //                                                         one JSON line each
 //   selfcal_blind_generate record SEED CLEAN REPEATS KEY N FILE
 //                                                         writes the recording of case N, prints what is assumed
+//   selfcal_blind_generate draw SEED CLEAN REPEATS N FILE both of case N alone: its recording; its line of the key and
+//                                                         what is assumed as one JSON object
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -113,8 +115,8 @@ int write_key(const std::vector<blind::Recipe>& recipes, std::uint64_t seed, con
   return 0;
 }
 
-// The physics that the key's line of this case holds.
-Expected<sim::ConcealedPhysics> physics_in(const std::string& key, int number) {
+// The key's line of this case.
+Expected<std::string> line_of(const std::string& key, int number) {
   std::ifstream file(key);
   std::string line;
   for (int n = -1; n < number; ++n) {
@@ -122,10 +124,15 @@ Expected<sim::ConcealedPhysics> physics_in(const std::string& key, int number) {
       return fail(ErrorKind::bad_input, fmt::format("{}: no case {}", key, number));
     }
   }
+  return line;
+}
+
+// The physics that it holds.
+Expected<sim::ConcealedPhysics> physics_in(const std::string& line, int number) {
   sim::ConcealedPhysics physics;
   const auto j = nlohmann::json::parse(line, nullptr, false);
   if (j.is_discarded() || !j.contains("effects")) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: line {} is no case", key, number + 1));
+    return fail(ErrorKind::bad_input, fmt::format("key: line {} is no case", number + 1));
   }
   for (const auto& e : j.at("effects")) {
     sim::PhysicsEffect effect{e.at("id").get<std::string>(), {}};
@@ -140,8 +147,10 @@ Expected<sim::ConcealedPhysics> physics_in(const std::string& key, int number) {
   return physics;
 }
 
-int write_one(const blind::Case& c, const std::string& key, const std::string& path) {
-  const auto physics = physics_in(key, c.number);
+// What `printed` makes of what is assumed.
+template <typename Printed>
+int write_one(const blind::Case& c, const std::string& line, const std::string& path, const Printed& printed) {
+  const auto physics = physics_in(line, c.number);
   if (!physics) {
     return complain(physics.error());
   }
@@ -152,8 +161,24 @@ int write_one(const blind::Case& c, const std::string& key, const std::string& p
   if (const auto written = write_recording(*recording, path); !written) {
     return complain(written.error());
   }
-  fmt::print("{}\n", assumed(c.config).dump());
+  fmt::print("{}\n", printed(assumed(c.config)).dump());
   return 0;
+}
+
+int write_recorded(const blind::Case& c, const std::string& key, const std::string& path) {
+  const auto line = line_of(key, c.number);
+  return line ? write_one(c, *line, path, [](ordered_json noise) { return noise; }) : complain(line.error());
+}
+
+int write_drawn(const blind::Recipe& recipe, int number, std::uint64_t seed, const std::string& path) {
+  const auto drawn = blind::draw_case(recipe, number, seed);
+  const auto line = drawn ? to_json(*drawn) : tl::unexpected(drawn.error());
+  if (!line) {
+    return complain(line.error());
+  }
+  return write_one(blind::draw_installation(recipe, number, seed), line->dump(), path, [&](const ordered_json& noise) {
+    return ordered_json{{"case", *line}, {"assumed", noise}};
+  });
 }
 
 template <typename T>
@@ -171,11 +196,13 @@ int run(std::span<char*> a) {
   const std::string command = a.size() > 1 ? a[1] : "";
   const bool key = command == "key" && a.size() == 7;
   const bool record = command == "record" && a.size() == 8;
-  if ((!key && !record) || !parse(a[2], seed) || !parse(a[3], size.clean) || !parse(a[4], size.repeats) ||
-      (record && !parse(a[6], number)) || (key && !parse(a[5], first))) {
+  const bool draw = command == "draw" && a.size() == 7;
+  if ((!key && !record && !draw) || !parse(a[2], seed) || !parse(a[3], size.clean) || !parse(a[4], size.repeats) ||
+      (record && !parse(a[6], number)) || (draw && !parse(a[5], number)) || (key && !parse(a[5], first))) {
     fmt::print(stderr,
                "usage: selfcal_blind_generate key SEED CLEAN REPEATS FIRST FILE\n"
-               "       selfcal_blind_generate record SEED CLEAN REPEATS KEY NUMBER FILE\n");
+               "       selfcal_blind_generate record SEED CLEAN REPEATS KEY NUMBER FILE\n"
+               "       selfcal_blind_generate draw SEED CLEAN REPEATS NUMBER FILE\n");
     return 2;
   }
   auto recipes = blind::recipes(size, seed);
@@ -186,7 +213,9 @@ int run(std::span<char*> a) {
   if (number < 0 || number >= static_cast<int>(recipes.size())) {
     return complain({ErrorKind::usage, fmt::format("case {}: there are {}", number, recipes.size())});
   }
-  return write_one(blind::draw_installation(recipes[static_cast<std::size_t>(number)], number, seed), a[5], a[7]);
+  const blind::Recipe& recipe = recipes[static_cast<std::size_t>(number)];
+  return draw ? write_drawn(recipe, number, seed, a[6])
+              : write_recorded(blind::draw_installation(recipe, number, seed), a[5], a[7]);
 }
 
 }  // namespace

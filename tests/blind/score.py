@@ -139,7 +139,7 @@ class Score:
         self.coverage()
         self.parameters()
         self.rivals()
-        cost = [answers[c["number"]]["cpu_s"] for c in cases]
+        cost = [answers[c["number"]].get("cpu_s", math.nan) for c in cases]   # a batch keeps none in its results
         self.say(f"cost: {sum(cost):.0f} s of CPU for {len(cost)} diagnoses, longest {max(cost, default=0):.1f} s")
 
     def say(self, line=""):

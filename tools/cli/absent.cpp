@@ -15,7 +15,11 @@ namespace {
 const CommandRegistration report{
     {"report", "a calibration as a page with plots (not built into this program)", configure}};
 #endif
+#ifdef SELFCAL_WITHOUT_METRICS
+const CommandRegistration metrics{{"metrics", "figures for Prometheus (not built into this program)", configure}};
+#endif
 #ifdef SELFCAL_WITHOUT_HUB
+const CommandRegistration batch{{"batch", "the same work on many recordings (not built into this program)", configure}};
 const CommandRegistration fleet{{"fleet", "a depot's units and sets (not built into this program)", configure}};
 const CommandRegistration hub{{"hub", "a depot's memory (not built into this program)", configure}};
 #endif

@@ -21,6 +21,9 @@
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/output_file.hpp"
 #include "tools/cli/page_writer.hpp"
+#ifndef SELFCAL_WITHOUT_HUB
+#include "tools/cli/report_hub.hpp"
+#endif
 #include "tools/cli/terminal.hpp"
 #include "tools/report/calibration_document.hpp"
 #include "tools/report/fleet_document.hpp"
@@ -41,6 +44,7 @@ struct ReportArguments {
   std::vector<std::string> subjects;
   std::string output;
   std::string past;
+  std::string hub;
   std::vector<std::string> tolerance;
   NoiseArguments noise;
   bool fleet = false;
@@ -226,6 +230,11 @@ Expected<std::vector<Json>> histories_of_daemon() {
 }
 
 Expected<Json> fleet_page(const ReportArguments& arguments) {
+#ifndef SELFCAL_WITHOUT_HUB
+  if (!arguments.hub.empty()) {
+    return fleet_page_of_hub(arguments.hub, arguments.fleet_options);
+  }
+#endif
   std::vector<Json> histories;
   if (arguments.subjects.empty()) {
     Expected<std::vector<Json>> live = histories_of_daemon();
@@ -298,6 +307,9 @@ CommandRun configure(Options& options) {
   options.text("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)", Needed::yes);
   options.flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
   options.text("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
+#ifndef SELFCAL_WITHOUT_HUB
+  options.text("--hub", arguments->hub, "with --history: all units of a depot's hub, by its connection string");
+#endif
   options.number("--interval", arguments->fleet_options.interval_days, range::interval,
                  "with --history: days between calibrations");
   options.text("--as-of", arguments->fleet_options.as_of_utc, "with --history: UTC of the page; now if left out");

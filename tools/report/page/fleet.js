@@ -4,6 +4,23 @@
 const soonDays = 30;
 const unitDashes = [undefined, [8, 4], [2, 3], [10, 3, 2, 3]];
 
+// A depot's hub says which sets it has; a set's own page has none.
+function showSets(report) {
+  const place = document.getElementById('set-table');
+  if (!report.sets) {
+    place.remove();
+    return;
+  }
+  const sets = report.sets;
+  place.append(element('h2', {}, 'Sets'), table([
+    {title: 'set', cells: sets.map((s) => s.set), class: 'left'},
+    {title: 'runs', cells: sets.map((s) => String(s.runs))},
+    {title: 'sent last', cells: sets.map((s) => day(s.last_seen_utc)), class: 'left'},
+    {title: 'refused', cells: sets.map((s) => String(s.refused))},
+    {title: 'biased in', cells: sets.map((s) => (s.accused_of ? element('span', {class: 'bad'}, `✘ ${s.accused_of}`) : '–')), class: 'left'},
+  ], {id: 'sets'}));
+}
+
 function dueState(unit) {
   if (unit.due_in_days === null) {
     return element('span', {class: 'bad'}, '✘ never calibrated');
@@ -28,6 +45,7 @@ function showUnits(report) {
     {title: 'unit', cells: units.map((u) => u.serial), class: 'left'},
     {title: 'last calibrated', cells: units.map((u) => day(u.last_run?.started_utc)), class: 'left'},
     {title: 'due', cells: units.map((u) => day(u.due_utc)), class: 'left'},
+    ...(units.some((u) => u.due_for) ? [{title: 'for', cells: units.map((u) => u.due_for ?? '–'), class: 'left'}] : []),
     {title: 'state', cells: units.map(dueState), class: 'left'},
     {title: 'runs', cells: units.map((u) => String(u.runs.length))},
     {title: 'parameters that drift', cells: units.map((u) => String(u.parameters.filter((p) => p.drifts).length))},
@@ -90,6 +108,9 @@ function showTrends(report) {
       }
     }
   };
+  if (report.units.length > 8) {   // more lines than anybody can tell apart
+    choice.value = report.units[0].serial;
+  }
   choice.addEventListener('change', draw);
   draw();
 }
@@ -106,6 +127,7 @@ function showFleet(report) {
   fillFacts([['As of', report.as_of_utc], ['Interval', `${significant(report.interval_days, 4)} days`],
              ['Units', String(report.units.length)]]);
   showOrigin(report);
+  showSets(report);
   showUnits(report);
   showDrifts(report);
   showTrends(report);
