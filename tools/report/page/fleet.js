@@ -120,7 +120,8 @@ function showFleet(report) {
   const due = report.units.filter((u) => u.due_in_days === null || u.due_in_days < 0);
   const drifting = report.units.filter((u) => u.parameters.some((p) => p.drifts));
   const passing = report.units.filter(limitOf);
-  const list = (units) => (units.length === 0 ? '' : ` (${units.map((u) => u.serial).join(', ')})`);
+  const named = (units) => units.slice(0, 8).map((u) => u.serial).join(', ') + (units.length > 8 ? ' …' : '');
+  const list = (units) => (units.length === 0 ? '' : ` (${named(units)})`);
   showBanner({standing: due.length === 0 ? 'good' : 'bad',
               verdict: `${due.length} of ${report.units.length} units are due${list(due)}; ${drifting.length} drift${list(drifting)}; `
                   + `${passing.length} will pass a limit within 20 years${list(passing)}.`});
