@@ -39,6 +39,20 @@ TEST(ParameterTrend, OneValueHasNoTrendAndUndeterminedOnesDoNotCount) {
   EXPECT_FALSE(parameter_trend({value(2020, 10), vague}));
 }
 
+// Three runs of one morning scatter about a level; a slope a year of them is noise times thousands.
+TEST(ParameterTrend, RunsMinutesApartHaveNoSlope) {
+  std::vector<ParameterRecord> morning;
+  for (const auto& [minute, figure] : {std::pair{0, 10.0}, {40, 11.0}, {80, 12.0}}) {
+    morning.push_back({1, fmt::format("2026-01-01T{:02}:{:02}:00Z", 8 + minute / 60, minute % 60), figure, 1.0, true});
+  }
+  const auto trend = parameter_trend(morning);
+  ASSERT_TRUE(trend);
+  EXPECT_EQ(trend->slope_per_year, 0.0);
+  EXPECT_EQ(trend->slope_sigma, 0.0);
+  // Sigma 1 each, the scatter within it: the mean of three.
+  EXPECT_NEAR(trend->at(year_of("2027-01-01T00:00:00Z")), 11.0, 1e-9);
+}
+
 TEST(TrendWarnings, AValueThatFitsIsNotMentionedAndOneThatDoesNotIs) {
   const std::vector<ParameterRecord> past{value(2020, 10), value(2021, 10.5), value(2022, 9.5)};
   EXPECT_THAT(trend_warnings("accel_bias_x", "ug", past, value(2023, 11), 0), IsEmpty());
