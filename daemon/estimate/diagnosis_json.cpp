@@ -61,7 +61,7 @@ ordered_json to_json(const Finding& f) {
 ordered_json to_json(const Adequacy& a) {
   return {{"accepted", a.accepted},
           {"nis", a.nis},
-          {"whiteness_log10_p", a.log_p_white / std::log(10.0)},
+          {"whiteness_log10_p", a.coloured ? ordered_json() : ordered_json(a.log_p_white / std::log(10.0))},
           {"largest_located_sigma", a.largest_sigma},
           {"misfit", a.misfit}};
 }

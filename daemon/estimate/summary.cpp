@@ -125,7 +125,7 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
   if (!d.remaining.empty()) {
     text = hidden ? fmt::format("NIS {:.3g} is as expected over all, but ", d.after.nis) : std::string();
     text += fmt::format("{:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
-  } else if (d.after.log_p_white < std::log(1e-3)) {
+  } else if (!d.after.coloured && d.after.log_p_white < std::log(1e-3)) {
     text = fmt::format("what remains is {}", whiteness_text(d.after.log_p_white));
   } else {
     text = fmt::format("NIS {:.3g}", d.after.nis);
@@ -326,7 +326,7 @@ Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::
       return {SummaryStanding::good,
               "Recording and model agree: nothing that this recording can show was left out.",
               fmt::format("NIS {:.3g}, largest misfit {:.1f} sigma, innovations {}.", d.before.nis,
-                          d.before.largest_sigma, whiteness_text(d.before.log_p_white)),
+                          d.before.largest_sigma, innovations_text(d.before)),
               {}};
     case DiagnosisVerdict::named:
       return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
@@ -345,6 +345,10 @@ Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::
               "Mend the fault and record again."};
   }
   return {};
+}
+
+std::string innovations_text(const diagnosis::Adequacy& adequacy) {
+  return adequacy.coloured ? "coloured by quantum and lines" : whiteness_text(adequacy.log_p_white);
 }
 
 }  // namespace selfcal

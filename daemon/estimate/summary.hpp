@@ -30,4 +30,7 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
 Summary summary_of(const diagnosis::Diagnosis& diagnosis, const Subject& subject,
                    const discovery::Discovery* beyond = nullptr);
 
+// Whether the innovations are white, as far as that is judged: "white (p = 0.32)", "coloured by quantum and lines".
+std::string innovations_text(const diagnosis::Adequacy& adequacy);
+
 }  // namespace selfcal

@@ -53,6 +53,15 @@ std::optional<Remainder> remainder_of(const SearchResult& found) {
   return r;
 }
 
+InnovationColour colour_of_rows(const SignatureRows& rows, const RecordingContext& context) {
+  constexpr std::size_t axes = 3;
+  std::vector<std::size_t> segment;
+  for (std::size_t row = 0; row < rows.time_s.size(); row += axes) {
+    segment.push_back(context.segment_at(rows.time_s[row]));
+  }
+  return colour_of(rows.residual, segment);
+}
+
 class Diagnoser {
  public:
   Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
@@ -101,10 +110,25 @@ void Diagnoser::name() {
     input = forward_pass(recording.data(), d_.calibration);
     beats_ = fit_velocity_noise(input, d_.noise);
   }
-  const RecordingContext context(recording.data());
+  RecordingContext context(recording.data());
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
   say("signatures");
-  decide(context, search(context, input, {log_names_, say_, options_.stop}));
+  PassInput as_recorded = input;  // turns hold the slow lines still
+  as_recorded.data = &data_;
+  if (beats_) {
+    context.set_colour(colour_of_rows(SignaturePass(context, {}, false).run(as_recorded), context));
+  }
+  SearchResult found = search(context, input, {log_names_, say_, options_.stop});
+  if (beats_ && !found.empty()) {  // what was left out coloured the innovations too
+    context.set_colour({});
+    const CorrectedRecording whole(data_);
+    const LinearModel model = LinearModel::about(context, {as_recorded, whole}, found.stage.hypothesis(), {}, false);
+    SignatureRows left = model.rows();
+    left.residual = model.residual_after(columns_of(model.terms()));
+    context.set_colour(colour_of_rows(left, context));
+    found = search(context, input, {log_names_, say_, options_.stop});
+  }
+  decide(context, found);
 }
 
 void Diagnoser::decide(const RecordingContext& context, const SearchResult& found) {
@@ -199,7 +223,7 @@ DiagnosisOutcome Diagnoser::run() {
     leave_unjudged();
     return {std::move(d_), {}};
   }
-  if (turned(d_.calibration)) {
+  if (turned(data_)) {
     name();
   } else {
     judge_noise_alone();

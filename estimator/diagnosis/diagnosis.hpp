@@ -83,6 +83,7 @@ struct Undetectable {
 struct Adequacy {
   double nis = 0.0;  // per degree of freedom
   double log_p_white = 0.0;
+  bool coloured = false;         // the sensors' quantum and lines colour the innovations: whiteness is not judged
   double largest_sigma = 0.0;    // of the map
   double misfit = 0.0;           // sum of squares beyond the degrees of freedom
   double log_p_structure = 0.0;  // of biases that many dwells, rotations or times share; after the fit only

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
+
+#include "estimator/models/segments.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -26,19 +29,20 @@ CalibrationOutcome with_smaller_noise(const ImuData& data, CalibrationOptions op
 
 }  // namespace
 
-bool turned(const CalibrationResult& result) {
-  return std::any_of(result.segments.begin(), result.segments.end(),
-                     [](const SegmentSummary& s) { return s.rotation; });
+bool turned(const ImuData& data) {
+  const std::vector<Segment> segments = find_segments(data);
+  return std::any_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; });
 }
 
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop) {
   constexpr double largest_still_sigma = 3e-6;  // m: a calibration that asks for more does so because of an omission
-  CalibrationOutcome outcome = calibrate(data, options, {}, stop);
   // Noise fitted to the drift takes up what was left out; where the sensors turned it is left to the steps of the search, which fit
   // a coarse quantum beside what is named (noise/velocity_noise.hpp).
-  const bool of_still_drift = outcome.result && outcome.result->noise_of_drift && !turned(*outcome.result);
-  if (outcome.result && !outcome.result->moored && !of_still_drift && !options.noise.position_sigma &&
-      outcome.result->position_sigma > largest_still_sigma) {
+  options.noise_of_drift = !turned(data);
+  CalibrationOutcome outcome = calibrate(data, options, {}, stop);
+  const bool widened = outcome.result && !outcome.result->moored && !outcome.result->noise_of_drift &&
+                       outcome.result->position_sigma > largest_still_sigma;
+  if (widened && !options.noise.position_sigma) {
     options.noise.position_sigma = largest_still_sigma;
     outcome = calibrate(data, options, {}, stop);
   }

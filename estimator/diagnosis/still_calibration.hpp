@@ -10,8 +10,8 @@ namespace selfcal::diagnosis {
 // (passes/noise_fit.hpp) stays only where nothing turned.
 CalibrationOutcome calibrate_still(const ImuData& data, CalibrationOptions options, const std::stop_token& stop = {});
 
-// Whether the gimbal turned.
-bool turned(const CalibrationResult& result);
+// Whether the sensors turned.
+bool turned(const ImuData& data);
 
 // A forward pass about the calibrated recording; `data` must outlive it.
 PassInput forward_pass(const ImuData& data, const CalibrationResult& calibration);

@@ -281,8 +281,8 @@ bool Calibration::fit_base_motion() {
 
 bool Calibration::spectra_mislead() const {
   const NoiseOptions& given = options_.noise;
-  return !noise_.base_moves && !given.gyro_arw && !given.accel_vrw && !given.position_sigma &&
-         typical_nis(last_) < far_below_one;
+  return options_.noise_of_drift && !noise_.base_moves && !given.gyro_arw && !given.accel_vrw &&
+         !given.position_sigma && typical_nis(last_) < far_below_one;
 }
 
 // All densities from the drift of the navigation, with the walk that a coarse quantum makes of the position.

@@ -34,8 +34,9 @@ ParameterVector plausible_limit();
 
 struct CalibrationOptions {
   NoiseOptions noise;
-  int max_passes = 12;              // after the noise is known; at least 3 in all: forward, reverse, forward
-  double convergence_sigma = 0.1;   // stop when no parameter moved by more than this fraction of its sigma
+  int max_passes = 12;             // after the noise is known; at least 3 in all: forward, reverse, forward
+  double convergence_sigma = 0.1;  // stop when no parameter moved by more than this fraction of its sigma
+  bool noise_of_drift = true;  // where the spectra mislead: densities from the drift of the navigation (noise_fit.hpp)
   bool carried_covariance = false;  // for comparison only: keep P from pass to pass, counting data again
   ParameterVector tolerance = default_tolerance();  // 1 sigma beyond which a parameter counts as not determined
 };

@@ -27,7 +27,7 @@ std::string adequacy_text(const Diagnosis& d) {
   std::string text = fmt::format("{:<8}{:>9}  {:>15}  {}\n", "", "NIS", "largest misfit", "innovations");
   for (const Adequacy* a : {&d.before, &d.after}) {
     text += fmt::format("{:<8}{:>9}  {:>9} sigma  {}\n", a == &d.before ? "before" : "after", number_text(a->nis),
-                        number_text(a->largest_sigma), whiteness_text(a->log_p_white));
+                        number_text(a->largest_sigma), innovations_text(*a));
   }
   return text;
 }

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/regression/innovation_colour.hpp"
 #include "estimator/models/segments.hpp"
 #include "estimator/navigation/interval_navigator.hpp"
 #include "estimator/passes/pass.hpp"
@@ -39,6 +41,9 @@ class RecordingContext {
   const std::vector<Turn>& turns() const { return turns_; }          // in order of time
   double mean_temperature() const { return mean_temperature_; }      // degC, where there is a channel
   const ReferenceResidual& reference() const { return reference_; }  // may be empty
+  // Taken from the rows of signature passes; white unless it was set.
+  const InnovationColour& colour() const { return colour_; }
+  void set_colour(InnovationColour colour) { colour_ = std::move(colour); }
   bool has_temperature() const { return !data_.temperature.empty(); }
 
  private:
@@ -51,6 +56,7 @@ class RecordingContext {
 
   const ImuData& data_;
   ReferenceResidual reference_;
+  InnovationColour colour_;
   std::vector<Segment> segments_;
   std::vector<Turn> turns_;
   std::size_t samples_per_division_;  // 20 ms

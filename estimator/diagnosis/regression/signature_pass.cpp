@@ -223,6 +223,14 @@ void compare_with(const Eigen::VectorXd& reference, SignatureRows& rows) {
   rows.pass.log_likelihood += 0.5 * (own_square - rows.residual.squaredNorm());
 }
 
+void without_colour(const InnovationColour& colour, SignatureRows& rows) {
+  const double square = rows.residual.squaredNorm();
+  whiten(colour, rows.residual);
+  whiten(colour, rows.columns);
+  rows.pass.log_likelihood +=
+      0.5 * (square - rows.residual.squaredNorm()) + log_determinant(colour, rows.residual.size());
+}
+
 }  // namespace
 
 double map_unit(int axis) { return axis < 3 ? 0.01 * units::degree_per_hour : 10.0 * units::micro_g; }
@@ -275,6 +283,7 @@ SignatureRows SignaturePass::run(const PassInput& input) {
   if (context_->reference()) {
     compare_with(context_->reference()(input.noise), rows);
   }
+  without_colour(context_->colour(), rows);
   return rows;
 }
 

@@ -105,7 +105,8 @@ Finding describe(const RandomWalk& walk, double rows) {
 Adequacy adequacy(const Rules& rules, const Shown& shown, double rows, double alpha, double alpha_elsewhere) {
   Adequacy a;
   a.nis = shown.square / rows;
-  a.log_p_white = rules.coloured ? 0.0 : shown.log_p_white;
+  a.log_p_white = shown.log_p_white;
+  a.coloured = rules.coloured;
   a.largest_sigma = shown.map.largest_sigma;
   a.misfit = std::max(0.0, shown.square - rows);
   const auto good = [&](double sigma, double rate) {
@@ -114,7 +115,7 @@ Adequacy adequacy(const Rules& rules, const Shown& shown, double rows, double al
   const bool map_good =
       good(shown.map.largest_named_sigma, alpha) && good(shown.map.largest_sigma, std::min(alpha, alpha_elsewhere));
   // A fitted model of the base's motion leaves a little correlation; noise densities are known to 2 %: NIS to 4 %.
-  const bool white = rules.motion_fitted || a.log_p_white > std::log(rules.budget.whiteness * alpha);
+  const bool white = rules.motion_fitted || a.coloured || a.log_p_white > std::log(rules.budget.whiteness * alpha);
   const double nis_sigma = std::sqrt(2.0 / rows + 0.04 * 0.04);
   const bool size_good = rules.motion_fitted ||
                          log_normal_tail(std::max(0.0, a.nis - 1.0) / nis_sigma) > std::log(rules.budget.size * alpha);

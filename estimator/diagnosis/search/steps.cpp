@@ -119,7 +119,12 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
   const auto goes_on = [&](const RandomWalk& walk) {
     return walks_inside_dwells(ground.context.data(), stage.hypothesis().noise, walk);
   };
-  const auto says_nothing = [&](const Candidate& c, const GroupTest& test) { return immaterial(stage, c, test); };
+  // The p-values of coloured noise rest on a spectrum that was estimated from the same recording: a name must be worth its
+  // coefficients by BIC too.
+  const bool coloured = !is_white(ground.context.colour());
+  const auto says_nothing = [&](const Candidate& c, const GroupTest& test) {
+    return immaterial(stage, c, test) || (coloured && test.delta_chi2 < test.rank * std::log(ground.significance.rows));
+  };
   const auto found = best_addition(stage.given_forms(), stage.columns(), alternatives, walks_to_test(stage),
                                    ground.significance, goes_on, says_nothing);
   if (!found) {
@@ -198,7 +203,8 @@ std::optional<Stage> sharpen_observation(const SearchGround& ground, const Stage
 }
 
 std::optional<Stage> refit_noise(const SearchGround& ground, const Stage& stage) {
-  if (stage.hypothesis().empty()) {
+  // A colour is in units of the densities that it was found beside.
+  if (stage.hypothesis().empty() || !is_white(ground.context.colour())) {
     return std::nullopt;
   }
   const auto noise = refit_velocity_noise(

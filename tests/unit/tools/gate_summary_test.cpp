@@ -200,6 +200,15 @@ TEST(QuantityText, HasTheDigitsThatSigmaCarries) {
   EXPECT_EQ(with_sigma(3.14159, 0.0, "s"), "3.142 +- ? s");
 }
 
+// A test that was not made has no p-value: "white (p = 1)" stood there.
+TEST(Summary, ColourOfTheSensorsIsNotCalledWhite) {
+  diagnosis::Adequacy adequacy;
+  adequacy.log_p_white = -900.0;
+  EXPECT_EQ(innovations_text(adequacy), "correlated in time (p below 1e-12)");
+  adequacy.coloured = true;
+  EXPECT_EQ(innovations_text(adequacy), "coloured by quantum and lines");
+}
+
 TEST(QuantityText, SaysPValuesAsPeopleDo) {
   EXPECT_EQ(whiteness_text(-9166.6), "correlated in time (p below 1e-12)");
   EXPECT_EQ(whiteness_text(std::log(0.32)), "white (p = 0.32)");

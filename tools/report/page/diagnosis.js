@@ -93,7 +93,7 @@ function adequacyTable(adequacy, named) {
     {title: 'model', cells: ['24 parameters', 'with the named effects'].slice(0, rows.length), class: 'left'},
     {title: 'NIS (1 expected)', cells: rows.map((a) => significant(a.nis, 4))},
     {title: 'largest misfit (σ)', cells: rows.map((a) => significant(a.largest_located_sigma, 3))},
-    {title: 'innovations white? (p)', cells: rows.map((a) => probabilityText(a.whiteness_log10_p))},
+    {title: 'innovations white? (p)', cells: rows.map((a) => (a.whiteness_log10_p === null ? 'not judged: quantum and lines' : probabilityText(a.whiteness_log10_p)))},
     {title: 'misfit (χ² beyond its degrees of freedom)', cells: rows.map((a) => significant(a.misfit, 4))},
     {title: 'recording explained', cells: rows.map((a) => (a.accepted ? element('span', {class: 'good'}, '✔ yes')
                                                                    : element('span', {class: 'bad'}, '✘ no')))},
