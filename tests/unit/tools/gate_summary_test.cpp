@@ -138,6 +138,7 @@ TEST(Summary, EveryVerdictOfTheDiagnosisHasASentence) {
   d.unexplained = true;
   d.rejected = d.findings;
   EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("accel_relaxation (x 49.81 +- 0.58 ug, 85 sigma)"));
+  EXPECT_THAT(summary_of(d, {"r.h5", 0}).next, HasSubstr("selfcal diagnose r.h5 --split-schedule"));
   d.verdict = diagnosis::DiagnosisVerdict::not_enough_information;
   EXPECT_EQ(summary_of(d, {"r.h5", 0}).standing, SummaryStanding::open);
   d.verdict = diagnosis::DiagnosisVerdict::data_fault;
