@@ -16,6 +16,8 @@ from pathlib import Path
 from cryptography.hazmat.primitives.ciphers import algorithms
 from cryptography.hazmat.primitives.cmac import CMAC
 
+from server import Refused, crc16
+
 REQUEST, RESPONSE, FUNCTIONAL = 0x18DA2AF1, 0x18DAF12A, 0x18DB33F1
 EXTENDED = 0x80000000
 PAGE_BYTES, SAMPLES_PER_PAGE, PAGES, RUN = 1024, 38, 3, 7
@@ -56,19 +58,6 @@ DEVIATIONS = {
     "range_unchecked": ("an upload of pages that are not there begins", "upload.range"),
     "page_checksum_wrong": ("the last two bytes of a page are not its checksum", "transfer.page"),
 }
-
-
-class Refused(Exception):
-    pass
-
-
-def crc16(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
 
 
 class Bus:

@@ -7,21 +7,18 @@ goes when so many coefficients of a set have been written, of any but the first:
 """
 import json
 import os
-import signal
 import struct
 import sys
-import time
 import zlib
 from pathlib import Path
 
 import h5py
 import numpy
 
-import isotp
+from server import Refused, Turning, serve
 
 REQUEST, RESPONSE, FUNCTIONAL = 0x18DA51F5, 0x18DAF551, 0x18DB33F5
-STARTING, IDLE, ROTATING, COMPLETE, ABORTED = 1, 2, 3, 4, 5
-PAGE_BYTES, SAMPLES_PER_PAGE, CRC_AT = 2048, 63, 2044
+PAGE_BYTES, CRC_AT = 2048, 2044
 MEMORY_AT, LONGEST_READ = 0x80000000, 512
 SESSION, ROTATE = 0x60, 0x4201
 # Of each coefficient: format, and what one count is worth.
@@ -32,11 +29,6 @@ SET |= {0x4107 + k: (">i", 0.001, f"accel_scale_{a}") for k, a in enumerate("xyz
 SET |= {0x410A + k: (">f", 1, f"accel_misalignment_{p}") for k, p in enumerate(("yx", "zx", "zy"))}
 SET |= {0x410D + k: (">i", 0.001, f"gyro_scale_{a}") for k, a in enumerate("xyz")}
 SET |= {0x4110 + k: (">f", 1, f"gyro_misalignment_{p}") for k, p in enumerate(("xy", "xz", "yx", "yz", "zx", "zy"))}
-START_UP_S, AWAY_S = 0.5, 1.0
-
-
-class Refused(Exception):
-    pass
 
 
 def in_counts(increments, worth):
@@ -44,7 +36,11 @@ def in_counts(increments, worth):
     return numpy.diff(sums, axis=0, prepend=0)
 
 
-class Ins:
+class Ins(Turning):
+    STARTING, IDLE, ROTATING, COMPLETE, ABORTED = 1, 2, 3, 4, 5
+    SAMPLES_PER_PAGE = 63
+    AWAY_S = 1.0
+
     def __init__(self, recording, speed, memory, cuts):
         self.speed, self.memory, self.cuts = speed, memory, cuts
         with h5py.File(recording) as file:
@@ -59,44 +55,28 @@ class Ins:
                         for a, v, o, i in zip(angles, velocities, outer, inner)]
         self.set = {did: struct.pack(form, 0) for did, (form, _, _) in SET.items()}
         self.sets_written, self.writes = 0, 0
-        self.power_cycles, self.run_id, self.schedule, self.rotation = 0, 0, None, None
+        self.power_cycles, self.run_id, self.schedule = 0, 0, None
         self.power_on()
 
     def power_on(self):
         self.power_cycles += 1
-        self.ready_at = time.monotonic() + START_UP_S
-        self.session, self.stopped, self.rested = 1, None, True
+        self.at_rest()
+        self.enter(1)
         self.version = struct.unpack(">H", self.set[0x4100])[0]
         self.remember()
+
+    def enter(self, session):
+        self.session = session
 
     def remember(self):
         held = {name: struct.unpack(form, self.set[did])[0] * worth for did, (form, worth, name) in SET.items()}
         Path(self.memory + ".new").write_text(json.dumps({"cuts_left": len(self.cuts), "held": held}), encoding="ascii")
         os.replace(self.memory + ".new", self.memory)
 
-    # --- rotation and data
-    def samples_so_far(self):
-        if self.rotation is None:
-            return 0
-        end = self.stopped if self.stopped is not None else time.monotonic()
-        return min(len(self.samples), int((end - self.rotation) * self.speed * self.rate))
-
-    def state(self):
-        if time.monotonic() < self.ready_at:
-            return STARTING
-        if self.stopped is not None:
-            return ABORTED
-        if self.rotation is None or self.rested:
-            return IDLE
-        return ROTATING if self.samples_so_far() < len(self.samples) else COMPLETE
-
-    def pages_written(self):
-        done = self.samples_so_far()
-        return done // SAMPLES_PER_PAGE if self.state() == ROTATING else -(-done // SAMPLES_PER_PAGE)
-
+    # --- data
     def page(self, number):
-        first = number * SAMPLES_PER_PAGE
-        samples = self.samples[first:min(first + SAMPLES_PER_PAGE, self.samples_so_far())]
+        first = number * self.SAMPLES_PER_PAGE
+        samples = self.samples[first:min(first + self.SAMPLES_PER_PAGE, self.samples_so_far())]
         head = struct.pack(">IIHBx", self.run_id, number, len(samples), round((25.0 + 40.0) / 0.5))
         body = (head + b"".join(samples)).ljust(CRC_AT, b"\0")
         return body + struct.pack(">I", zlib.crc32(body))
@@ -109,18 +89,6 @@ class Ins:
         data = b"".join(self.page(number) for number in range(first, last + 1))
         return data[begin - first * PAGE_BYTES:][:size]
 
-    def position(self):
-        """1 is the first; a move belongs to the position that it leads to."""
-        if self.state() != ROTATING:
-            return 0
-        elapsed, end = self.samples_so_far() / self.rate, 0.0
-        for number, dwell in enumerate(self.dwells_s, 1):
-            end += dwell
-            if elapsed < end:
-                return number
-            end += self.move_s
-        return len(self.dwells_s)
-
     # --- records
     def read(self, did):
         if did == 0xF18C:
@@ -132,9 +100,9 @@ class Ins:
         if did == 0x4002 and self.schedule:
             return self.schedule
         if did == 0x4003:
-            written, over = self.pages_written(), self.state() != ROTATING
-            samples = self.samples_so_far() if over else written * SAMPLES_PER_PAGE
-            return struct.pack(">IIIIB", self.run_id, written, -(-len(self.samples) // SAMPLES_PER_PAGE), samples, over)
+            written, over = self.pages_written(), self.state() != self.ROTATING
+            samples = self.samples_so_far() if over else written * self.SAMPLES_PER_PAGE
+            return struct.pack(">IIIIB", self.run_id, written, -(-len(self.samples) // self.SAMPLES_PER_PAGE), samples, over)
         if did == 0x4004:
             return struct.pack(">Idd", round(self.rate * 1000), 1 / 16, 2e-3)
         if did in SET:
@@ -172,12 +140,12 @@ class Ins:
         if action == 1:
             if len(option) != 4:
                 raise Refused(0x13)
-            if not self.schedule or self.state() == ROTATING:
+            if not self.schedule or self.state() == self.ROTATING:
                 raise Refused(0x22)
             self.run_id, = struct.unpack(">I", option)
-            self.rotation, self.stopped, self.rested = time.monotonic(), None, False
+            self.turn()
         elif action == 2:
-            self.stopped = time.monotonic()
+            self.stop()
         else:
             return struct.pack(">BBI", self.state(), self.position(), self.run_id)
         return b""
@@ -189,7 +157,7 @@ class Ins:
         if service in (0x11, 0x23, 0x2E, 0x31) and self.session == 1:
             raise Refused(0x7F)
         if service == 0x10 and request[1] in (1, SESSION):
-            self.session = request[1]
+            self.enter(request[1])
             return bytes([0x50, request[1]]) + struct.pack(">HH", 50, 500)
         if service == 0x3E:
             return b"" if request[1] & 0x80 else b"\x7E\0"
@@ -208,36 +176,10 @@ class Ins:
             return b"\x51\x01"
         raise Refused({0x10: 0x12, 0x31: 0x31}.get(service, 0x11))
 
-    reset_wanted = False
-
 
 def main():
     interface, recording, speed, memory, *cuts = sys.argv[1:]
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    ins = Ins(recording, float(speed), memory, [int(cut) for cut in cuts])
-    bus = isotp.Transport(interface, REQUEST, RESPONSE, FUNCTIONAL)
-    print("ready", flush=True)
-    heard = time.monotonic()
-    while True:
-        got = bus.receive(0.1)
-        if ins.session != 1 and time.monotonic() - heard > 5.0:
-            ins.session = 1
-        if got is None or not got[0] or time.monotonic() < ins.ready_at:
-            continue
-        request, for_all = got
-        heard = time.monotonic()
-        try:
-            response = ins.answer(request)
-        except Refused as refusal:
-            response = b"" if for_all else bytes([0x7F, request[0], refusal.args[0]])
-        if response is None:
-            time.sleep(AWAY_S)
-            ins.power_on()
-        elif response:
-            bus.send(response)
-        if ins.reset_wanted:
-            ins.reset_wanted = False
-            ins.power_on()
+    serve(Ins(recording, float(speed), memory, [int(cut) for cut in cuts]), interface, REQUEST, RESPONSE, FUNCTIONAL)
 
 
 if __name__ == "__main__":

@@ -6,46 +6,29 @@ clock, its IMU's data are those of RECORDING, and it writes the sets that it hol
 """
 import json
 import os
-import signal
 import struct
 import subprocess
 import sys
-import time
 import zlib
 from pathlib import Path
 
 import h5py
 import numpy
 
-import isotp
+from server import Refused, Turning, crc16, serve
 
 REQUEST, RESPONSE, FUNCTIONAL = 0x18DA2AF1, 0x18DAF12A, 0x18DB33F1
-STARTING, IDLE, ROTATING, COMPLETE, ABORTED = 8, 1, 2, 3, 10
 SLOT_A, SLOT_B, SLOT_FACTORY = 0, 1, 3
-PAGE_BYTES, SAMPLES_PER_PAGE, FIRST_SAMPLE_AT = 1024, 38, 12
+PAGE_BYTES = 1024
 SET_BYTES = 204
 # Of the 24 doubles in a set.
 ORDER = ([f"gyro_drift_{a}" for a in "xyz"] + [f"accel_bias_{a}" for a in "xyz"] + [f"gyro_scale_{a}" for a in "xyz"]
          + [f"accel_scale_pos_{a}" for a in "xyz"] + [f"minus_accel_scale_neg_{a}" for a in "xyz"]
          + [f"gyro_misalignment_{p}" for p in ("xy", "xz", "yx", "yz", "zx", "zy")]
          + [f"accel_misalignment_{p}" for p in ("yx", "zx", "zy")])
-START_UP_S = 0.5
 
 OUT_OF_RANGE, CONDITIONS, DENIED, LENGTH, SEQUENCE, WRONG_KEY = 0x31, 0x22, 0x33, 0x13, 0x24, 0x35
 NOT_SUPPORTED, SUB_FUNCTION, NOT_IN_SESSION, BLOCK_COUNTER, NOT_ERASED = 0x11, 0x12, 0x7F, 0x73, 0x72
-
-
-class Refused(Exception):
-    pass
-
-
-def crc16(data):
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
 
 
 def int24(value):
@@ -57,7 +40,10 @@ def new_set(version, values=(0.0,) * 24):
     return body + struct.pack("<I", zlib.crc32(body))
 
 
-class Ins:
+class Ins(Turning):
+    STARTING, IDLE, ROTATING, COMPLETE, ABORTED = 8, 1, 2, 3, 10
+    SAMPLES_PER_PAGE = 38
+
     def __init__(self, recording, key, speed, memory):
         self.key, self.speed, self.memory = key, speed, memory
         with h5py.File(recording) as file:
@@ -74,7 +60,7 @@ class Ins:
                         for a, v, o, i in zip(*turned, outer, inner)]
         self.slots = {SLOT_FACTORY: new_set(0), SLOT_A: None, SLOT_B: None}
         self.committed = set()
-        self.power_cycles, self.run_id, self.schedule, self.rotation = 0, 0, None, None
+        self.power_cycles, self.run_id, self.schedule = 0, 0, None
         self.power_on()
 
     def power_on(self):
@@ -82,10 +68,12 @@ class Ins:
         valid = [slot for slot in (SLOT_A, SLOT_B) if slot in self.committed]
         self.slot = max(valid, key=lambda s: struct.unpack("<I", self.slots[s][:4])[0], default=SLOT_FACTORY)
         self.inactive = SLOT_B if self.slot == SLOT_A else SLOT_A
-        self.ready_at = time.monotonic() + START_UP_S
-        self.session, self.open, self.seed, self.upload = 1, False, None, None
-        self.stopped, self.rested = None, True
+        self.at_rest()
+        self.enter(1)
         self.remember()
+
+    def enter(self, session):
+        self.session, self.open, self.seed, self.upload = session, False, None, None
 
     def remember(self):
         held = self.slots[self.slot]
@@ -94,46 +82,14 @@ class Ins:
         Path(self.memory + ".new").write_text(text, encoding="ascii")
         os.replace(self.memory + ".new", self.memory)
 
-    # --- rotation and data
-    def samples_so_far(self):
-        if self.rotation is None:
-            return 0
-        end = self.stopped if self.stopped is not None else time.monotonic()
-        return min(len(self.samples), int((end - self.rotation) * self.speed * self.rate))
-
-    def state(self):
-        if time.monotonic() < self.ready_at:
-            return STARTING
-        if self.stopped is not None:
-            return ABORTED
-        if self.rotation is None or self.rested:
-            return IDLE
-        return ROTATING if self.samples_so_far() < len(self.samples) else COMPLETE
-
-    def pages_written(self):
-        done = self.samples_so_far()
-        over = self.state() != ROTATING
-        return -(-done // SAMPLES_PER_PAGE) if over else done // SAMPLES_PER_PAGE
-
+    # --- data
     def page(self, number):
-        first = number * SAMPLES_PER_PAGE
-        samples = self.samples[first:min(first + SAMPLES_PER_PAGE, self.samples_so_far())]
-        last = number + 1 == self.pages_written() and self.state() != ROTATING
+        first = number * self.SAMPLES_PER_PAGE
+        samples = self.samples[first:min(first + self.SAMPLES_PER_PAGE, self.samples_so_far())]
+        last = number + 1 == self.pages_written() and self.state() != self.ROTATING
         head = number.to_bytes(3, "little") + struct.pack("<BIhBx", len(samples), self.run_id, round(25.0 / 0.0625), int(last))
         body = (head + b"".join(samples)).ljust(PAGE_BYTES - 2, b"\0")
         return body + struct.pack("<H", crc16(body))
-
-    def position(self):
-        """1 is the first; a move belongs to the position that it leads to."""
-        if self.state() != ROTATING:
-            return 0
-        elapsed, end = self.samples_so_far() / self.rate, 0.0
-        for number, dwell in enumerate(self.dwells_s, 1):
-            end += dwell
-            if elapsed < end:
-                return number
-            end += self.move_s
-        return len(self.dwells_s)
 
     # --- records
     def state_record(self):
@@ -142,9 +98,9 @@ class Ins:
 
     def directory(self):
         written = self.pages_written()
-        over = self.state() != ROTATING
-        expected = -(-len(self.samples) // SAMPLES_PER_PAGE)
-        samples = self.samples_so_far() if over else written * SAMPLES_PER_PAGE
+        over = self.state() != self.ROTATING
+        expected = -(-len(self.samples) // self.SAMPLES_PER_PAGE)
+        samples = self.samples_so_far() if over else written * self.SAMPLES_PER_PAGE
         return (bytes([0x5A if over else 0xA5]) + struct.pack("<I", self.run_id) + written.to_bytes(3, "little")
                 + expected.to_bytes(3, "little") + struct.pack("<HI", 0, samples))
 
@@ -217,12 +173,12 @@ class Ins:
                 raise Refused(LENGTH)
             if option[0] != 0x55:
                 raise Refused(OUT_OF_RANGE)
-            if not self.schedule or self.state() == ROTATING:
+            if not self.schedule or self.state() == self.ROTATING:
                 raise Refused(CONDITIONS)
             self.run_id, = struct.unpack("<I", option[1:])
-            self.rotation, self.stopped, self.rested = time.monotonic(), None, False
+            self.turn()
         elif action == 2:
-            self.stopped = time.monotonic()
+            self.stop()
         else:
             return struct.pack("<BBI", self.state(), self.position(), self.run_id)
         return b""
@@ -233,7 +189,7 @@ class Ins:
         if service in (0x11, 0x27, 0x2E, 0x31, 0x35, 0x36, 0x37) and self.session == 1:
             raise Refused(NOT_IN_SESSION)
         if service == 0x10:
-            self.session, self.open, self.seed, self.upload = request[1], False, None, None
+            self.enter(request[1])
             return bytes([0x50, request[1]]) + struct.pack(">HH", 50, 500)
         if service == 0x3E:
             return b"" if request[1] & 0x80 else b"\x7E\0"
@@ -275,8 +231,6 @@ class Ins:
             return b"\x51\x01"
         raise Refused(NOT_SUPPORTED)
 
-    reset_wanted = False
-
     def transfer(self, block):
         upload = self.upload
         if upload is None:
@@ -294,28 +248,8 @@ class Ins:
 
 def main():
     interface, recording, key_file, speed, memory = sys.argv[1:]
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    ins = Ins(recording, Path(key_file).read_text(encoding="ascii").strip(), float(speed), memory)
-    bus = isotp.Transport(interface, REQUEST, RESPONSE, FUNCTIONAL)
-    print("ready", flush=True)
-    heard = time.monotonic()
-    while True:
-        got = bus.receive(0.1)
-        if ins.session != 1 and time.monotonic() - heard > 5.0:
-            ins.session, ins.open, ins.seed, ins.upload = 1, False, None, None
-        if got is None or not got[0] or time.monotonic() < ins.ready_at:
-            continue
-        request, for_all = got
-        heard = time.monotonic()
-        try:
-            response = ins.answer(request)
-        except Refused as refusal:
-            response = b"" if for_all else bytes([0x7F, request[0], refusal.args[0]])
-        if response:
-            bus.send(response)
-        if ins.reset_wanted:
-            ins.reset_wanted = False
-            ins.power_on()
+    key = Path(key_file).read_text(encoding="ascii").strip()
+    serve(Ins(recording, key, float(speed), memory), interface, REQUEST, RESPONSE, FUNCTIONAL)
 
 
 if __name__ == "__main__":
