@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "daemon/ins/kept_form.hpp"
+#include "daemon/ins/seed_answer.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
-#include "protocol/uds/security.hpp"
 
 namespace selfcal {
 namespace {
@@ -184,16 +184,16 @@ Task<Answer<Done>> InsClient::unlock(UnlockKey key) {
   if (!response) {
     co_return tl::unexpected(response.error());
   }
-  const auto seed = uds::read_seed_response(*response, level);
+  const auto seed = uds::read_seed_response(*response, level, profile_->security.seed_bytes);
   if (!seed) {
     co_return protocol_error(port_, seed.error());
   }
   if (std::all_of(seed->begin(), seed->end(), [](std::uint8_t byte) { return byte == 0; })) {
     co_return Done{};
   }
-  const auto secret = uds::answer_seed(key, *seed);
+  const auto secret = co_await answer_seed(timers_, profile_->security, key, *seed);
   if (!secret) {
-    co_return protocol_error(port_, secret.error());
+    co_return tl::unexpected<PortError>(PortError{PortError::Kind::local, 0, secret.error().message});
   }
   response = co_await ask(uds::key_request(*secret, level), longest_other);
   if (!response) {

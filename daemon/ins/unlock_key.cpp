@@ -32,7 +32,8 @@ std::string key_path(const InsConfig& config) {
 }  // namespace
 
 Expected<UnlockKey> load_unlock_key(const InsConfig& config) {
-  if (!config.profile->security.needed) {
+  const profile::Security& lock = config.profile->security;
+  if (!lock.needed || lock.program) {
     return UnlockKey{};
   }
   const std::string path = key_path(config);

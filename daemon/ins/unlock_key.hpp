@@ -12,7 +12,7 @@ namespace selfcal {
 
 using UnlockKey = std::array<std::uint8_t, 16>;
 
-// Of an INS without a lock none, all zeros. Else from key_file, else from the systemd credential NAME.key, else from the credential ins.key.
+// Of an INS without a lock, or whose key a program says: none, all zeros. Else from key_file, else from the systemd credential NAME.key, else from the credential ins.key.
 Expected<UnlockKey> load_unlock_key(const InsConfig& config);
 
 }  // namespace selfcal

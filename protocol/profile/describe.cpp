@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "protocol/profile/byte_picture.hpp"
 #include "protocol/profile/coefficient_fields.hpp"
@@ -214,11 +215,11 @@ class Document {
                            "session; P2 in ms, P2* in 10 ms, two bytes each, big-endian; locks"},
                           {"10 01", "50 01 P2 P2*", "back to the default session; locks"}};
     if (p_.security.needed) {
-      rows.push_back({fmt::format("27 {:02X}", p_.security.level), fmt::format("67 {:02X} SEED", p_.security.level),
-                      "16 bytes of seed, fresh each time; all zeros: open already"});
+      rows.push_back(
+          {fmt::format("27 {:02X}", p_.security.level), fmt::format("67 {:02X} SEED", p_.security.level),
+           fmt::format("{} bytes of seed, fresh each time; all zeros: open already", p_.security.seed_bytes)});
       rows.push_back({fmt::format("27 {:02X} KEY", p_.security.level + 1),
-                      fmt::format("67 {:02X}", p_.security.level + 1),
-                      "KEY is AES-CMAC-128 (RFC 4493) of the seed, 16 bytes"});
+                      fmt::format("67 {:02X}", p_.security.level + 1), key_words()});
     }
     rows.push_back({"22 DID", "62 DID RECORD", "read, in any session; DID has two bytes, big-endian"});
     rows.push_back({"2E DID RECORD", "6E DID", "write"});
@@ -230,6 +231,19 @@ class Document {
     rows.push_back(
         {"3E 00", "7E 00", "keep the session; 3E 80: without response. Without any request for 5 s it ends"});
     out_.table({"request", "response", "meaning"}, rows);
+  }
+
+  std::string key_words() const {
+    const auto& program = p_.security.program;
+    if (!program) {
+      return "KEY is AES-CMAC-128 (RFC 4493) of the seed, 16 bytes";
+    }
+    return fmt::format(
+        "KEY has {} bytes; a program of the user's own says it, {}, which gets the seed in hexadecimal digits {} and "
+        "has "
+        "{:g} s",
+        p_.security.key_bytes, std::filesystem::path(program->file).filename().string(),
+        program->seed_as_argument ? "as its argument" : "on standard input", program->limit_s);
   }
 
   void write_identifiers() {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "protocol/key_program/key_program.hpp"
 #include "protocol/profile/layout.hpp"
 
 namespace selfcal::profile {
@@ -29,8 +30,10 @@ struct Timing {
 };
 
 struct Security {
-  bool needed = true;      // AES-CMAC of the seed
-  std::uint8_t level = 1;  // of requestSeed; sendKey has the next
+  bool needed = true;                 // the lock is opened by the key to a seed
+  std::uint8_t level = 1;             // of requestSeed; sendKey has the next
+  std::optional<KeyProgram> program;  // that says the key; without one it is AES-CMAC of the seed
+  std::size_t seed_bytes = 16, key_bytes = 16;
 };
 
 // A record of a role: which identifier has it, where its fields stand, and which values the INS does not tell because they are

@@ -19,6 +19,7 @@ class Faults {
   bool none() const { return lines_.empty(); }
   std::string text() const;  // in the order of the lines
   std::size_t count() const { return lines_.size(); }
+  const std::string& file() const { return file_; }
 
  private:
   std::string file_;

@@ -8,6 +8,7 @@
 
 #include "protocol/profile/coefficient_fields.hpp"
 #include "protocol/profile/read_layout.hpp"
+#include "protocol/profile/read_security.hpp"
 
 namespace selfcal::profile {
 namespace {
@@ -16,7 +17,6 @@ constexpr std::uint64_t most_did = 0xFFFF;
 constexpr std::uint64_t most_samples = 145;  // of a page, as the service keeps it
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
 constexpr std::array<std::string_view, 3> addressings{"normal", "normal-29", "normal-fixed"};
-constexpr std::array<std::string_view, 2> methods{"aes-cmac", "none"};
 constexpr std::array<std::string_view, 2> address_units{"page", "byte"};
 
 // ISO 15765-2: the identifiers that normal fixed addressing makes of two addresses, with priority 6.
@@ -131,13 +131,7 @@ class ProfileReader {
     session.only_these();
     Section security = root_.table("security", true);
     if (security.there()) {
-      profile_.security.needed = security.word("method", methods, true).value_or("none") == "aes-cmac";
-      const auto level = security.whole("level", 1, 0x41);
-      if (level && *level % 2 == 0) {
-        security.fault("level", fmt::format("{} is even: requestSeed is odd, sendKey the next", *level));
-      }
-      profile_.security.level = static_cast<std::uint8_t>(level.value_or(1));
-      security.only_these();
+      profile_.security = read_security(security);
     }
   }
 

@@ -123,11 +123,10 @@ Expected<void> read_reset_response(ByteView response, ResetType type) {
   return check_code(response, service::ecu_reset, code(type), 2);
 }
 
-Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(ByteView response, std::uint8_t level) {
-  return check_code(response, service::security_access, level, 2 + seed_bytes).map([&] {
-    std::array<std::uint8_t, seed_bytes> seed{};
-    std::ranges::copy(response.subspan(2, seed_bytes), seed.begin());
-    return seed;
+Expected<Bytes> read_seed_response(ByteView response, std::uint8_t level, std::size_t length) {
+  return check_code(response, service::security_access, level, 2 + length).map([&] {
+    const ByteView seed = response.subspan(2, length);
+    return Bytes(seed.begin(), seed.end());
   });
 }
 

@@ -46,8 +46,8 @@ struct SessionTimings {
 [[nodiscard]] Expected<SessionTimings> read_session_response(ByteView response, Session session);
 [[nodiscard]] Expected<void> read_reset_response(ByteView response, ResetType type);
 // All zeros: already unlocked.
-[[nodiscard]] Expected<std::array<std::uint8_t, seed_bytes>> read_seed_response(
-    ByteView response, std::uint8_t level = security_seed_level);
+[[nodiscard]] Expected<Bytes> read_seed_response(ByteView response, std::uint8_t level = security_seed_level,
+                                                 std::size_t length = seed_bytes);
 [[nodiscard]] Expected<void> read_key_response(ByteView response, std::uint8_t seed_level = security_seed_level);
 [[nodiscard]] Expected<ByteView> read_read_response(ByteView response, std::uint16_t did);  // the record
 [[nodiscard]] Expected<void> read_write_response(ByteView response, std::uint16_t did);

@@ -54,7 +54,7 @@ tl::unexpected<Nrc> no(Nrc nrc) { return tl::unexpected(nrc); }
 Diagnostics::Diagnostics(Instrument& instrument, const DiagnosticOptions& options)
     : instrument_(instrument),
       profile_(options.profile),
-      lock_(instrument.flash(), instrument.counters(), options.key, options.seed_salt),
+      lock_(instrument.flash(), instrument.counters(), options.profile->security, options.key, options.seed_salt),
       upload_(instrument.raw(), options.longest_response, options.profile) {}
 
 void Diagnostics::power_on(Time now) {
@@ -187,7 +187,7 @@ Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
   if (!seed_wanted && !lock_.seed_given()) {  // figure 6: sequence of the sub-functions
     return no(Nrc::request_sequence_error);
   }
-  if (request.size() != (seed_wanted ? 2 : 2 + uds::seed_bytes)) {
+  if (request.size() != (seed_wanted ? 2 : 2 + profile_->security.key_bytes)) {
     return no(Nrc::incorrect_message_length);
   }
   if (seed_wanted) {

@@ -2,7 +2,7 @@
 
 #include <sys/random.h>
 
-#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "protocol/byte_order.hpp"
@@ -32,25 +32,44 @@ uds::Reply SecurityLock::give_seed(Time now) {
   if (now < locked_until_) {
     return tl::unexpected(Nrc::required_time_delay_not_expired);
   }
-  Seed seed{};
   if (open_) {  // all zeros: nothing to answer
-    return uds::seed_response(seed);
+    return uds::seed_response(uds::Bytes(kind_.seed_bytes, 0));
   }
-  if (seed_salt_ != 0) {
-    ByteWriter writer(seed);
-    writer.put(seed_salt_);
-    writer.put(++seeds_given_);
-  } else if (::getrandom(seed.data(), seed.size(), 0) != static_cast<ssize_t>(seed.size())) {
+  uds::Bytes seed = new_seed();
+  if (seed.empty()) {
     return tl::unexpected(Nrc::conditions_not_correct);
   }
   seed_ = seed;
   return uds::seed_response(seed);
 }
 
+// Empty: there is no entropy.
+uds::Bytes SecurityLock::new_seed() {
+  uds::Bytes seed(kind_.seed_bytes, 0);
+  if (seed_salt_ == 0) {
+    return ::getrandom(seed.data(), seed.size(), 0) == static_cast<ssize_t>(seed.size()) ? seed : uds::Bytes{};
+  }
+  std::array<std::uint8_t, 16> drawn{};
+  ByteWriter writer(drawn);
+  writer.put(seed_salt_);
+  writer.put(++seeds_given_);
+  for (std::size_t k = 0; k < seed.size(); ++k) {  // the end changes from one to the next
+    seed[k] = drawn[drawn.size() - 1 - k % drawn.size()];
+  }
+  return seed;
+}
+
+Expected<uds::Bytes> SecurityLock::key_to(const uds::Bytes& seed) const {
+  if (kind_.program) {
+    return key_by_program(*kind_.program, seed);
+  }
+  return uds::answer_seed(key_, seed).map([](const auto& key) { return uds::Bytes(key.begin(), key.end()); });
+}
+
 void SecurityLock::begin_attempt(std::span<const std::uint8_t> key, Time now) {
   Attempt attempt;
   attempt.seed = *std::exchange(seed_, std::nullopt);  // an answer counts once: a recorded one is worth nothing
-  std::ranges::copy(key, attempt.key.begin());
+  attempt.key.assign(key.begin(), key.end());
   attempt.asked = now;
   counters_.set(counters_.get().power_cycles, counters_.get().key_attempts + 1);
   attempt.due_s = flash_.ready_at_s();
@@ -59,7 +78,7 @@ void SecurityLock::begin_attempt(std::span<const std::uint8_t> key, Time now) {
 
 // The second write: a new copy of the counters for a wrong key too.
 void SecurityLock::judge(Attempt& attempt) {
-  const auto expected = uds::answer_seed(key_, attempt.seed);
+  const auto expected = key_to(attempt.seed);
   attempt.right = expected && uds::equal_in_constant_time(*expected, attempt.key);
   attempt.judged = true;
   counters_.set(counters_.get().power_cycles, attempt.right ? 0 : counters_.get().key_attempts);

@@ -5,11 +5,11 @@
 // leaves the attempt counted or comes before anything depends on the key; and a right and a wrong key take the same time.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 
+#include "protocol/profile/profile.hpp"
 #include "protocol/time.hpp"
 #include "protocol/uds/messages.hpp"
 #include "protocol/uds/security.hpp"
@@ -20,8 +20,9 @@ namespace selfcal::sim {
 class SecurityLock {
  public:
   // `seed_salt` 0: seeds from the system's entropy; else reproducible (tests).
-  SecurityLock(FlashMemory& flash, CounterStore& counters, const uds::SecurityKey& key, std::uint64_t seed_salt)
-      : flash_(flash), counters_(counters), key_(key), seed_salt_(seed_salt) {}
+  SecurityLock(FlashMemory& flash, CounterStore& counters, const profile::Security& kind, const uds::SecurityKey& key,
+               std::uint64_t seed_salt)
+      : flash_(flash), counters_(counters), kind_(kind), key_(key), seed_salt_(seed_salt) {}
 
   // Locked. The delay after wrong keys begins anew: else a reset would be the way round it.
   void power_on(Time now);
@@ -39,22 +40,24 @@ class SecurityLock {
   std::optional<uds::Reply> take_answer(double now_s);
 
  private:
-  using Seed = std::array<std::uint8_t, uds::seed_bytes>;
   struct Attempt {
-    Seed seed{}, key{};
+    uds::Bytes seed, key;
     Time asked{0};
     double due_s = 0.0;  // INS time at which the write under way is done
     bool judged = false;
     bool right = false;
   };
+  uds::Bytes new_seed();
+  Expected<uds::Bytes> key_to(const uds::Bytes& seed) const;
   void judge(Attempt& attempt);
 
   FlashMemory& flash_;
   CounterStore& counters_;
+  profile::Security kind_;
   uds::SecurityKey key_;
   std::uint64_t seed_salt_;
   std::uint64_t seeds_given_ = 0;
-  std::optional<Seed> seed_;  // given out, not yet answered: used once
+  std::optional<uds::Bytes> seed_;  // given out, not yet answered: used once
   std::optional<Attempt> attempt_;
   bool open_ = false;
   Time locked_until_{0};

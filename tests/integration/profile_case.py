@@ -30,7 +30,7 @@ class UnderProfile(case.OnBench):
         print(f"{what} against our own INS: 24 values, largest difference {largest:.1e} sigma", flush=True)
         self.assertLess(largest, 0.1)
 
-    def bench_with(self, server, profile, own, *more):
+    def bench_with(self, server, profile, own, *more, start=True):
         """A bench on which a server of somebody else's is the INS, with the data of the virtual one."""
         unit = self.bench_of(profile)
         recording = unit.folder / "direct.h5"
@@ -46,7 +46,8 @@ class UnderProfile(case.OnBench):
         end = time.monotonic() + 60
         while not memory.exists() and time.monotonic() < end:
             time.sleep(0.1)
-        unit.start_daemon()
+        if start:
+            unit.start_daemon()
         return unit, memory
 
     def calibrate_or_tell(self, unit):

@@ -267,7 +267,7 @@ it, and `config/profiles` holds three. Unknown keys are faults.
 | `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
 | `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
-| `security` | `method` aes-cmac or none; `level` of requestSeed, odd |
+| `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
 | `identity` | `serial`, `software`: data identifiers of ASCII |
 | `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
 | `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at` |

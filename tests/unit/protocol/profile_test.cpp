@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/profile/records.hpp"
 
@@ -300,6 +301,33 @@ TEST(MemoryProfile, HasAnIdentifierForEachFieldAndOneFactor) {
   ASSERT_TRUE(held);
   EXPECT_NEAR(held->value[plus], 100e-6, 1e-15);
   EXPECT_NEAR(held->value[minus], -100e-6, 1e-15);
+}
+
+// By a program of the user's own; its path begins in the folder of the profile.
+TEST(Profile, ALockMayBeOpenedByAProgram) {
+  const std::string lock = "method = \"program\"\nprogram = \"keys/open\"\nseed_bytes = 6\nkey_bytes = 4\n";
+  const std::string text = with(own_text(), "method = \"aes-cmac\"\n", lock);
+  const auto profile = parse_profile(text, "/etc/selfcal/profiles/p.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  const Security& security = (*profile)->security;
+  ASSERT_TRUE(security.program);
+  EXPECT_EQ(security.program->file, "/etc/selfcal/profiles/keys/open");
+  EXPECT_EQ(security.program->key_bytes, 4);
+  EXPECT_EQ(security.seed_bytes, 6);
+  EXPECT_FALSE(security.program->seed_as_argument);
+  const std::string words = describe(**profile, Markup::markdown);
+  EXPECT_THAT(words, testing::HasSubstr("6 bytes of seed"));
+  EXPECT_THAT(words, testing::HasSubstr("KEY has 4 bytes; a program of the user's own says it, open, which gets"));
+
+  const auto fault = [&](std::string_view was, std::string_view is) { return complaint(with(text, was, is)); };
+  EXPECT_THAT(fault("program = \"keys/open\"\n", ""), testing::HasSubstr("security.program: missing"));
+  EXPECT_THAT(fault("program = \"keys/open\"", "program = \"\""), testing::HasSubstr("security.program: is empty"));
+  EXPECT_THAT(fault("seed_bytes = 6", "seed_bytes = 65"), testing::HasSubstr("security.seed_bytes: is 65"));
+  EXPECT_THAT(fault("key_bytes = 4\n", ""), testing::HasSubstr("security.key_bytes: missing"));
+  EXPECT_THAT(fault("key_bytes = 4", "key_bytes = 4\nlimit_s = 0"), testing::HasSubstr("security.limit_s"));
+  EXPECT_THAT(fault("key_bytes = 4", "key_bytes = 4\nseed = \"file\""), testing::HasSubstr("security.seed"));
+  EXPECT_THAT(fault("method = \"program\"", "method = \"aes-cmac\""),
+              testing::HasSubstr("security.program: no such key"));
 }
 
 // Each fault is told with its line; what cannot be together is.

@@ -69,7 +69,9 @@ Expected<int> check(const CheckArguments& arguments) {
   }
   Permission permission;
   permission.write = arguments.write;
-  if (!arguments.key_file.empty()) {
+  if ((*profile)->security.program) {
+    permission.key = UnlockKey{};  // the program says it
+  } else if (!arguments.key_file.empty()) {
     InsConfig config;
     config.key_file = arguments.key_file;
     const auto key = load_unlock_key(config);

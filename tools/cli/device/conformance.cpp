@@ -43,6 +43,13 @@ std::string words(const Exchange& exchange) {
   }
 }
 
+Expected<Bytes> Conformance::key_to(const Bytes& seed) const {
+  if (profile_.security.program) {
+    return key_by_program(*profile_.security.program, seed);
+  }
+  return uds::answer_seed(*permission_.key, seed).map([](const auto& key) { return Bytes(key.begin(), key.end()); });
+}
+
 bool Conformance::unlock() {
   if (!profile_.security.needed) {
     return true;
@@ -53,7 +60,7 @@ bool Conformance::unlock() {
   }
   const std::uint8_t level = profile_.security.level;
   const Exchange seed = tester_.ask(uds::seed_request(level));
-  const auto bytes = uds::read_seed_response(seed.response, level);
+  const auto bytes = uds::read_seed_response(seed.response, level, profile_.security.seed_bytes);
   if (seed.kind != Exchange::Kind::positive || !bytes) {
     why_not_ = fmt::format("no seed: {}", words(seed));
     return false;
@@ -61,8 +68,12 @@ bool Conformance::unlock() {
   if (std::ranges::all_of(*bytes, [](std::uint8_t b) { return b == 0; })) {
     return true;
   }
-  const auto key = uds::answer_seed(*permission_.key, *bytes);
-  const Exchange opened = key ? tester_.ask(uds::key_request(*key, level)) : Exchange{};
+  const auto key = key_to(*bytes);
+  if (!key) {
+    why_not_ = key.error().message;
+    return false;
+  }
+  const Exchange opened = tester_.ask(uds::key_request(*key, level));
   if (opened.kind != Exchange::Kind::positive) {
     why_not_ = fmt::format("the lock does not open: {}", words(opened));
     return false;

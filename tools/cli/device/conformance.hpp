@@ -66,6 +66,7 @@ class Conformance {
   bool enter(Mode mode);  // false: why_not() says why
   const std::string& why_not() const { return why_not_; }
   bool unlock();
+  Expected<Bytes> key_to(const Bytes& seed) const;
   Tester& tester() { return tester_; }
   const profile::Profile& profile() const { return profile_; }
   const Permission& permission() const { return permission_; }

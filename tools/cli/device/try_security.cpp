@@ -22,12 +22,12 @@ Bytes seed_of(Conformance& c) {
 }
 
 void try_seeds(Conformance& c, std::uint8_t level) {
-  c.answered(
-      {"security.seed", clause, "A seed of 16 bytes is given, not all zeros while the lock is closed.", Mode::session},
-      uds::seed_request(level), 1, [&](ByteView response) -> std::string {
-        const auto seed = uds::read_seed_response(response, level);
-        return !seed ? seed.error().message : all_zero(*seed) ? "all zeros" : "";
-      });
+  c.answered({"security.seed", clause,
+              "A seed of the profile's length is given, not all zeros while the lock is closed.", Mode::session},
+             uds::seed_request(level), 1, [&](ByteView response) -> std::string {
+               const auto seed = uds::read_seed_response(response, level, c.profile().security.seed_bytes);
+               return !seed ? seed.error().message : all_zero(*seed) ? "all zeros" : "";
+             });
   constexpr Requirement fresh{"security.fresh", clause, "Every seed is another one.", Mode::session};
   if (c.ready(fresh)) {
     const Bytes first = seed_of(c);
@@ -46,7 +46,7 @@ void try_seeds(Conformance& c, std::uint8_t level) {
   c.refused({"security.level", clause, "A level that is none is refused.", Mode::session}, Bytes{0x27, other},
             {Nrc::sub_function_not_supported});
   c.refused({"security.sequence", clause, "A key without a seed before it is refused.", Mode::session},
-            uds::key_request(Bytes(uds::seed_bytes, 0), level), {Nrc::request_sequence_error});
+            uds::key_request(Bytes(c.profile().security.key_bytes, 0), level), {Nrc::request_sequence_error});
 }
 
 void try_keys(Conformance& c, std::uint8_t level) {
@@ -55,7 +55,7 @@ void try_keys(Conformance& c, std::uint8_t level) {
     c.not_tried(wrong, "needs --key-file");
   } else if (c.ready(wrong)) {  // the right one behind it, so that no attempt stays counted
     const Bytes seed = seed_of(c);
-    const Exchange exchange = c.tester().ask(uds::key_request(Bytes(uds::seed_bytes, 0x5A), level));
+    const Exchange exchange = c.tester().ask(uds::key_request(Bytes(c.profile().security.key_bytes, 0x5A), level));
     c.judged(wrong, fmt::format("27 {:02X}, then a key that is wrong", level), "invalidKey (0x35)", words(exchange),
              exchange.kind == Exchange::Kind::negative && exchange.nrc == static_cast<std::uint8_t>(Nrc::invalid_key));
     if (c.enter(Mode::session)) {
