@@ -30,15 +30,18 @@ ImuData imu_view(const Recording& recording, std::vector<double>& first_temperat
 
 Expected<CalibrationResult> calibrate_recording(const Recording& recording, const CalibrationOptions& options,
                                                 const std::function<void(const CalibrationProgress&)>& progress,
-                                                const std::stop_token& stop) {
+                                                const std::stop_token& stop, const diagnosis::SetAside* aside) {
   std::vector<double> first_temperature;
-  const ImuData data = imu_view(recording, first_temperature);
+  const ImuData data = aside != nullptr ? aside->data() : imu_view(recording, first_temperature);
   const auto begin = std::chrono::steady_clock::now();
   CalibrationOutcome outcome = calibrate(data, options, progress, stop);
   if (!outcome.result) {
     return fail(ErrorKind::bad_input, std::move(outcome.failure.message));
   }
   CalibrationResult& result = *outcome.result;
+  if (aside != nullptr) {
+    result.left_out = aside->left_out();
+  }
   add_remedies(result.undetermined, result.covariance, installation_of(result, data.site, options.tolerance));
   outcome.result->elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return std::move(*outcome.result);

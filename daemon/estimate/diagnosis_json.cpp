@@ -5,6 +5,7 @@
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
+#include "daemon/estimate/left_out.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
 namespace selfcal {
@@ -134,6 +135,9 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_
   for (const auto& f : d.faults) {
     j["data_faults"].push_back(
         {{"id", f.id}, {"words", f.words}, {"first_sample", f.first_sample}, {"count", f.count}});
+  }
+  if (!d.calibration.left_out.empty()) {
+    j["left_out"] = left_out_json(d.calibration);
   }
   j["nothing_turned"] = d.nothing_turned;
   j["base"] = d.calibration.moored ? "moored" : "still";

@@ -20,9 +20,10 @@ JudgedResult judged(CalibrationResult result, const ParameterVector& tolerance, 
 
 Expected<JudgedResult> judged_calibration(const Recording& recording, const CalibrationOptions& options,
                                           const Limits& limits, const Subject& subject, bool find_cause,
-                                          const JudgedProgress& progress, const std::stop_token& stop) {
+                                          const JudgedProgress& progress, const std::stop_token& stop,
+                                          const diagnosis::SetAside* aside) {
   const auto begun = std::chrono::steady_clock::now();
-  Expected<CalibrationResult> result = calibrate_recording(recording, options, progress.calibration, stop);
+  Expected<CalibrationResult> result = calibrate_recording(recording, options, progress.calibration, stop, aside);
   if (!result) {
     return tl::unexpected(result.error());
   }
@@ -32,7 +33,8 @@ Expected<JudgedResult> judged_calibration(const Recording& recording, const Cali
     diagnosis::DiagnosisOptions of_catalogue;
     of_catalogue.calibration = options;
     of_catalogue.stop = stop;
-    cause = cause_of(imu_view(recording, first_temperature), of_catalogue, progress.diagnosis);
+    cause = cause_of(aside != nullptr ? aside->data() : imu_view(recording, first_temperature), of_catalogue,
+                     progress.diagnosis);
     result->elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   }
   return judged(std::move(*result), options.tolerance, limits, subject, std::move(cause.diagnosis),

@@ -8,6 +8,7 @@
 
 #include "daemon/estimate/gate.hpp"
 #include "daemon/estimate/summary.hpp"
+#include "estimator/diagnosis/data/set_aside.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/passes/calibration.hpp"
 #include "protocol/error.hpp"
@@ -35,9 +36,10 @@ struct JudgedProgress {
 
 // calibrate_recording, then, where recording and model disagree and `find_cause` is set, the diagnosis of the same
 // recording: some seconds more, and where the catalogue explains nothing the search beyond it: up to a minute. What cannot
-// be made leaves the cause open; it is no error.
+// be made leaves the cause open; it is no error. `aside`: the recording's sound part, in the place of all of it.
 Expected<JudgedResult> judged_calibration(const Recording& recording, const CalibrationOptions& options,
                                           const Limits& limits, const Subject& subject, bool find_cause,
-                                          const JudgedProgress& progress = {}, const std::stop_token& stop = {});
+                                          const JudgedProgress& progress = {}, const std::stop_token& stop = {},
+                                          const diagnosis::SetAside* aside = nullptr);
 
 }  // namespace selfcal

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/diagnosis_json.hpp"
+#include "daemon/estimate/left_out.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal {
@@ -191,6 +192,9 @@ nlohmann::ordered_json result_json(const JudgedResult& judged, const Calibration
                      {"height_m", recording.height_m}}},
                    {"start_time_utc", recording.start_time_utc},
                    {"warnings", warnings}});
+  if (!result.left_out.empty()) {
+    document["left_out"] = left_out_json(result);
+  }
   if (curves) {
     document["correlation"] = correlation_json(result);
   }

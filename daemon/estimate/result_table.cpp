@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "daemon/estimate/left_out.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/undetermined_text.hpp"
 #include "estimator/geometry/units.hpp"
@@ -137,6 +138,9 @@ std::string objections_text(const Gate& gate) {
 std::string result_table(const JudgedResult& judged, const CalibrationOptions& options, const Recording& recording,
                          bool colour, int columns) {
   std::string text = summary_text(judged.summary, colour, columns) + "\n";
+  if (!judged.result.left_out.empty()) {
+    text += left_out_text(judged.result) + "\n";
+  }
   text += parameters_text(judged, options, colour) + "\n" + surroundings_text(judged.result, recording) +
           passes_text(judged.result);
   text += undetermined_text(judged.result);

@@ -64,7 +64,7 @@ InnovationColour colour_of_rows(const SignatureRows& rows, const RecordingContex
 
 class Diagnoser {
  public:
-  Diagnoser(const ImuData& data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
+  Diagnoser(ImuData data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
       : data_(data),
         options_(options),
         say_(say),
@@ -85,7 +85,7 @@ class Diagnoser {
     }
   }
 
-  const ImuData& data_;
+  ImuData data_;
   const DiagnosisOptions& options_;
   const std::function<void(const std::string&)>& say_;
   double log_names_;
@@ -97,7 +97,8 @@ class Diagnoser {
 CorrectedRecording Diagnoser::quiet_dwells() {
   AngleVelocity theta(data_.delta_theta.begin(), data_.delta_theta.end());
   AngleVelocity velocity(data_.delta_v.begin(), data_.delta_v.end());
-  const std::vector<VibrationLine> lines = subtract_dwell_lines(data_, find_segments(data_), theta, velocity);
+  const std::vector<VibrationLine> lines =
+      subtract_dwell_lines(data_, observed(find_segments(data_), data_), theta, velocity);
   d_.noise.lines.insert(d_.noise.lines.end(), lines.begin(), lines.end());
   return {data_, std::move(theta), std::move(velocity)};
 }
@@ -210,15 +211,18 @@ void Diagnoser::judge_noise_alone() {
 
 DiagnosisOutcome Diagnoser::run() {
   say("data");
-  d_.faults = find_data_faults(data_);
+  if (data_.coasts.empty()) {  // else they were found and left out
+    d_.faults = find_data_faults(data_);
+  }
   const bool faulty = !d_.faults.empty();
-  d_.noise = check_noise(data_, find_segments(data_));
+  d_.noise = check_noise(data_, observed(find_segments(data_), data_));
   say("calibration");
   CalibrationOutcome calibration = calibrate_still(data_, options_.calibration, options_.stop);
   if (!calibration.result) {
     return {std::nullopt, (faulty ? d_.faults.front().words + "; " : std::string()) + calibration.failure.message};
   }
   d_.calibration = std::move(*calibration.result);
+  data_.coasts = d_.calibration.coasts;  // with the turns as found
   if (faulty) {
     leave_unjudged();
     return {std::move(d_), {}};

@@ -6,8 +6,18 @@
 #include <span>
 
 #include "estimator/geometry/earth.hpp"
+#include "estimator/geometry/rotation.hpp"
 
 namespace selfcal {
+
+// Samples that hold no observation, whatever stands in them. The navigation goes on without the accelerometers there and
+// starts anew from the site behind them; without the gyros it holds the attitude, or turns it by `turn`.
+struct Coast {
+  std::size_t first = 0, last = 0;     // samples [first, last)
+  bool gyros = false;                  // theirs are lost too
+  bool turned = false;                 // and the IMU may have turned meanwhile: the attitude opens
+  Matrix3 turn = Matrix3::Identity();  // C_nb behind = C_nb before * turn, as far as it is known
+};
 
 struct ImuData {
   earth::Position site;                                // known position of the site
@@ -18,6 +28,7 @@ struct ImuData {
   std::span<const double> gimbal_outer;                // [N] rad, may be empty: used to name positions only
   std::span<const double> gimbal_inner;                // [N] rad, may be empty
   std::span<const double> temperature;                 // [N] degC of the first channel, may be empty
+  std::span<const Coast> coasts;                       // chronological, no two overlap; mostly empty
 
   std::size_t size() const { return time_s.size(); }
 };

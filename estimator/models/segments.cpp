@@ -109,4 +109,28 @@ std::vector<Segment> find_segments(const ImuData& data) {
   return joined;
 }
 
+std::vector<Segment> observed(const std::vector<Segment>& segments, const ImuData& data) {
+  std::vector<Segment> pieces;
+  for (const Segment& segment : segments) {
+    Segment rest = segment;
+    for (const Coast& coast : data.coasts) {
+      if (coast.last <= rest.first || coast.first >= rest.last) {
+        continue;
+      }
+      if (coast.first > rest.first) {
+        Segment piece = rest;
+        piece.last = coast.first;
+        piece.end_s = data.time_s[coast.first - 1];
+        pieces.push_back(piece);
+      }
+      rest.first = std::min(coast.last, rest.last);
+      rest.start_s = data.time_s[rest.first - 1];
+    }
+    if (rest.first < rest.last) {
+      pieces.push_back(rest);
+    }
+  }
+  return pieces;
+}
+
 }  // namespace selfcal

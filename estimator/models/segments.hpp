@@ -20,4 +20,7 @@ struct Segment {
 // than 1 s are joined to their neighbour.
 std::vector<Segment> find_segments(const ImuData& data);
 
+// The same without the samples that hold no observation: a dwell with such in its middle becomes two.
+std::vector<Segment> observed(const std::vector<Segment>& segments, const ImuData& data);
+
 }  // namespace selfcal

@@ -71,8 +71,34 @@ void IntervalNavigator::load(std::size_t index) {
   loaded_ = index;
 }
 
+const Coast* IntervalNavigator::coast_at(std::size_t index) const {
+  const auto after = std::upper_bound(data_.coasts.begin(), data_.coasts.end(), index,
+                                      [](std::size_t i, const Coast& c) { return i < c.last; });
+  return after != data_.coasts.end() && after->first <= index ? &*after : nullptr;
+}
+
+// A sample without gyros: C_nb as it was, or turned once. What (N5) will take out of it is put in here.
+void IntervalNavigator::coast(const Coast& coast, std::size_t index, double length, Moments& m, Interval& interval) {
+  close_block(m, length);
+  const double dt = sample_dt(index);
+  if (coast.turned && index == (sign_ > 0.0 ? coast.first : coast.last - 1)) {
+    q_nb_ = q_nb_ * Eigen::Quaterniond(sign_ > 0.0 ? coast.turn : Matrix3(coast.turn.transpose()));
+    interval.turned = static_cast<int>(&coast - data_.coasts.data());
+  }
+  q_nb_ = quaternion_from_rotation_vector(sign_ * dt * site_.omega_ie_n) * q_nb_;
+  m.C_now = q_nb_.toRotationMatrix();
+  m.tau += dt;
+}
+
 void IntervalNavigator::sample(std::size_t index, double length, Moments& m, Interval& interval) {
   load(index);
+  if (const Coast* lost = coast_at(index)) {
+    interval.coasted = true;
+    if (lost->gyros) {
+      coast(*lost, index, length, m, interval);
+      return;
+    }
+  }
   const double dt = sample_dt(index);
   // (N2), (N3): rotation vector with the coning term, velocity with the rotation and sculling terms; second-order
   // polynomials through this sample and the one before.
@@ -173,6 +199,8 @@ bool IntervalNavigator::next(Interval& interval) {
   interval.end_s = data_.time_s[interval.last - 1];
   interval.length_s = interval.end_s - interval.start_s;
   interval.angle_b.setZero();
+  interval.coasted = false;
+  interval.turned = -1;
 
   Moments m;
   if (extra_ != nullptr) {
@@ -227,6 +255,11 @@ void IntervalNavigator::finish(const Moments& m, Interval& interval) {
     extra.middleRows<3>(StateLayout::position) = m.XA1 - s * (S * m.XW2);
     extra.middleRows<3>(StateLayout::velocity) = s * m.XA0 - S * m.XW1;
     extra.middleRows<3>(StateLayout::attitude) = -s * m.XW0;
+  }
+  if (interval.coasted) {
+    interval.drive.setZero();
+    interval.Phi.topRows<6>().setZero();
+    interval.Gamma.topRows<6>().setZero();
   }
 }
 

@@ -46,6 +46,9 @@ struct Interval {
   Matrix9 Phi;                                     // of the navigation states
   Eigen::Matrix<double, 9, Eigen::Dynamic> Gamma;  // [9 x (24 + extra)]
   Vector9 drive;  // minus the drift of the computed position and velocity, zero attitude
+  // Samples without observation: position and velocity start anew at its end, which Phi, Gamma and drive say already.
+  bool coasted = false;
+  int turned = -1;  // number of the coast that begins here and opens the attitude
 };
 
 // Where the sensitivities to force come from. Of the accelerometers' output they hold its noise: beside a quantum of
@@ -71,6 +74,8 @@ class IntervalNavigator {
  private:
   struct Moments;
   void sample(std::size_t index, double length, Moments& m, Interval& interval);
+  const Coast* coast_at(std::size_t index) const;
+  void coast(const Coast& coast, std::size_t index, double length, Moments& m, Interval& interval);
   void close_block(Moments& m, double length);
   void finish(const Moments& m, Interval& interval);
   double sample_dt(std::size_t index) const;

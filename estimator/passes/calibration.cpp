@@ -61,9 +61,20 @@ class Calibration {
  public:
   Calibration(const ImuData& data, const CalibrationOptions& options,
               const std::function<void(const CalibrationProgress&)>& progress, const std::stop_token& stop)
-      : data_(data), options_(options), progress_(progress), stop_(stop), segments_(find_segments(data)) {
-    noise_ = estimate_sensor_noise(data, segments_);
-    input_.data = &data;
+      : data_(data),
+        coasts_(data.coasts.begin(), data.coasts.end()),
+        options_(options),
+        progress_(progress),
+        stop_(stop),
+        segments_(find_segments(data)) {
+    data_.coasts = coasts_;
+    noise_ = estimate_sensor_noise(data_, observed(segments_, data_));
+    if (noise_.base_moves) {  // what the gyros did not see of it is open
+      for (Coast& coast : coasts_) {
+        coast.turned = coast.gyros;
+      }
+    }
+    input_.data = &data_;
     input_.interval_s = interval_s;
     input_.prior.parameter_sigma = 2.0 * plausible_limit();
     input_.noise.gyro_arw = options.noise.gyro_arw.value_or(noise_.gyro.white_asd);
@@ -71,6 +82,9 @@ class Calibration {
     input_.noise.observation.sigma =
         options.noise.position_sigma.value_or(noise_.base_moves ? first_moored_sigma : first_still_sigma);
   }
+
+  Calibration(const Calibration&) = delete;
+  Calibration& operator=(const Calibration&) = delete;
 
   CalibrationOutcome run();
 
@@ -84,12 +98,14 @@ class Calibration {
   bool fit_base_motion();
   bool spectra_mislead() const;
   void fit_noise();
+  ParameterVector sigma_of_whole();
   CalibrationResult result();
   ParameterVector sigma() const {
     return last_.covariance.diagonal().segment<sensor_parameter_count>(last_.layout.parameters()).cwiseSqrt();
   }
 
-  const ImuData& data_;
+  ImuData data_;
+  std::vector<Coast> coasts_;  // its own, with the turns as the passes find them
   const CalibrationOptions& options_;
   const std::function<void(const CalibrationProgress&)>& progress_;
   const std::stop_token& stop_;
@@ -125,6 +141,9 @@ bool Calibration::pass(double sign) {
   }
   const ParameterVector value =
       input_.parameters + last_.mean.segment<sensor_parameter_count>(last_.layout.parameters());
+  for (std::size_t k = 0; k < coasts_.size(); ++k) {
+    coasts_[k].turn = last_.turns[k];
+  }
   last_move_ = (value - value_).cwiseAbs().cwiseQuotient(sigma()).maxCoeff();
   std::optional<ParameterVector>& same_way = answers_[sign > 0.0 ? 0 : 1];
   same_way_move_ = same_way ? (value - *same_way).cwiseAbs().cwiseQuotient(sigma()).maxCoeff() : HUGE_VAL;
@@ -332,6 +351,23 @@ CalibrationOutcome Calibration::run() {
   return {result(), {}};
 }
 
+// The covariance needs the motion and no observation: the samples in the stretches left out move as the IMU did.
+ParameterVector Calibration::sigma_of_whole() {
+  if (coasts_.empty()) {
+    return sigma();
+  }
+  ImuData whole = data_;
+  whole.coasts = {};
+  PassInput input = input_;
+  input.data = &whole;
+  input.sign = next_sign_;
+  const PassOutput out = run_pass(input, {}, stop_);
+  return out.stopped
+             ? sigma()
+             : ParameterVector(
+                   out.covariance.diagonal().segment<sensor_parameter_count>(out.layout.parameters()).cwiseSqrt());
+}
+
 CalibrationResult Calibration::result() {
   CalibrationResult r;
   r.value = value_;
@@ -360,6 +396,8 @@ CalibrationResult Calibration::result() {
   const bool gimbal = !data_.gimbal_outer.empty() && !data_.gimbal_inner.empty();
   const Matrix3 C_vb = gimbal ? gimbal_matrix(data_.gimbal_outer[0], data_.gimbal_inner[0]) : Matrix3::Identity();
   r.initial_attitude = attitude_from_matrix(r.C_nb_start * C_vb.transpose());
+  r.coasts = coasts_;
+  r.sigma_whole = sigma_of_whole();
   r.passes = std::move(passes_);
   return r;
 }

@@ -65,6 +65,14 @@ struct SegmentSummary {
   int epochs = 0;
 };
 
+// A stretch whose samples are no observation, or only in part (models/imu_data.hpp).
+struct LeftOut {
+  double start_s = 0.0, end_s = 0.0;
+  std::string fault;  // id of the fault of the data, or "disturbed"
+  std::string words;
+  bool turn = false;  // a turn that the gyros did not see: how far it went comes from what lies on both sides
+};
+
 enum class Verdict { consistent, inconsistent, not_converged };
 
 struct Consistency {
@@ -112,6 +120,9 @@ struct CalibrationResult {
   bool noise_given = false;                                      // a density, or the position's noise, was an option
   bool noise_of_drift = false;                                   // the spectra mislead: noise_fit.hpp
   bool moored = false;                                           // coloured motion of the base was found and modelled
+  std::vector<Coast> coasts;                                     // of the data, with the turns as found
+  std::vector<LeftOut> left_out;                                 // why; filled by the caller, who left it out
+  ParameterVector sigma_whole;  // SI, what it would be if nothing were left out; sigma where nothing is
   std::vector<PassSummary> passes;
   std::vector<SegmentSummary> segments;
   Consistency consistency;

@@ -61,6 +61,16 @@ class AxisFilter {
     }
   }
 
+  // After an interval without observation: position and velocity as the filter begins, the tilt goes on.
+  void start_anew(bool turning) {
+    const double tilt = x_(2);
+    const double variance = P_(2, 2) + (turning ? first_acceleration * first_acceleration : 0.0);
+    x_.head<drift_states>() << 0.0, 0.0, tilt;
+    P_.topRows<drift_states>().setZero();
+    P_.leftCols<drift_states>().setZero();
+    P_.diagonal().head<drift_states>() << first_position * first_position, first_velocity * first_velocity, variance;
+  }
+
   // (M3). Returns the innovation and its variance.
   std::pair<double, double> update() {
     State Ph = P_.col(0);
@@ -123,10 +133,11 @@ DriftSeries drift_series(const PassInput& input) {
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s);
   Interval interval;
   while (navigator.next(interval)) {
-    if (std::abs(interval.length_s - input.interval_s) <= 0.1 * input.interval_s) {
+    if (interval.coasted || std::abs(interval.length_s - input.interval_s) <= 0.1 * input.interval_s) {
       series.position.emplace_back(interval.drive.segment<3>(StateLayout::position));
       series.velocity.emplace_back(interval.drive.segment<3>(StateLayout::velocity));
-      series.turning.push_back(interval.angle_b.norm() > turning_rate * interval.length_s);
+      series.coasted.push_back(interval.coasted);
+      series.turning.push_back(interval.turned >= 0 || interval.angle_b.norm() > turning_rate * interval.length_s);
       series.start_s.push_back(interval.start_s);
       series.end_s.push_back(interval.end_s);
     }
@@ -143,6 +154,14 @@ void filter_axis(const DriftSeries& series, int axis, const DriftNoise& noise, c
   filter.update();  // where the pass begins the position is known as well
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
+    if (!series.coasted.empty() && series.coasted[i]) {
+      filter.propagate(0.0, 0.0, series.turning[i], 1.0);
+      filter.start_anew(series.turning[i]);
+      filter.update();
+      out.value(k) = 0.0;  // no innovation
+      out.variance(k) = 1.0;
+      continue;
+    }
     filter.propagate(series.position[i](axis), series.velocity[i](axis), series.turning[i],
                      series.inflation.empty() ? 1.0 : series.inflation[i]);
     std::tie(out.value(k), out.variance(k)) = filter.update();

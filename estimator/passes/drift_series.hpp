@@ -13,6 +13,7 @@ struct DriftSeries {
   double sign = 1.0;                        // of the pass
   std::vector<Vector3> position, velocity;  // drive of the filter (N6), m and m/s
   std::vector<bool> turning;                // the gimbal turned
+  std::vector<bool> coasted;                // without observation: position and velocity start anew
   std::vector<double> start_s, end_s;       // of the interval, chronological
   std::vector<double> inflation;            // of the noise's variance; empty: 1 everywhere
   std::size_t size() const { return position.size(); }

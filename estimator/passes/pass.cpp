@@ -38,6 +38,70 @@ struct DynamicModel {
   }
 };
 
+// Noise of an interval without observation: position and velocity are as unknown as where a pass begins, and the attitude
+// wanders no less than if the gyros had held it.
+class CoastNoise {
+ public:
+  CoastNoise(const PassInput& input, const DynamicModel& model) : prior_(input.prior), L_(model.L), q_(model.q) {
+    L_.topLeftCorner<9, 9>().setIdentity();
+    attitude_ = input.noise.gyro_arw * input.noise.gyro_arw;
+  }
+  const MatrixX& L() const { return L_; }
+  const VectorX& q(const Interval& interval) {
+    const double opened = interval.turned >= 0 ? prior_.attitude * prior_.attitude : 0.0;
+    q_.segment<3>(StateLayout::position).setConstant(prior_.position * prior_.position);
+    q_.segment<3>(StateLayout::velocity).setConstant(prior_.velocity * prior_.velocity);
+    q_.segment<3>(StateLayout::attitude).setConstant(attitude_ * interval.length_s + opened);
+    return q_;
+  }
+
+ private:
+  const PriorModel& prior_;
+  MatrixX L_;
+  VectorX q_;
+  double attitude_;
+};
+
+// What a pass finds of the turns that the gyros did not see: the attitude before one, and behind it until the IMU turns again.
+class UnseenTurns {
+ public:
+  UnseenTurns(const ImuData& data, double sign) : sign_(sign) {
+    for (const Coast& coast : data.coasts) {
+      turns_.push_back(coast.turn);
+    }
+  }
+  void before(const Matrix3& C_nb, const VectorX& mean) { before_ = corrected(C_nb, mean); }
+  void behind(const Interval& interval, const Matrix3& C_nb, const VectorX& mean) {
+    if (interval.turned >= 0) {
+      open_ = interval.turned;
+      begun_ = before_;
+      first_ = C_nb;
+      turned_ = 0.0;
+    } else if (open_ >= 0) {
+      turned_ += interval.angle_b.norm();
+      if (turned_ > still) {
+        open_ = -1;
+      }
+    }
+    if (open_ >= 0) {
+      const Matrix3 R = begun_.transpose() * corrected(first_, mean);
+      turns_[static_cast<std::size_t>(open_)] = sign_ > 0.0 ? R : Matrix3(R.transpose());
+    }
+  }
+  std::vector<Matrix3> take() { return std::move(turns_); }
+
+ private:
+  static constexpr double still = 0.1;  // rad: the Earth turns the IMU by as much in 23 min
+  static Matrix3 corrected(const Matrix3& C_nb, const VectorX& mean) {
+    return matrix_from_rotation_vector(mean.segment<3>(StateLayout::attitude)) * C_nb;
+  }
+  double sign_;
+  std::vector<Matrix3> turns_;
+  Matrix3 before_ = Matrix3::Identity(), begun_ = before_, first_ = before_;
+  int open_ = -1;
+  double turned_ = 0.0;
+};
+
 VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
   VectorX sigma(layout.count());
   sigma.segment<3>(StateLayout::position).setConstant(input.prior.position);
@@ -89,6 +153,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   DynamicModel model(
       input.noise.observation, input.interval_s,
       process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s, input.sign));
+  CoastNoise coast_noise(input, model);
+  UnseenTurns turns(*input.data, input.sign);
   const double noise_variance = input.noise.observation.sigma * input.noise.observation.sigma / input.interval_s;
   const int d = layout.dynamic_count();
   const double intervals = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s;
@@ -112,6 +178,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   for (const VectorX& h : model.h) {  // where the pass begins the position is known as well
     filter.update(h, 0.0, noise_variance);
   }
+  turns.before(navigator.C_nb(), filter.mean());
   while (navigator.next(interval)) {
     if (stop.stop_requested()) {
       out.stopped = true;
@@ -121,8 +188,23 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     model.drive.head<9>() = interval.drive;
     Gamma.topRows<9>() = interval.Gamma;
     const double inflation = input.noise.inflation(0.5 * (interval.start_s + interval.end_s));
-    filter.propagate(model.Phi, Gamma, model.drive, model.L, inflation * model.q);
+    if (interval.coasted) {
+      filter.propagate(model.Phi, Gamma, model.drive, coast_noise.L(), coast_noise.q(interval));
+    } else {
+      filter.propagate(model.Phi, Gamma, model.drive, model.L, inflation * model.q);
+    }
     ++index;
+    if (interval.coasted) {
+      if (observer != nullptr) {
+        observer->propagated(interval, filter);
+      }
+      for (const VectorX& h : model.h) {  // as where the pass begins
+        filter.update(h, 0.0, noise_variance);
+      }
+      turns.behind(interval, navigator.C_nb(), filter.mean());
+      turns.before(navigator.C_nb(), filter.mean());
+      continue;
+    }
     if (std::abs(interval.length_s - input.interval_s) > 0.1 * input.interval_s) {
       continue;  // the remainder at the end of the data: noise and motion are those of a whole interval
     }
@@ -145,6 +227,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
                                    std::log(2.0 * std::numbers::pi * innovation.variance));
     }
     epoch.position = filter.mean().segment<3>(StateLayout::position);
+    turns.behind(interval, navigator.C_nb(), filter.mean());
+    turns.before(navigator.C_nb(), filter.mean());
     out.epochs.push_back(epoch);
     if (index % history_step == 0) {
       record_history();
@@ -152,6 +236,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   }
   record_history();
   out.nis_mean = out.epochs.empty() ? 0.0 : nis / (3.0 * static_cast<double>(out.epochs.size()));
+  out.turns = turns.take();
   out.mean = filter.mean();
   out.covariance = filter.covariance();
   out.C_nb = matrix_from_rotation_vector(out.mean.segment<3>(StateLayout::attitude)) * navigator.C_nb();

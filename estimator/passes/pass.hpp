@@ -72,6 +72,7 @@ struct PassOutput {
   double log_likelihood = 0.0;
   std::vector<double> history_s;
   std::vector<ParameterVector> history_value, history_sigma;
+  std::vector<Matrix3> turns;  // of the data's coasts: as known after the pass
   bool stopped = false;
 };
 

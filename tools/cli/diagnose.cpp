@@ -20,6 +20,7 @@
 #include "tools/cli/dwell_table.hpp"
 #include "tools/cli/poses_input.hpp"
 #include "tools/cli/poses_output.hpp"
+#include "tools/cli/sound_part.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -34,6 +35,7 @@ struct DiagnoseArguments {
   std::string holdout;
   DiscoveryArguments discovery;
   bool json = false;
+  bool strict = false;
   double false_alarm_rate = diagnosis::DiagnosisOptions{}.false_alarm_rate;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
   double gyro_lsb_arcsec = 0.1, accel_lsb_mps = 2e-6;
@@ -47,6 +49,7 @@ struct Opened {
   document::InputFile file;
   LoadedRecording loaded;
   std::vector<double> first_temperature;
+  std::unique_ptr<SoundPart> sound;  // null: all of it
   ImuData data;
 };
 
@@ -67,6 +70,23 @@ Expected<std::unique_ptr<Opened>> open(const std::string& path) {
   opened->loaded = std::move(*loaded);
   opened->data = imu_view(opened->loaded.recording, opened->first_temperature);
   return opened;
+}
+
+// Diagnoses what is sound of a recording and leaves that in `opened`, with the turns as found.
+diagnosis::DiagnosisOutcome diagnose_sound(Opened& opened, const diagnosis::DiagnosisOptions& options, bool strict,
+                                           const std::function<void(const std::string&)>& say) {
+  if (!strict) {
+    opened.sound = sound_part_or_all(opened.loaded.recording);
+    opened.data = opened.sound ? opened.sound->aside.data() : opened.data;
+  }
+  diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(opened.data, options, say);
+  if (outcome.diagnosis && opened.sound) {
+    CalibrationResult& calibration = outcome.diagnosis->calibration;
+    opened.sound->coasts = calibration.coasts;
+    opened.data.coasts = opened.sound->coasts;
+    calibration.left_out = opened.sound->aside.left_out();
+  }
+  return outcome;
 }
 
 diagnosis::DiagnosisOptions options_from(const DiagnoseArguments& arguments) {
@@ -227,13 +247,13 @@ Expected<Others> open_others(const DiagnoseArguments& arguments, const Opened& f
 
 // Each by itself.
 Expected<std::vector<diagnosis::Diagnosis>> diagnose_each(const Others& others,
-                                                          const diagnosis::DiagnosisOptions& options) {
+                                                          const diagnosis::DiagnosisOptions& options, bool strict) {
   std::vector<diagnosis::Diagnosis> diagnoses;
   for (const auto& other : others) {
     const std::string& file = other->file.name;
     ProgressLine line;
-    diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(
-        other->data, options, [&](const std::string& words) { line.show(fmt::format("{}: {}", file, words)); });
+    diagnosis::DiagnosisOutcome outcome = diagnose_sound(
+        *other, options, strict, [&](const std::string& words) { line.show(fmt::format("{}: {}", file, words)); });
     if (!outcome.diagnosis) {
       return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, outcome.failure));
     }
@@ -302,7 +322,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   }
   const diagnosis::DiagnosisOutcome outcome = [&] {
     ProgressLine line;
-    return diagnosis::diagnose(data, options, [&line](const std::string& words) { line.show(words); });
+    return diagnose_sound(**opened, options, arguments.strict, [&line](const std::string& words) { line.show(words); });
   }();
   if (!outcome.diagnosis) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.recording, outcome.failure));
@@ -319,7 +339,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!splits) {
     return tl::unexpected(splits.error());
   }
-  const Expected<std::vector<diagnosis::Diagnosis>> of_others = diagnose_each(*others, options);
+  const Expected<std::vector<diagnosis::Diagnosis>> of_others = diagnose_each(*others, options, arguments.strict);
   if (!of_others) {
     return tl::unexpected(of_others.error());
   }
@@ -367,6 +387,7 @@ CommandRun configure(Options& options) {
   auto arguments = std::make_shared<DiagnoseArguments>();
   options.text("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file", Needed::yes);
   options.flag("--json", arguments->json, "one JSON document on standard output");
+  add_strict_option(options, arguments->strict);
   options.text("--physics", arguments->physics, "write what was named as a physics file for the simulation");
   options.text("--amended", arguments->amended,
                "write physics.toml, sim.toml (with the 24 as fitted) and schedule.toml into this folder");

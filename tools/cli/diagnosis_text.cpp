@@ -6,6 +6,7 @@
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
+#include "daemon/estimate/left_out.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/summary.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
@@ -157,6 +158,9 @@ std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colo
     return text;
   }
   text += '\n';
+  if (!d.calibration.left_out.empty()) {
+    text += left_out_text(d.calibration) + "\n";
+  }
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
   text += remainder_text(d);

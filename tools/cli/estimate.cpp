@@ -10,6 +10,7 @@
 #include "protocol/recording/recording_file.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/estimator_arguments.hpp"
+#include "tools/cli/sound_part.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
@@ -20,6 +21,7 @@ struct EstimateArguments {
   bool json = false;
   bool curves = false;
   bool no_diagnosis = false;
+  bool strict = false;
   std::string covariance = "once";
   std::uint64_t max_passes = static_cast<std::uint64_t>(CalibrationOptions{}.max_passes);
   double convergence_sigma = CalibrationOptions{}.convergence_sigma;
@@ -51,9 +53,14 @@ Expected<int> estimate(const EstimateArguments& arguments) {
   if (!options) {
     return tl::unexpected(options.error());
   }
-  const Expected<LoadedRecording> loaded = read_recording(arguments.recording);
+  const CheckPolicy policy{.gaps_are_errors = arguments.strict};
+  const Expected<LoadedRecording> loaded = read_recording(arguments.recording, policy);
   if (!loaded) {
     return tl::unexpected(loaded.error());
+  }
+  const Expected<std::unique_ptr<SoundPart>> sound = sound_part(loaded->recording, arguments.strict);
+  if (!sound) {
+    return fail(sound.error().kind, fmt::format("{}: {}", arguments.recording, sound.error().message));
   }
   for (const std::string& warning : loaded->warnings) {
     fmt::print(stderr, "selfcal estimate: warning: {}: {}\n", arguments.recording, warning);
@@ -63,7 +70,7 @@ Expected<int> estimate(const EstimateArguments& arguments) {
     const JudgedProgress progress{[&line](const CalibrationProgress& p) { line.show(progress_text(p)); },
                                   [&line](const std::string& step) { line.show("looking for the cause: " + step); }};
     return judged_calibration(loaded->recording, *options, {}, {arguments.recording, 0}, !arguments.no_diagnosis,
-                              progress);
+                              progress, {}, *sound ? &(*sound)->aside : nullptr);
   }();
   if (!judged) {
     return fail(judged.error().kind, fmt::format("{}: {}", arguments.recording, judged.error().message));
@@ -88,6 +95,7 @@ CommandRun configure(Options& options) {
   options.flag("--curves", arguments->curves, "with --json: convergence within the passes, and the correlations");
   options.flag("--no-diagnosis", arguments->no_diagnosis,
                "do not look for the cause where recording and model disagree (some seconds)");
+  add_strict_option(options, arguments->strict);
   arguments->noise.add_to(options);
   options.choice("--covariance", arguments->covariance, {"once", "carried"},
                  "once: every datum counts once; carried: kept from pass to pass (overconfident, for comparison)");

@@ -11,6 +11,7 @@
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/judged_result.hpp"
+#include "daemon/estimate/left_out.hpp"
 #include "daemon/host/wall_clock.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/file_hash.hpp"
@@ -24,6 +25,7 @@
 #ifndef SELFCAL_WITHOUT_HUB
 #include "tools/cli/report_hub.hpp"
 #endif
+#include "tools/cli/sound_part.hpp"
 #include "tools/cli/terminal.hpp"
 #include "tools/report/calibration_document.hpp"
 #include "tools/report/fleet_document.hpp"
@@ -64,9 +66,10 @@ Expected<CalibrationOptions> options_from(const ReportArguments& arguments) {
 
 // Adds the diagnosis, and to the summary the cause that it names.
 Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recording& recording,
-                             const std::string& name, const CalibrationOptions& calibration, double false_alarm_rate) {
+                             const std::string& name, const CalibrationOptions& calibration, double false_alarm_rate,
+                             const SoundPart* sound) {
   std::vector<double> first_temperature;
-  const ImuData data = imu_view(recording, first_temperature);
+  ImuData data = sound != nullptr ? sound->aside.data() : imu_view(recording, first_temperature);
   diagnosis::DiagnosisOptions options;
   options.calibration = calibration;
   options.false_alarm_rate = false_alarm_rate;
@@ -77,6 +80,7 @@ Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recor
   }
   const discovery::Discovery* found = cause.beyond ? &*cause.beyond : nullptr;
   Json document = diagnosis_json(*cause.diagnosis, false_alarm_rate, {}, found);
+  data.coasts = cause.diagnosis->calibration.coasts;  // with the turns as found
   if (cause.diagnosis->faults.empty()) {
     document["map"] = report::misfit_map(data, *cause.diagnosis);
   }
@@ -90,17 +94,27 @@ Expected<Json> recording_document(const std::string& file, const ReportArguments
   if (!options) {
     return tl::unexpected(options.error());
   }
-  const Expected<LoadedRecording> loaded = read_recording(file);
+  const Expected<LoadedRecording> loaded = read_recording(file, {.gaps_are_errors = false});
   if (!loaded) {
     return tl::unexpected(loaded.error());
   }
-  const Expected<JudgedResult> judged = judged_calibration(loaded->recording, *options, {}, {file, 0}, false);
+  const Expected<std::unique_ptr<SoundPart>> sound = sound_part(loaded->recording, false);
+  if (!sound) {
+    return fail(sound.error().kind, fmt::format("{}: {}", file, sound.error().message));
+  }
+  const diagnosis::SetAside* aside = *sound ? &(*sound)->aside : nullptr;
+  const Expected<JudgedResult> judged =
+      judged_calibration(loaded->recording, *options, {}, {file, 0}, false, {}, {}, aside);
   if (!judged) {
     return fail(judged.error().kind, fmt::format("{}: {}", file, judged.error().message));
   }
   Json document = report::calibration_document(*judged, *options, loaded->recording, loaded->warnings);
+  if (aside != nullptr) {
+    document["warnings"].push_back(left_out_text(judged->result));
+  }
   if (!arguments.no_diagnosis) {
-    const auto added = add_diagnosis(document, *judged, loaded->recording, file, *options, arguments.false_alarm_rate);
+    const auto added =
+        add_diagnosis(document, *judged, loaded->recording, file, *options, arguments.false_alarm_rate, sound->get());
     if (!added) {
       return tl::unexpected(added.error());
     }

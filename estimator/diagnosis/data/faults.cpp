@@ -25,6 +25,14 @@ void note(DataFault& fault, std::size_t sample) {
   }
 }
 
+// Adds sample i to the last stretch or begins another.
+void spoil(std::vector<FaultyStretch>& stretches, std::size_t i, bool gyros) {
+  if (stretches.empty() || stretches.back().last != i || stretches.back().gyros != gyros) {
+    stretches.push_back({i, i, gyros});
+  }
+  stretches.back().last = i + 1;
+}
+
 bool same(const ImuData& d, std::size_t i, std::size_t j) {
   return d.delta_theta[i] == d.delta_theta[j] && d.delta_v[i] == d.delta_v[j];
 }
@@ -61,6 +69,7 @@ struct Losses {
   std::size_t by_chance = 0;                   // samples like the last but one
   std::size_t longest = 0, longest_first = 0;  // samples in a row that repeat the one before
   double missing = 0.0;
+  std::vector<FaultyStretch> runs;  // of three repeats and more
 };
 
 Losses count_losses(const ImuData& data) {
@@ -70,6 +79,7 @@ Losses count_losses(const ImuData& data) {
   for (std::size_t i = 0; i < data.size(); ++i) {
     if (data.delta_v[i] == zero) {
       note(l.zeros, i);
+      spoil(l.zeros.stretches, i, data.delta_theta[i] == zero);
     } else if (i > 0 && same(data, i, i - 1)) {
       note(l.repeats, i);
     } else if (i > 1 && same(data, i, i - 2)) {
@@ -80,43 +90,69 @@ Losses count_losses(const ImuData& data) {
       l.longest = run;
       l.longest_first = i + 1 - run;
     }
+    if (constexpr std::size_t least = 3; run == least) {
+      l.runs.push_back({i + 1 - run, i + 1, true});
+    } else if (run > least) {
+      l.runs.back().last = i + 1;
+    }
     const double steps = i > 0 ? (data.time_s[i] - data.time_s[i - 1]) * data.sample_rate_hz : 1.0;
     if (steps > 1.5) {
       note(l.gaps, i);
+      spoil(l.gaps.stretches, i, true);
       l.missing += steps - 1.0;
     }
   }
   return l;
 }
 
-void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
-  auto [zeros, repeats, gaps, by_chance, longest, longest_first, missing] = count_losses(data);
-  const double chance = std::max(static_cast<double>(by_chance), repeats_by_chance(data));
-  const double excess = static_cast<double>(repeats.count) - chance;
-  if (zeros.count > 0) {
-    zeros.words = number("%.0f samples have zero velocity increments", static_cast<double>(zeros.count));
-    faults.push_back(zeros);
-  }
-  // Difference of two counts, 5 sigma; sensors move together, and neighbours are alike by half more often than their product.
+// Of n samples a run of r comes by chance n p^r times; where p is too small to be counted, 2 %. Shortest that does not; 0: none.
+std::size_t improbable_run(double n, double chance) {
+  constexpr double least_p = 0.02, never = 1e-4, most_p = 0.5;
+  const double p = std::max(least_p, (chance + 3.0) / n);
+  return p < most_p ? static_cast<std::size_t>(std::ceil(std::log(never / n) / std::log(p))) : 0;
+}
+
+// Difference of two counts, 5 sigma; sensors move together, and neighbours are alike by half more often than their product.
+bool more_than_chance(double repeats, double chance) {
   constexpr double moving_excess = 40.0, together = 0.5;
-  if (excess > std::max({moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0), together * chance})) {
-    repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
-                           static_cast<double>(repeats.count), chance);
-    faults.push_back(repeats);
-  } else if (zeros.count == 0) {
-    // Of n samples a run of r comes by chance n p^r times; where p is too small to be counted, 2 %.
-    const auto n = static_cast<double>(data.size());
-    constexpr double least_p = 0.02, never = 1e-4;
-    const double p = std::max(least_p, (chance + 3.0) / n);
-    if (p < 0.5 && n * std::pow(p, static_cast<double>(longest)) < never) {
-      faults.push_back({"lost_samples",
-                        number("%.0f samples in a row repeat the one before", static_cast<double>(longest)),
-                        longest_first, longest});
+  return repeats - chance > std::max({moving_excess, 5.0 * std::sqrt(2.0 * chance + 1.0), together * chance});
+}
+
+void repeated_samples(const ImuData& data, Losses& l, std::vector<DataFault>& faults) {
+  const double chance = std::max(static_cast<double>(l.by_chance), repeats_by_chance(data));
+  const std::size_t improbable = improbable_run(static_cast<double>(data.size()), chance);
+  std::vector<FaultyStretch> runs;
+  std::size_t in_runs = 0;
+  for (const FaultyStretch& run : l.runs) {
+    if (improbable > 0 && run.last - run.first >= improbable) {
+      runs.push_back(run);
+      in_runs += run.last - run.first;
     }
   }
-  if (gaps.count > 0) {
-    gaps.words = number("%.0f gaps, %.0f samples missing", static_cast<double>(gaps.count), missing);
-    faults.push_back(gaps);
+  if (more_than_chance(static_cast<double>(l.repeats.count), chance)) {
+    l.repeats.words = number("%.0f samples repeat the one before (%.0f expected by chance)",
+                             static_cast<double>(l.repeats.count), chance);
+    if (!more_than_chance(static_cast<double>(l.repeats.count - in_runs), chance)) {
+      l.repeats.stretches = runs;
+    }
+    faults.push_back(l.repeats);
+  } else if (l.zeros.count == 0 && !runs.empty()) {
+    faults.push_back({"lost_samples",
+                      number("%.0f samples in a row repeat the one before", static_cast<double>(l.longest)),
+                      l.longest_first, l.longest, runs});
+  }
+}
+
+void lost_samples(const ImuData& data, std::vector<DataFault>& faults) {
+  Losses l = count_losses(data);
+  if (l.zeros.count > 0) {
+    l.zeros.words = number("%.0f samples have zero velocity increments", static_cast<double>(l.zeros.count));
+    faults.push_back(l.zeros);
+  }
+  repeated_samples(data, l, faults);
+  if (l.gaps.count > 0) {
+    l.gaps.words = number("%.0f gaps, %.0f samples missing", static_cast<double>(l.gaps.count), l.missing);
+    faults.push_back(l.gaps);
   }
 }
 
@@ -177,6 +213,7 @@ void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, 
     if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
       fault.first_sample = fault.count == 0 ? start : fault.first_sample;
       fault.count += i - start;
+      fault.stretches.push_back({start, i, gyro});
     }
     start = i;
   }
@@ -212,7 +249,7 @@ std::vector<DataFault> find_data_faults(const ImuData& data) {
   time_base(data, faults);
   frozen_axes(data, segments, faults);
   find_spikes(sensors, segments, faults);
-  find_saturation(data, faults);
+  find_saturation(data, segments, faults);
   if (faults.empty()) {  // else what a turn adds up to is no question of axes
     find_wrong_axes(data, segments, faults);
   }

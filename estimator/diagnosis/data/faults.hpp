@@ -8,12 +8,20 @@
 
 namespace selfcal::diagnosis {
 
+// Samples [first, last) that a fault spoils; the gyros' among them or only the accelerometers'.
+struct FaultyStretch {
+  std::size_t first = 0, last = 0;
+  bool gyros = true;
+};
+
 struct DataFault {
   // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_sign, wrong_scale, wrong_site
   std::string id;
   std::string words;  // what is wrong, by what it shows, and what mends it
   std::size_t first_sample = 0;
   std::size_t count = 0;  // samples concerned
+  // All of it, where it is a fault of a part of the recording; empty: of the whole.
+  std::vector<FaultyStretch> stretches = {};
 };
 
 // Each kind at most once, with its first sample and how many there are.

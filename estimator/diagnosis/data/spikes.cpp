@@ -21,21 +21,43 @@ std::string name_of(std::size_t axis) { return std::string(axis < 3 ? "gyro " : 
 // Samples at the extreme value in runs that are entered from a slope. A drive comes up to its rate smoothly, and where
 // the noise is below the quantum the rate is one count all along: no clipping. Over the last 0.05 s before a rate is
 // reached with continuous acceleration, ramps of a second and more change it by less than 0.7 %; a clipped ramp by 3 %.
+struct Clipping {
+  std::size_t met = 0, first = 0;
+  std::vector<FaultyStretch> runs;
+};
+
 template <typename Value>
-std::size_t steeply_met(const ImuData& data, const Value& value, double largest) {
+Clipping clipping(const ImuData& data, const Value& value, std::size_t first, std::size_t last, bool gyro) {
   constexpr double steep = 0.01;
+  Clipping found;
+  double largest = 0.0;
+  for (std::size_t i = first; i < last; ++i) {
+    if (std::abs(value(i)) > largest) {
+      largest = std::abs(value(i));
+      found.first = i;
+    }
+  }
+  const double rest = gyro ? 0.5 * units::degree : 11.0;  // below it the largest count of a gyro is only noise
+  if (largest * data.sample_rate_hz <= rest) {
+    return found;
+  }
   const auto back = static_cast<std::size_t>(std::max(1.0, std::round(0.05 * data.sample_rate_hz)));
-  std::size_t met = 0;
   bool run = false, counts = false;
-  for (std::size_t i = 0; i < data.size(); ++i) {
+  for (std::size_t i = first; i < last; ++i) {
     const bool extreme = std::abs(value(i)) == largest;
     if (extreme && !run) {
       counts = i > back && std::abs(value(i - 1) - value(i - 1 - back)) > steep * largest;
+      if (counts) {
+        found.runs.push_back({i, i, gyro});
+      }
     }
     run = extreme;
-    met += extreme && counts ? 1 : 0;
+    if (extreme && counts) {
+      ++found.met;
+      found.runs.back().last = i + 1;
+    }
   }
-  return met;
+  return found;
 }
 
 // How far each sample in the dwells stands from what its neighbours make of it (fourth differences: a turn's smooth
@@ -115,6 +137,7 @@ void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std:
       const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
       if (off[k] > spike_sigmas && largest_around && !is_motion(d, axis, k, data.sample_rate_hz)) {
         spike.first_sample = spike.count++ == 0 ? d.sample[k] : spike.first_sample;
+        spike.stretches.push_back({d.sample[k] - 2, d.sample[k] + 3, axis < 3});
       }
     }
     if (spike.count > 0) {
@@ -126,24 +149,28 @@ void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std:
   }
 }
 
-void find_saturation(const ImuData& data, std::vector<DataFault>& faults) {
+void find_saturation(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  constexpr std::size_t often = 100, in_a_turn = 20;
+  constexpr double in_a_turn_s = 0.25;
+  const auto least = std::max(in_a_turn, static_cast<std::size_t>(in_a_turn_s * data.sample_rate_hz));
   for (std::size_t axis = 0; axis < axes; ++axis) {
     const auto value = [&](std::size_t i) { return value_at(data, i, axis); };
-    double largest = 0.0;
-    std::size_t first_met = 0;
-    for (std::size_t i = 0; i < data.size(); ++i) {
-      if (std::abs(value(i)) > largest) {
-        largest = std::abs(value(i));
-        first_met = i;
+    Clipping found = clipping(data, value, 0, data.size(), axis < 3);
+    if (found.met <= often) {
+      found = {};
+      for (const Segment& s : segments) {
+        const Clipping turn = s.rotation && axis < 3 ? clipping(data, value, s.first, s.last, true) : Clipping{};
+        if (turn.met > least) {
+          found.first = found.met == 0 ? turn.first : found.first;
+          found.met += turn.met;
+          found.runs.insert(found.runs.end(), turn.runs.begin(), turn.runs.end());
+        }
       }
     }
-    const std::size_t met = steeply_met(data, value, largest);
-    constexpr std::size_t often = 100;
-    constexpr double rest_rate = 0.5 * units::degree;  // below it the largest count of a gyro is only noise
-    const bool loud = axis < 3 ? largest * data.sample_rate_hz > rest_rate : largest * data.sample_rate_hz > 11.0;
-    if (met > often && loud) {
-      faults.push_back(
-          {"saturation", name_of(axis) + " meets its extreme value " + std::to_string(met) + " times", first_met, met});
+    if (found.met > 0) {
+      faults.push_back({"saturation",
+                        name_of(axis) + " meets its extreme value " + std::to_string(found.met) + " times", found.first,
+                        found.met, found.runs});
     }
   }
 }

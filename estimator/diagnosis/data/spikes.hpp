@@ -12,7 +12,7 @@ namespace selfcal::diagnosis {
 // the neighbouring samples, or shows in both triads; a spike does neither. Appends.
 void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults);
 
-// Extreme values that are met again and again. Appends.
-void find_saturation(const ImuData& data, std::vector<DataFault>& faults);
+// Extreme values that are met again and again, in the recording or in one turn. Appends.
+void find_saturation(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults);
 
 }  // namespace selfcal::diagnosis

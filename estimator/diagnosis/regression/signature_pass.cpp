@@ -110,6 +110,9 @@ class RowWriter : public PassObserver {
     next.topRows<9>() += own_.Gamma.rightCols(s_.cols());
     s_.topRows(dynamic_) = next;
     displace(own_.end_s - start_s_);
+    if (own_.coasted) {
+      s_.topRows<3>() = -at_epoch_;  // as where the pass begins
+    }
     middle_s_ = 0.5 * (own_.start_s + own_.end_s);
   }
 
