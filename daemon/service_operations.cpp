@@ -8,7 +8,7 @@
 
 #include "daemon/host/journal.hpp"
 #include "daemon/host/wall_clock.hpp"
-#include "daemon/ins/can_port.hpp"
+#include "daemon/ins/frame_port.hpp"
 #include "daemon/ins/unlock_key.hpp"
 #include "daemon/service.hpp"
 #include "daemon/store/database_copies.hpp"
@@ -66,7 +66,7 @@ Expected<void> Service::attach(Session& session, RunRecord record, const std::st
     return fail(ErrorKind::device, fmt::format("{}: {}", run_folder(record.id).string(), error.message()));
   }
   session.run.reset();
-  session.port = std::make_unique<CanPort>(loop_, session.config);
+  session.port = open_port(loop_, session.config);
   if (!session.estimators) {
     session.estimators = std::make_unique<EstimateWorker>(loop_);
   }

@@ -122,6 +122,10 @@ Expected<void> take_profile(const std::string& file, NodeOptions& node) {
     if (!profile) {
       return tl::unexpected(profile.error());
     }
+    if ((*profile)->frames) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: bus.addressing: none: the virtual INS speaks UDS, and nothing else", file));
+    }
     node.diagnostics.profile = std::move(*profile);
   }
   const profile::Bus& bus = node.diagnostics.profile->bus;

@@ -13,9 +13,9 @@ constexpr std::size_t longest_answer = 128;
 }  // namespace
 
 BusQuestion::BusQuestion(EventLoop& loop, const InsConfig& config, std::function<void(const std::string&)> done)
-    : config_(config), listener_(config), port_(loop, config) {
-  port_.request(uds::read_request(config_.profile->serial), longest_answer,
-                [this, done = std::move(done)](const Answer<Bytes>& answer) { done(words_of(answer)); });
+    : config_(config), listener_(config), port_(open_port(loop, config)) {
+  port_->request(uds::read_request(config_.profile->serial), longest_answer,
+                 [this, done = std::move(done)](const Answer<Bytes>& answer) { done(words_of(answer)); });
 }
 
 std::string BusQuestion::words_of(const Answer<Bytes>& answer) {
@@ -29,6 +29,9 @@ std::string BusQuestion::words_of(const Answer<Bytes>& answer) {
   }
   if (answer.error().kind == PortError::Kind::protocol) {
     return fmt::format("{}, the INS's answer makes no sense ({})", up, answer.error().message);
+  }
+  if (config_.profile->frames) {
+    return fmt::format("{}, the INS is silent: {}", up, answer.error().message);
   }
   const std::string why = listener_.why_silent();
   return fmt::format("{}, no answer to {:#x}: {}", up, config_.request_id, why.empty() ? answer.error().message : why);

@@ -8,7 +8,7 @@
 #include "daemon/host/config.hpp"
 #include "daemon/host/event_loop.hpp"
 #include "daemon/ins/bus_listener.hpp"
-#include "daemon/ins/can_port.hpp"
+#include "daemon/ins/frame_port.hpp"
 
 namespace selfcal {
 
@@ -23,7 +23,7 @@ class BusQuestion {
 
   InsConfig config_;
   BusListener listener_;  // before the question, so that it hears all that follows
-  CanPort port_;
+  std::unique_ptr<InsPort> port_;
 };
 
 }  // namespace selfcal

@@ -7,71 +7,11 @@
 
 #include "protocol/profile/byte_picture.hpp"
 #include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/describe_frames.hpp"
+#include "protocol/profile/document_writer.hpp"
 
 namespace selfcal::profile {
 namespace {
-
-using Row = std::vector<std::string>;
-
-std::string html_text(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : std::string(1, c);
-  }
-  return out;
-}
-
-// The document in one of its two forms.
-class Writer {
- public:
-  Writer(Markup markup, std::string_view title) : html_(markup == Markup::html) {
-    if (html_) {
-      text_ = fmt::format(
-          "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title><style>\n"
-          "body{{font:16px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}\n"
-          "table{{border-collapse:collapse}}td,th{{border:1px solid #999;padding:.2em .6em;text-align:left}}\n"
-          "pre{{overflow-x:auto;background:#f4f4f4;padding:.6em}}\n</style></head><body>\n<h1>{0}</h1>\n",
-          html_text(title));
-    } else {
-      text_ = fmt::format("# {}\n\n", title);
-    }
-  }
-  void heading(std::string_view words) {
-    text_ += html_ ? fmt::format("<h2>{}</h2>\n", html_text(words)) : fmt::format("## {}\n\n", words);
-  }
-  void say(std::string_view words) {
-    text_ += html_ ? fmt::format("<p>{}</p>\n", html_text(words)) : fmt::format("{}\n\n", words);
-  }
-  void table(const Row& head, const std::vector<Row>& rows) {
-    const auto line = [&](const Row& cells, std::string_view tag) {
-      if (!html_) {
-        return fmt::format("| {} |\n", fmt::join(cells, " | "));
-      }
-      std::string out = "<tr>";
-      for (const std::string& text : cells) {
-        out += fmt::format("<{0}>{1}</{0}>", tag, html_text(text));
-      }
-      return out + "</tr>\n";
-    };
-    text_ += html_ ? "<table>\n" : "";
-    text_ += line(head, "th");
-    if (!html_) {
-      text_ += fmt::format("|{}\n", fmt::join(Row(head.size(), "---|"), ""));
-    }
-    for (const Row& row : rows) {
-      text_ += line(row, "td");
-    }
-    text_ += html_ ? "</table>\n" : "\n";
-  }
-  void picture(std::string_view drawing) {
-    text_ += html_ ? fmt::format("<pre>{}</pre>\n", html_text(drawing)) : fmt::format("```\n{}```\n\n", drawing);
-  }
-  std::string end() { return html_ ? text_ + "</body></html>\n" : text_.substr(0, text_.size() - 1); }
-
- private:
-  bool html_;
-  std::string text_;
-};
 
 std::string id_text(std::uint32_t id, bool extended) { return fmt::format("0x{:0{}X}", id, extended ? 8 : 3); }
 
@@ -167,15 +107,20 @@ class Document {
 
   std::string write() {
     out_.say(
-        "What an INS has to do so that selfcal calibrates it: rotate its IMU on its own gimbal, store and tell the raw "
-        "data, "
+        "What an INS has to do so that selfcal calibrates it: rotate its IMU on its own gimbal, tell the raw data, "
         "take the 24 coefficients and use them after the next power-on. Made from the profile.");
-    write_bus();
-    write_services();
-    write_identifiers();
-    write_records();
-    write_routines();
-    write_upload();
+    if (p_.frames) {
+      describe_frames(out_, p_);
+      write_set();
+    } else {
+      write_bus();
+      write_services();
+      write_identifiers();
+      write_records();
+      write_set();
+      write_routines();
+      write_upload();
+    }
     write_axes();
     return out_.end();
   }
@@ -289,6 +234,9 @@ class Document {
         out_.say(fmt::format("Not told, always the same: {} {:.12g}.", name, value));
       }
     }
+  }
+
+  void write_set() {
     out_.heading("Record coefficients: a set of the 24");
     out_.say(
         "Sensor output = truth + error, in selfcal's axes (below). df = bias + K+ max(f, 0) + K- max(-f, 0) per axis, "
@@ -310,13 +258,16 @@ class Document {
   }
 
   void write_fields_one_by_one() {
-    out_.say("Each field is a record of its own, read and written by its identifier; version is written last.");
+    const bool by_index = p_.frames.has_value();
+    out_.say(fmt::format("Each field is {}; version is written last.",
+                         by_index ? "told and written by its index, its bits being those of the signal value"
+                                  : "a record of its own, read and written by its identifier"));
     std::vector<Row> rows = rows_of(p_.set.fields, set_role());
     for (Row& row : rows) {
       const auto field = std::ranges::find(p_.set.fields, row[0], &Field::name);
-      row[1] = fmt::format("0x{:04X}", field->did.value_or(0));
+      row[1] = by_index ? std::to_string(*field->did - first_index_did) : fmt::format("0x{:04X}", *field->did);
     }
-    out_.table({"field", "identifier", "type", "byte order", "one count is", "meaning"}, rows);
+    out_.table({"field", by_index ? "index" : "identifier", "type", "byte order", "one count is", "meaning"}, rows);
   }
 
   void write_routine(const Routine& routine, std::string_view table, std::string_view words, bool has_result) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "protocol/key_program/key_program.hpp"
+#include "protocol/profile/frames.hpp"
 #include "protocol/profile/layout.hpp"
 
 namespace selfcal::profile {
@@ -82,6 +83,8 @@ struct Profile {
   Layout set;
   Routine rotate, erase, commit, navigation_check;
   Raw raw;
+  // An INS that speaks no UDS. All the rest is then what the service asks itself in its place (daemon/ins/frame_port).
+  std::optional<Frames> frames;
 };
 using ProfilePtr = std::shared_ptr<const Profile>;
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/profile/frames.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
 
 namespace selfcal::profile {
@@ -130,12 +131,16 @@ bool check_constant(Section& section, const Field& field, double value) {
   return fits;
 }
 
-void read_field(Section& section, const RoleField* role, ByteOrder order, bool field_by_field, Field& field) {
+void read_field(Section& section, const RoleField* role, ByteOrder order, std::string_view numbered_by, Field& field) {
   field.line = section.line();
   field.meaning = role == nullptr ? std::string_view() : role->meaning;
-  if (field_by_field) {
-    if (const auto did = section.whole("did", 1, 0xFFFF, true)) {
+  if (numbered_by == by_did) {
+    if (const auto did = section.whole(by_did, 1, 0xFFFF, true)) {
       field.did = static_cast<std::uint16_t>(*did);
+    }
+  } else if (numbered_by == by_index) {
+    if (const auto index = section.whole(by_index, 0, 0xFF, true)) {
+      field.did = static_cast<std::uint16_t>(first_index_did + *index);
     }
   } else {
     field.at = section.whole("at", 0, longest_record - 1, true).value_or(0);
@@ -213,8 +218,8 @@ void check_extents(Section& section, std::string_view prefix, const std::vector<
   }
 }
 
-void read_fields_of(Section& section, const RecordRole& role, bool repeated, ByteOrder order, bool field_by_field,
-                    std::vector<Field>& fields) {
+void read_fields_of(Section& section, const RecordRole& role, bool repeated, ByteOrder order,
+                    std::string_view numbered_by, std::vector<Field>& fields) {
   std::size_t next = 0;
   for (const std::string& name : section.keys()) {
     const RoleField* known = find_role(role, name);
@@ -238,8 +243,8 @@ void read_fields_of(Section& section, const RecordRole& role, bool repeated, Byt
     }
     Field field;
     field.name = name;
-    read_field(table, known, order, field_by_field, field);
-    if (field_by_field) {
+    read_field(table, known, order, numbered_by, field);
+    if (!numbered_by.empty()) {
       field.at = std::exchange(next, next + field.type.bytes * field.count);
     }
     fields.push_back(std::move(field));
@@ -260,7 +265,7 @@ void read_repetition(Section& section, const RecordRole& role, ByteOrder order, 
     section.fault("count", fmt::format("no such field: {}", each.count));
   }
   Section fields = section.table("fields", true);
-  read_fields_of(fields, role, true, order, false, each.fields);
+  read_fields_of(fields, role, true, order, {}, each.fields);
   std::vector<Extent> extents;
   for (const Field& field : each.fields) {
     extents.push_back(extent_of(field));
@@ -331,18 +336,20 @@ void check_record(Section& section, const Layout& layout) {
 
 }  // namespace
 
-void read_layout(Section& section, const RecordRole& role, ByteOrder order, Record& record, bool field_by_field) {
+void read_layout(Section& section, const RecordRole& role, ByteOrder order, Record& record,
+                 std::string_view numbered_by) {
+  const bool in_places = numbered_by.empty();
   Layout& layout = record.layout;
   layout.record = role.table;
   std::ranges::replace(layout.record, '_', ' ');
   const bool may_be_open = std::ranges::any_of(role.fields, &RoleField::repeated);
   Section fields = section.table("fields");
-  if (!field_by_field) {
+  if (in_places) {
     layout.bytes = section.whole("bytes", 1, longest_record, fields.there() && !may_be_open).value_or(0);
     layout.fill = static_cast<std::uint8_t>(section.whole("fill", 0, 255).value_or(0));
   }
-  read_fields_of(fields, role, false, order, field_by_field, layout.fields);
-  if (field_by_field) {
+  read_fields_of(fields, role, false, order, numbered_by, layout.fields);
+  if (!in_places) {
     layout.bytes = layout.fields.empty() ? 0 : layout.fields.back().end();
   }
   Section each = section.table("each", may_be_open && section.there());
@@ -351,7 +358,7 @@ void read_layout(Section& section, const RecordRole& role, ByteOrder order, Reco
   } else {
     read_repetition(each, role, order, layout);
   }
-  if (!field_by_field) {
+  if (in_places) {
     Section checksum = section.table("checksum");
     read_checksum(checksum, order, layout);
   }

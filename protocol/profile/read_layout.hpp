@@ -8,8 +8,9 @@
 namespace selfcal::profile {
 
 // Asks `section` for the keys of a layout; faults go where the section's go. What the role needs and neither a field nor
-// `given` has is a fault. Field by field: each field has an identifier, `did`, and no place; they stand one behind the other.
+// `given` has is a fault. Where the fields are numbered by a key, each has that and no place; they stand one behind the other.
+inline constexpr std::string_view by_did = "did", by_index = "index";
 void read_layout(Section& section, const RecordRole& role, ByteOrder order, Record& record,
-                 bool field_by_field = false);
+                 std::string_view numbered_by = {});
 
 }  // namespace selfcal::profile

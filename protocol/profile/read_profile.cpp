@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/read_frames.hpp"
 #include "protocol/profile/read_layout.hpp"
 #include "protocol/profile/read_security.hpp"
 
@@ -14,9 +15,11 @@ namespace selfcal::profile {
 namespace {
 
 constexpr std::uint64_t most_did = 0xFFFF;
-constexpr std::uint64_t most_samples = 145;  // of a page, as the service keeps it
+constexpr std::uint32_t longest_message = 4094;  // ISO-TP's 12 bits of length, less the service
+constexpr std::uint64_t most_samples = 145;      // of a page, as the service keeps it
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
-constexpr std::array<std::string_view, 3> addressings{"normal", "normal-29", "normal-fixed"};
+constexpr std::array<std::string_view, 4> addressings{"normal", "normal-29", "normal-fixed", "none"};
+constexpr std::string_view no_uds = "none";
 constexpr std::array<std::string_view, 2> address_units{"page", "byte"};
 
 // ISO 15765-2: the identifiers that normal fixed addressing makes of two addresses, with priority 6.
@@ -51,13 +54,7 @@ class ProfileReader {
   Expected<ProfilePtr> read() {
     profile_.name = root_.text("name", true).value_or("");
     order_ = root_.word("byte_order", orders).value_or("big") == "little" ? ByteOrder::little : ByteOrder::big;
-    read_bus();
-    read_timing();
-    read_identity();
-    read_records();
-    read_set();
-    read_routines();
-    read_raw();
+    read_bus() == no_uds ? read_plain_frames() : read_uds();
     read_axes();
     root_.only_these();
     if (!faults_.none()) {
@@ -67,6 +64,45 @@ class ProfileReader {
   }
 
  private:
+  void read_uds() {
+    read_timing();
+    read_identity();
+    read_records();
+    read_set();
+    read_routines();
+    read_raw();
+  }
+
+  // What the service asks in the INS's place, it asks as our own INS would be asked.
+  void read_plain_frames() {
+    const Profile& own = *built_in();
+    for (const auto member : {&Profile::state, &Profile::schedule, &Profile::directory}) {
+      profile_.*member = own.*member;
+    }
+    profile_.serial = own.serial;
+    profile_.software = own.software;
+    profile_.rotate = own.rotate;
+    profile_.raw.page = own.raw.page;
+    profile_.raw.way = Raw::Way::memory;
+    profile_.raw.by_page = false;
+    profile_.raw.longest_read = longest_message;
+    profile_.security.needed = false;
+    Section timing = root_.table("timing");
+    profile_.timing.request_timeout_s = timing.number("request_timeout_s", 0.01, 60).value_or(1.0);
+    timing.only_these();
+    read_record("sample_format", profile_.sample_format, false);
+    if (profile_.sample_format.did) {
+      root_.fault("sample_format", "an INS without records tells none: give the values");
+    }
+    Section set = root_.table("coefficients", true);
+    if (set.there()) {
+      profile_.slots = false;
+      profile_.field_by_field = true;
+      read_set_layout(set, by_index);
+    }
+    profile_.frames = read_frames(root_, profile_, order_);
+  }
+
   std::optional<std::uint16_t> did(Section& section, std::string_view key, bool needed) {
     const auto number = section.whole(key, 1, most_did, needed);
     if (!number) {
@@ -84,15 +120,20 @@ class ProfileReader {
     return static_cast<std::uint32_t>(id.value_or(0));
   }
 
-  void read_bus() {
+  // The addressing.
+  std::string read_bus() {
     Section bus = root_.table("bus", true);
     if (!bus.there()) {
-      return;
+      return {};
     }
     Bus& b = profile_.bus;
     const std::string addressing = bus.word("addressing", addressings, true).value_or("normal");
-    b.extended_ids = addressing != "normal";
+    b.extended_ids = addressing == no_uds ? bus.flag("extended_ids").value_or(false) : addressing != "normal";
     b.fd = bus.flag("fd").value_or(false);
+    if (addressing == no_uds) {
+      bus.only_these();
+      return addressing;
+    }
     Numbers ids("identifier");
     if (addressing == "normal-fixed") {
       const auto ins = static_cast<std::uint32_t>(bus.whole("ins_address", 0, 255, true).value_or(0));
@@ -118,6 +159,7 @@ class ProfileReader {
       bus.fault("st_min", fmt::format("0x{:02X} is reserved: 0 to 0x7F ms, 0xF1 to 0xF9 times 100 us", b.st_min));
     }
     bus.only_these();
+    return addressing;
   }
 
   void read_timing() {
@@ -180,11 +222,15 @@ class ProfileReader {
       profile_.set_inactive = did(section, "inactive", true);
       profile_.set_factory = did(section, "factory", false);
     }
+    read_set_layout(section, profile_.field_by_field ? by_did : std::string_view());
+  }
+
+  void read_set_layout(Section& section, std::string_view numbered_by) {
     Record record;
-    read_layout(section, set_role(), order_, record, profile_.field_by_field);
+    read_layout(section, set_role(), order_, record, numbered_by);
     for (const Field& field : record.layout.fields) {
       if (field.did) {
-        dids_.take(faults_, field.line, fmt::format("coefficients.fields.{}.did", field.name), *field.did);
+        dids_.take(faults_, field.line, fmt::format("coefficients.fields.{}.{}", field.name, numbered_by), *field.did);
       }
     }
     section.only_these();
@@ -258,7 +304,7 @@ class ProfileReader {
     const auto largest = [](std::size_t bytes) { return (std::uint64_t{1} << (8 * bytes)) - 1; };
     raw.first_address =
         static_cast<std::uint32_t>(memory.whole("address", 0, largest(raw.address_bytes), true).value_or(0));
-    constexpr std::uint64_t shortest = 32, longest = 4094;  // ISO-TP's 12 bits of length, less the service
+    constexpr std::uint64_t shortest = 32, longest = longest_message;
     raw.longest_read = static_cast<std::uint32_t>(
         memory.whole("longest", shortest, std::min(longest, largest(raw.size_bytes)), true).value_or(shortest));
     memory.only_these();

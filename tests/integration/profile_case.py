@@ -8,7 +8,8 @@ import case
 PROFILES = case.ROOT / "config" / "profiles"
 FOREIGN = case.ROOT / "tests" / "foreign"
 SPEED, DWELL_S = 60.0, 20.0
-SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml does not tell
+SLOW = 25.0  # what Python streams in frames beside everything else on one processor
+SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml and frames.toml do not tell
 
 
 class UnderProfile(case.OnBench):
@@ -17,9 +18,9 @@ class UnderProfile(case.OnBench):
         self.assertEqual((run["state"], run["exit_status"]), ("completed", case.DONE), run["reason"])
         return run
 
-    def bench_of(self, profile, **ins):
-        site = SITE if profile == "memory.toml" else {}
-        return self.bench(speed=SPEED, ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins,
+    def bench_of(self, profile, speed=SPEED, **ins):
+        site = SITE if profile in ("memory.toml", "frames.toml") else {}
+        return self.bench(speed=speed, ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins,
                           sim_options=["--profile", PROFILES / profile])
 
     def assert_same(self, run, own, what):
@@ -30,17 +31,17 @@ class UnderProfile(case.OnBench):
         print(f"{what} against our own INS: 24 values, largest difference {largest:.1e} sigma", flush=True)
         self.assertLess(largest, 0.1)
 
-    def bench_with(self, server, profile, own, *more, start=True):
+    def bench_with(self, server, profile, own, *more, start=True, speed=SPEED):
         """A bench on which a server of somebody else's is the INS, with the data of the virtual one."""
-        unit = self.bench_of(profile)
+        unit = self.bench_of(profile, speed)
         recording = unit.folder / "direct.h5"
         unit.selfcal("simulate", "--config", unit.folder / "sim.toml", "--schedule", "horizontal", "--dwell", DWELL_S,
                      "--seed", unit.seed, "-o", recording)
         memory = unit.folder / "memory.json"
         log = open(unit.folder / "foreign.log", "wb")
         self.addCleanup(log.close)
-        command = [sys.executable, "-B", FOREIGN / server, unit.interface, recording, *own(unit), SPEED, memory, *more]
-        process = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log)
+        command = [sys.executable, "-B", FOREIGN / server, unit.interface, recording, *own(unit), speed, memory, *more]
+        process = unit.foreign = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         end = time.monotonic() + 60

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "protocol/ins_interface/dbc.hpp"
+#include "protocol/profile/dbc_file.hpp"
 #include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "tools/cli/command.hpp"
@@ -61,6 +62,10 @@ Expected<int> write_dbc(const Arguments& arguments) {
   const auto profile = device::chosen_profile(arguments.file);
   if (!profile) {
     return tl::unexpected(profile.error());
+  }
+  if ((*profile)->frames) {
+    fmt::print("{}", profile::frames_dbc(**profile));
+    return 0;
   }
   const profile::Bus& bus = (*profile)->bus;
   fmt::print("{}", ins::dbc_text({bus.request, bus.response, bus.functional, bus.status, bus.extended_ids}));

@@ -259,12 +259,12 @@ std::string profile_page() {
   std::string text = "# Profile\n\n" + made_from("protocol/profile/roles");
   text +=
       R"(What an INS speaks, in TOML. [Your INS in an hour](your-ins.md) shows how one is made, `selfcal device lint` tells what is wrong with
-it, and `config/profiles` holds three. Unknown keys are faults.
+it, and `config/profiles` holds four. Unknown keys are faults.
 
 | table | keys |
 |---|---|
 | | `name`; `byte_order` big or little, of every number that says nothing else |
-| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
+| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), none (no UDS, with `extended_ids`: see `frames`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
 | `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
@@ -274,6 +274,7 @@ it, and `config/profiles` holds three. Unknown keys are faults.
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
 | `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
+| `frames` | of an INS without UDS, [below](#plain-frames) |
 | `page` | a record |
 | `axes` | `imu`, `gimbal`: ours, in the INS's words, `-` for the other way round |
 
@@ -288,6 +289,24 @@ it, and `config/profiles` holds three. Unknown keys are faults.
 | `each.fields.NAME` | a field of each repetition, `at` from its beginning |
 | `checksum` | `at`, `type`, `algorithm` crc32c, crc32 or crc16, `from`, `to`: bytes from `from` to `to` - 1, its own as 0 |
 | `given` | numbers that the INS does not tell because they are always the same |
+
+## Plain frames
+
+With `addressing = "none"` a message is a CAN frame and its fields are signals. Of the tables above only `bus`, `timing` (`request_timeout_s`),
+`sample_format` (`given`), `coefficients` (each field has `index` in place of `at`, and as many bits as the signal `value`) and `axes` remain.
+
+| table | keys |
+|---|---|
+| `frames` | `dbc`: a DBC that frames may name, from the folder of the profile on |
+| `frames.turning` | `there` angle (with `tolerance_deg`, and `rest_deg`: it rests while its angles stay so near, 0.05 where it is left out) or state; `longest_s` of a move |
+| `frames.identity`, `frames.state`, `frames.told` | what the INS tells |
+| `frames.move`, `frames.read`, `frames.write`, `frames.reset`; `frames.start`, `frames.stop` may be left out | what it is told; those with one `id` are told apart by a constant |
+| `frames.sample.NAME` | a sample, or a part of it: each part has the sample's `counter` |
+
+A frame: `id` and `bytes`, or `message` of the DBC; `signals.NAME`. A signal: `start`, `length`, `byte_order` as in a DBC, `type` (unsigned, signed,
+float), or `of` with the DBC's name; `scale`, `offset`, `unit`, `codes`, `constant` as of a field, before what the DBC says.
+
+## A field
 
 A field: `at` (byte, from 0), `type` (u8 u16 u24 u32 u64 i8 i16 i24 i32 i64 f32 f64, ascii with `length`), `count` (elements, one behind
 the other), `byte_order`, `first_bit` and `bits` (part of an unsigned integer, 0 the lowest), `scale`, `offset` (value = number times

@@ -11,6 +11,9 @@ namespace selfcal::cli::device {
 // As an error is told: one line. Our own INS's where no file is named.
 [[nodiscard]] Expected<profile::ProfilePtr> chosen_profile(const std::string& file);
 
+// What is told of an INS that cannot be asked by UDS.
+std::string without_uds(const profile::Profile& profile);
+
 struct CheckArguments {
   std::string interface, profile, key_file;
   bool write = false, json = false, all = false;

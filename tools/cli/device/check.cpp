@@ -67,6 +67,9 @@ Expected<int> check(const CheckArguments& arguments) {
   if (!profile) {
     return tl::unexpected(profile.error());
   }
+  if ((*profile)->frames) {
+    return fail(ErrorKind::bad_input, without_uds(**profile));
+  }
   Permission permission;
   permission.write = arguments.write;
   if ((*profile)->security.program) {

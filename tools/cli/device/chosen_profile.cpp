@@ -22,4 +22,9 @@ Expected<profile::ProfilePtr> chosen_profile(const std::string& file) {
                   (more > 0 ? fmt::format(" (and {} more: selfcal device lint)", more) : std::string()));
 }
 
+std::string without_uds(const profile::Profile& profile) {
+  return fmt::format("{}: bus.addressing: none: an INS that speaks no UDS has none of the services that are tried",
+                     profile.file);
+}
+
 }  // namespace selfcal::cli::device

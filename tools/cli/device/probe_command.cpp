@@ -106,6 +106,9 @@ Expected<int> probe(const ProbeArguments& arguments) {
   if (!profile) {
     return tl::unexpected(profile.error());
   }
+  if ((*profile)->frames) {
+    return fail(ErrorKind::bad_input, without_uds(**profile));
+  }
   if (arguments.last_did > 0xFFFF) {
     return fail(ErrorKind::usage,
                 fmt::format("--last-did is 0x{:X}, 0xFFFF is the last identifier", arguments.last_did));

@@ -1,0 +1,11 @@
+// The document of an INS that speaks no UDS: its frames and their signals, and how it is turned and read.
+#pragma once
+
+#include "protocol/profile/document_writer.hpp"
+#include "protocol/profile/profile.hpp"
+
+namespace selfcal::profile {
+
+void describe_frames(Writer& out, const Profile& profile);
+
+}  // namespace selfcal::profile

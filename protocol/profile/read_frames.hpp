@@ -1,0 +1,12 @@
+// The part of a profile that describes plain frames: their identifiers and signals, and when a move is over.
+#pragma once
+
+#include "protocol/profile/profile.hpp"
+#include "protocol/profile/profile_file.hpp"
+
+namespace selfcal::profile {
+
+// `profile` has bus and set already.
+Frames read_frames(Section& root, const Profile& profile, ByteOrder order);
+
+}  // namespace selfcal::profile
