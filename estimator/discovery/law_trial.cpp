@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "estimator/discovery/piece_model.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/statistics/distributions.hpp"
 
@@ -11,8 +13,7 @@ namespace {
 
 constexpr int constant_rounds = 12;
 
-std::optional<LawTrialFailure> check(const LawMotion& motion, const NodeTable& table,
-                                     const std::vector<LawTerm>& laws) {
+std::optional<LawTrialFailure> missing_channel(const LawMotion& motion, const std::vector<LawTerm>& laws) {
   for (std::size_t k = 0; k < laws.size(); ++k) {
     const laws::VariableSet missing = laws[k].expression.variables() & ~motion.available();
     for (std::size_t v = 0; v < laws::variable_count; ++v) {
@@ -20,6 +21,12 @@ std::optional<LawTrialFailure> check(const LawMotion& motion, const NodeTable& t
         return LawTrialFailure{k, std::string(laws::variable_names[v]).append(": the recording has no such channel")};
       }
     }
+  }
+  return std::nullopt;
+}
+
+std::optional<LawTrialFailure> not_finite(const NodeTable& table, const std::vector<LawTerm>& laws) {
+  for (std::size_t k = 0; k < laws.size(); ++k) {
     const Eigen::ArrayXd values = laws[k].expression.evaluate(table.channels, laws[k].constants);
     for (Eigen::Index i = 0; i < values.size(); ++i) {
       if (!std::isfinite(values(i))) {
@@ -31,6 +38,117 @@ std::optional<LawTrialFailure> check(const LawMotion& motion, const NodeTable& t
   return std::nullopt;
 }
 
+// Values at which a constant is tried before it is refined: both signs, so close that a wave of ten periods is not missed.
+std::vector<double> logarithmic(double low, double high, double ratio) {
+  std::vector<double> values;
+  for (double x = low; x <= high; x *= ratio) {
+    values.push_back(x);
+    values.push_back(-x);
+  }
+  return values;
+}
+
+// Where the constants of one law start: the best of a grid over the pieces, given what the model has chosen.
+class Start {
+ public:
+  Start(const PieceSums& sums, const PieceModel& model, LawTerm& term) : sums_(sums), model_(model), term_(term) {}
+
+  // Returns how many peaks were to choose from: what the significance of the best one is corrected for.
+  double run() {
+    if (term_.constants.size() == 2) {
+      std::vector<double> second = logarithmic(0.01, 100.0, 1.6);
+      second.push_back(0.0);
+      for (const double x : logarithmic(1e-3, 1e5, 1.1)) {
+        for (const double y : second) {
+          gain_of({x, y});
+        }
+      }
+      take();
+    }
+    constexpr int sweeps = 3;
+    double peaks = 1.0;
+    for (int sweep = 0; sweep < (term_.constants.size() > 1 ? sweeps : 1); ++sweep) {
+      peaks = 1.0;
+      for (std::size_t c = 0; c < term_.constants.size(); ++c) {
+        peaks *= std::max(1, along(c));
+        take();
+      }
+    }
+    return peaks;
+  }
+
+ private:
+  // Tries one constant over its range; returns the number of peaks of one sign.
+  int along(std::size_t constant) {
+    int peaks = 0;
+    double before = 0.0, last = 0.0;
+    for (const double x : logarithmic(1e-3, 1e5, 1.05)) {
+      std::vector<double> moved = term_.constants;
+      moved[constant] = x;
+      const double gain = gain_of(std::move(moved));
+      if (x > 0.0) {
+        peaks += last > before && last > gain ? 1 : 0;
+        before = std::exchange(last, gain);
+      }
+    }
+    return peaks;
+  }
+
+  double gain_of(std::vector<double> constants) {
+    const Eigen::ArrayXd values = term_.expression.evaluate(sums_.channels, constants);
+    if (!values.isFinite().all()) {
+      return 0.0;
+    }
+    const double gain = model_.gain(term_.axis, sums_.means(values));
+    if (gain > best_gain_) {
+      best_gain_ = gain;
+      best_ = std::move(constants);
+    }
+    return gain;
+  }
+
+  void take() { term_.constants = best_.empty() ? term_.constants : best_; }
+
+  const PieceSums& sums_;
+  const PieceModel& model_;
+  LawTerm& term_;
+  std::vector<double> best_;
+  double best_gain_ = 0.0;
+};
+
+struct Started {
+  std::vector<LawTerm> laws;
+  std::vector<double> peaks;  // [laws]
+};
+
+// Each law given the ones before it.
+Started started(std::vector<LawTerm> laws, const std::vector<std::unique_ptr<Scene>>& scenes) {
+  Started result{std::move(laws), {}};
+  result.peaks.assign(result.laws.size(), 1.0);
+  if (std::all_of(result.laws.begin(), result.laws.end(), [](const LawTerm& t) { return t.constants.empty(); })) {
+    return result;
+  }
+  std::vector<PieceSums> each;
+  for (const auto& scene : scenes) {
+    each.push_back(sum_over_pieces(scene->motion, scene->input));
+  }
+  const PieceSums sums = each.size() == 1 ? std::move(each.front()) : join(each);
+  Dictionary nothing;
+  nothing.means.resize(sums.piece_dt.size(), 0);
+  PieceModel model(sums, nothing);
+  std::vector<Eigen::VectorXd> chosen;
+  for (std::size_t k = 0; k < result.laws.size(); ++k) {
+    LawTerm& term = result.laws[k];
+    result.peaks[k] = term.constants.empty() ? 1.0 : Start(sums, model, term).run();
+    const Eigen::ArrayXd values = term.expression.evaluate(sums.channels, term.constants);
+    if (values.isFinite().all()) {
+      chosen.push_back(model.column(term.axis, sums.means(values)));
+      model.choose(chosen);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
@@ -39,11 +157,17 @@ tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const Un
   const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
   for (const auto& scene : scenes) {
     scene->table = collect_nodes(scene->motion, scene->input);
-    if (auto failure = check(scene->motion, scene->table, laws)) {
+    if (auto failure = missing_channel(scene->motion, laws)) {
       return tl::unexpected(std::move(*failure));
     }
   }
-  const LawFit fit = fit_laws(laws_on(scenes), laws, constant_rounds);
+  const Started start = started(laws, scenes);
+  for (const auto& scene : scenes) {
+    if (auto failure = not_finite(scene->table, start.laws)) {
+      return tl::unexpected(std::move(*failure));
+    }
+  }
+  const LawFit fit = fit_laws(laws_on(scenes), start.laws, constant_rounds);
   std::vector<TriedLaw> tried;
   auto at = static_cast<Eigen::Index>(laws.size());
   for (std::size_t k = 0; k < laws.size(); ++k) {
@@ -60,7 +184,8 @@ tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const Un
     law.gain = fit.gain[k];
     law.held_out_gain = fit.held_out_gain[k];
     const double degrees = 1.0 + static_cast<double>(law.constants.size());
-    law.significance = sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees)));
+    law.significance =
+        sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + std::log(start.peaks[k])));
     law.share = std::clamp(law.gain / std::max(1.0, fit.square_before - fit.rows), 0.0, 1.0);
     law.stated = stated[k];
     law.collinear = fit.collinear[k];

@@ -16,7 +16,7 @@ struct TriedLaw {
   std::string expression;                 // constants as numbers
   double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
   std::vector<Constant> constants;        // the k-th `?` is "constant k"
-  double significance = 0.0;              // sigma: one law was asked for, so nothing is corrected for
+  double significance = 0.0;              // sigma, corrected for the peaks that free constants had to choose from
   double gain = 0.0, held_out_gain = 0.0, share = 0.0;
   double stated = 0.0;     // the file's coefficient; NaN: none
   double collinear = 0.0;  // share of its information that the other laws and the constants take, 0 to 1
@@ -27,7 +27,8 @@ struct LawTrialFailure {
   std::string words;
 };
 
-// All together, beside the 24 of each recording. A law that needs a channel that a recording has not, or whose expression is not
+// All together, beside the 24 of each recording. Free constants are looked for from 0.001 to 100,000 of either sign (three and
+// more one after the other) and refined, whatever they are at the start. A law that needs a channel that a recording has not, or whose expression is not
 // finite somewhere on one, is a failure. `stated` [laws], NaN where the file has no coefficient.
 tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
                                                               const std::vector<LawTerm>& laws,
