@@ -20,6 +20,7 @@ using discovery::ProcessKind;
 using nlohmann::ordered_json;
 
 constexpr std::size_t most_told = 3;  // equations in a sentence
+constexpr double sure = 0.9;          // that an equation holds on another plan; below it the verdict counts its rivals
 
 bool leaves_noise(const Discovery& found) { return found.misfit_after < 3.0 * std::sqrt(2.0 * found.rows); }
 
@@ -50,18 +51,25 @@ double explained_share(const Discovery& found) {
   if (found.laws.empty() && found.processes.empty()) {
     return 0.0;
   }
+  if (!found.described.empty()) {  // what is left after them too is not what these laws leave
+    double gain = 0.0;
+    for (const DiscoveredLaw& law : found.laws) {
+      gain += law.gain;
+    }
+    return std::clamp(gain / std::max(1.0, found.misfit_before), 0.0, 1.0);
+  }
   return std::clamp(1.0 - found.misfit_after / std::max(1.0, found.misfit_before), 0.0, 1.0);
 }
 
 bool explains(const Discovery* found) {
   constexpr double most = 0.9;
-  const bool any = found != nullptr && !(found->laws.empty() && found->processes.empty());
+  const bool any = found != nullptr && !(found->laws.empty() && found->processes.empty()) && found->described.empty();
   return any && (leaves_noise(*found) || explained_share(*found) >= most);
 }
 
 bool confirmed(const Discovery* found) {
-  return found != nullptr && found->fit.recordings.size() > 1 && !found->laws.empty() && found->processes.empty() &&
-         leaves_noise(*found);
+  return found != nullptr && found->fit.recordings.size() > 1 && !found->laws.empty() && found->described.empty() &&
+         found->processes.empty() && leaves_noise(*found);
 }
 
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
@@ -77,7 +85,10 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* 
 std::string discovered_words(const Discovery& found) {
   std::vector<std::string> all;
   for (const DiscoveredLaw& law : found.laws) {
-    all.push_back(fmt::format("{} follows {}", name_of_axis(law.term.axis), law.expression));
+    const std::size_t others =
+        law.carries_over < sure ? law.ambiguous.size() - std::min<std::size_t>(1, law.ambiguous.size()) : 0;
+    all.push_back(fmt::format("{} follows {}{}", name_of_axis(law.term.axis), law.expression,
+                              others > 0 ? fmt::format(" or one of {} others", others) : std::string()));
   }
   for (std::string words : {processes_words(found, ProcessKind::jump_per_turn, "takes a new offset at each turn",
                                             "take a new offset at each turn"),
@@ -109,27 +120,41 @@ std::string discovered_figures(const Discovery& found) {
                      nis(found.misfit_after));
 }
 
+namespace {
+
+ordered_json law_json(const DiscoveredLaw& law) {
+  ordered_json constants = ordered_json::object();
+  for (const discovery::Constant& c : law.constants) {
+    constants[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
+  }
+  ordered_json members = ordered_json::array();
+  for (const discovery::ClassMember& m : law.ambiguous) {
+    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
+  }
+  return {{"axis", name_of_axis(law.term.axis)},
+          {"expression", law.expression},
+          {"coefficient", law.coefficient},
+          {"sigma", law.sigma},
+          {"unit", unit_of_axis(law.term.axis)},
+          {"constants", constants},
+          {"significance", law.significance},
+          {"held_out_gain", law.held_out_gain},
+          {"share", law.share},
+          {"stability", law.stability},
+          {"carries_over", law.carries_over},
+          {"class", members}};
+}
+
+}  // namespace
+
 void add_discovery(ordered_json& document, const Discovery& found) {
   document["discovered"] = ordered_json::array();
   for (const DiscoveredLaw& law : found.laws) {
-    ordered_json constants = ordered_json::object();
-    for (const discovery::Constant& c : law.constants) {
-      constants[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
-    }
-    ordered_json members = ordered_json::array();
-    for (const discovery::ClassMember& m : law.ambiguous) {
-      members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
-    }
-    document["discovered"].push_back({{"axis", name_of_axis(law.term.axis)},
-                                      {"expression", law.expression},
-                                      {"coefficient", law.coefficient},
-                                      {"sigma", law.sigma},
-                                      {"unit", unit_of_axis(law.term.axis)},
-                                      {"constants", constants},
-                                      {"significance", law.significance},
-                                      {"held_out_gain", law.held_out_gain},
-                                      {"share", law.share},
-                                      {"class", members}});
+    document["discovered"].push_back(law_json(law));
+  }
+  document["described"] = ordered_json::array();
+  for (const DiscoveredLaw& law : found.described) {
+    document["described"].push_back(law_json(law));
   }
   document["processes"] = ordered_json::array();
   for (const DiscoveredProcess& p : found.processes) {

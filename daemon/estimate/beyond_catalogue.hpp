@@ -12,7 +12,7 @@ namespace selfcal {
 
 // Of the misfit that the catalogue leaves, the share that laws and processes take away; 0 where none was found.
 double explained_share(const discovery::Discovery& found);
-// Laws or processes were found that take away all but a tenth of the misfit, or leave noise.
+// Laws or processes were found that take away all but a tenth of the misfit, or leave noise; and no axis is only described.
 bool explains(const discovery::Discovery* found);
 
 // Laws that hold in two recordings and more of a unit, with one coefficient and one set of constants, and leave noise: what may
@@ -23,12 +23,13 @@ bool confirmed(const discovery::Discovery* found);
 // rejected names correct nothing.
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
 
-// "accel_y and accel_z take a new offset at each turn"; empty where nothing was found.
+// "accel_y and accel_z take a new offset at each turn"; "gyro_x follows abs(wz) or one of 22 others" where it matters which, for
+// they differ on another plan; empty where nothing was found.
 std::string discovered_words(const discovery::Discovery& found);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
 std::string discovered_figures(const discovery::Discovery& found);
 
-// "discovered", "processes" and "discovery" of the document.
+// "discovered", "described", "processes" and "discovery" of the document.
 void add_discovery(nlohmann::ordered_json& document, const discovery::Discovery& found);
 
 }  // namespace selfcal

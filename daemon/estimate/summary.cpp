@@ -9,6 +9,7 @@
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
+#include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
 namespace {
@@ -138,6 +139,10 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
   if (beyond != nullptr && explained_share(*beyond) > 0.0) {
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
+  }
+  if (beyond != nullptr && !beyond->described.empty()) {
+    text += fmt::format("; {} follows no equation that was tried, only a sum of several",
+                        name_of_axis(beyond->described.front().term.axis));
   }
   return text + ".";
 }

@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <map>
+#include <string_view>
 #include <utility>
 
 namespace selfcal::discovery {
 namespace {
 
 constexpr double seconds_per_hour = 3600.0;
+// Of the probability of a factor, what the quantities themselves have; the rest have their sizes, squares, harmonics.
+constexpr double plain_share = 0.65;
 
 class Builder {
  public:
@@ -23,7 +28,7 @@ class Builder {
     geometry();
     kernels();
     enumerate();
-    collect();
+    finish();
     return std::move(dictionary_);
   }
 
@@ -43,163 +48,192 @@ class Builder {
     dictionary_.factors.push_back({text, kernel, constant});
     return static_cast<int>(values_.size()) - 1;
   }
-  void add_to(std::vector<int>& family, const std::string& text, Kernel kernel = Kernel::none, double constant = 0.0) {
-    const int index = add(text, kernel, constant);
-    if (index >= 0) {
-      family.push_back(index);
+  // A factor and the probability with which it is drawn where a function has one.
+  struct Choice {
+    int factor = 0;
+    double belief = 0.0;
+    bool alone = true;  // false: less a constant it is another one
+  };
+
+  void add_all(std::vector<Choice>& choices, std::initializer_list<const char*> texts, double belief,
+               bool alone = true) {
+    for (const char* text : texts) {
+      const int factor = add(text);
+      if (factor >= 0) {
+        choices.push_back({factor, belief, alone});
+      }
     }
   }
 
+  // What a sensor may depend on. The probabilities add up to 1 where all channels are there.
   void geometry() {
-    for (const char* text : {"fx", "fy", "fz", "wx", "wy", "wz", "sin(outer)", "cos(outer)", "sin(inner)", "cos(inner)",
-                             "so", "si", "t", "T"}) {
-      add_to(main_, text);
-    }
-    for (const char* text :
-         {"abs(fx)", "abs(fy)", "abs(fz)", "abs(wx)", "abs(wy)", "abs(wz)", "wo", "wi", "abs(wo)", "abs(wi)",
-          "sin(2*outer)", "cos(2*outer)", "sin(2*inner)", "cos(2*inner)", "n", "dT", "abs(so)", "abs(si)"}) {
-      add_to(further_, text);
+    constexpr double plain = plain_share / 16.0, formed = (1.0 - plain_share) / 39.0;
+    add_all(main_,
+            {"fx", "fy", "fz", "wx", "wy", "wz", "wo", "wi", "sin(outer)", "cos(outer)", "sin(inner)", "cos(inner)",
+             "so", "si", "t", "T"},
+            plain);
+    all_ = main_;
+    add_all(all_,
+            {"abs(fx)", "abs(fy)", "abs(fz)", "abs(wx)", "abs(wy)", "abs(wz)", "abs(wo)", "abs(wi)", "abs(so)",
+             "abs(si)", "abs(sin(outer))", "abs(cos(outer))", "abs(sin(inner))", "abs(cos(inner))"},
+            formed);
+    add_all(all_, {"fx**2", "fy**2", "fz**2", "wx**2", "wy**2", "wz**2", "wo**2", "wi**2", "t**2", "T**2"}, formed);
+    add_all(all_,
+            {"sin(2*outer)", "cos(2*outer)", "sin(2*inner)", "cos(2*inner)", "sin(3*outer)", "cos(3*outer)",
+             "sin(3*inner)", "cos(3*inner)", "n", "dT"},
+            formed);
+    add_all(all_, {"sin(outer)**2", "cos(outer)**2", "sin(inner)**2", "cos(inner)**2", "T*dT"}, formed, false);
+  }
+
+  void add_grid(const char* text, Kernel kernel, std::initializer_list<double> constants, double belief,
+                double unit = 1.0) {
+    for (const double constant : constants) {
+      const int factor = add(text, kernel, unit * constant);
+      if (factor >= 0) {
+        decays_.push_back({factor, belief / static_cast<double>(constants.size())});
+      }
     }
   }
 
   void kernels() {
-    for (const double tau : {4.0, 7.0, 11.0, 17.0, 26.0, 40.0, 60.0, 90.0, 140.0, 220.0}) {
-      add_to(decays_, "exp(-since/?)", Kernel::creep, tau);
+    add_grid("exp(-since/?)", Kernel::creep, {4.0, 7.0, 11.0, 17.0, 26.0, 40.0, 60.0, 90.0, 140.0, 220.0}, 0.5);
+    // Nothing creeps before the first turn, where `rest` is 1e9.
+    add_grid("log(1+rest/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
+    add_grid("log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
+    add_grid("exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
+    waves();
+    for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {
+      const Piece& piece = sums_.pieces[k];
+      if (!piece.turning) {
+        const int factor = add("sign(t-?)", Kernel::step, piece.start_s / seconds_per_hour);
+        if (factor >= 0) {
+          steps_.push_back({factor, 1.0 / static_cast<double>(sums_.pieces.size())});
+        }
+      }
     }
-    for (const double tau : {1.0, 4.0, 15.0, 60.0}) {
-      // Nothing creeps before the first turn, where `rest` is 1e9.
-      add_to(decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, tau);
-      add_to(decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, tau);
-    }
-    for (const double share : {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}) {
-      add_to(decays_, "exp(-t/?)", Kernel::warm_up, share * duration_h_);
-    }
-    // Half a period of frequency resolution apart; the shortest wave is twice the longest piece.
+  }
+
+  // Half a period of frequency resolution apart; the shortest wave is twice the longest piece. A period is as probable as
+  // any other on a logarithmic scale: of two that one plan cannot tell apart the longer one wins.
+  void waves() {
     constexpr double shortest_h = 120.0 / seconds_per_hour;
+    double sum = 0.0;
     for (int k = 1; 2.0 * duration_h_ / k > shortest_h; ++k) {
       const double period = 2.0 * duration_h_ / k;
       const int sine = add("sin(2*pi*t/?)", Kernel::wave, period);
       const int cosine = add("cos(2*pi*t/?)", Kernel::wave, period);
       if (sine >= 0 && cosine >= 0) {
-        waves_.emplace_back(sine, cosine);
+        waves_.push_back({sine, 1.0 / k});
+        cosine_[sine] = cosine;
+        sum += 1.0 / k;
       }
     }
-    for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {
-      const Piece& piece = sums_.pieces[k];
-      if (!piece.turning) {
-        add_to(steps_, "sign(t-?)", Kernel::step, piece.start_s / seconds_per_hour);
-      }
+    for (Choice& wave : waves_) {
+      wave.belief /= sum;
     }
   }
 
-  // Functions of one kind share the cost: pairs of indices here, resolved in collect().
-  struct Kind {
-    std::vector<std::vector<int>> members;
-    std::vector<std::vector<int>> partners;  // of waves, same length
+  struct Draw {
+    std::vector<int> factors;
+    double belief = 1.0;
   };
 
-  void products(const std::vector<int>& all, int depth, std::vector<int>& chosen, std::size_t from, Kind& kind) const {
-    if (static_cast<int>(chosen.size()) == depth) {
-      kind.members.push_back(chosen);
-      return;
-    }
-    for (std::size_t k = from; k < all.size(); ++k) {
-      chosen.push_back(all[k]);
-      products(all, depth, chosen, k, kind);
-      chosen.pop_back();
-    }
-  }
-  Kind products(const std::vector<int>& all, int depth) const {
-    Kind kind;
-    std::vector<int> chosen;
-    products(all, depth, chosen, 0, kind);
-    return kind;
-  }
-  static Kind times(const std::vector<int>& kernels, const Kind& with) {
-    Kind kind;
-    for (const int kernel : kernels) {
-      for (const std::vector<int>& factors : with.members) {
-        kind.members.push_back(factors);
-        kind.members.back().insert(kind.members.back().begin(), kernel);
-      }
-    }
-    return kind;
-  }
-  Kind waves_times(const Kind& with) const {
-    Kind kind;
-    for (const auto& [sine, cosine] : waves_) {
-      for (const std::vector<int>& factors : with.members) {
-        for (auto [list, wave] : {std::pair(&kind.members, sine), std::pair(&kind.partners, cosine)}) {
-          list->push_back(factors);
-          list->back().insert(list->back().begin(), wave);
+  // All unordered draws of `depth` different choices.
+  static std::vector<Draw> products(const std::vector<Choice>& choices, int depth) {
+    std::vector<Draw> draws(1);
+    std::vector<std::size_t> next(1, 0);
+    for (int level = 1; level <= depth; ++level) {
+      std::vector<Draw> longer;
+      std::vector<std::size_t> after;
+      for (std::size_t d = 0; d < draws.size(); ++d) {
+        for (std::size_t k = next[d]; k < choices.size(); ++k) {
+          if (depth == 1 && !choices[k].alone) {
+            continue;
+          }
+          longer.push_back(draws[d]);
+          longer.back().factors.push_back(choices[k].factor);
+          longer.back().belief *= choices[k].belief * level;  // as many orders as places for the new one
+          after.push_back(k + 1);
         }
       }
+      draws = std::move(longer);
+      next = std::move(after);
     }
-    return kind;
+    return draws;
   }
 
+  // The kernel first, for the dictionary takes a function's kernel and constant from its first factor.
+  static std::vector<Draw> times(const std::vector<Choice>& kernels, const std::vector<Draw>& with) {
+    std::vector<Draw> draws;
+    draws.reserve(kernels.size() * with.size());
+    for (const Choice& kernel : kernels) {
+      for (const Draw& other : with) {
+        draws.push_back({{kernel.factor}, kernel.belief * other.belief});
+        draws.back().factors.insert(draws.back().factors.end(), other.factors.begin(), other.factors.end());
+      }
+    }
+    return draws;
+  }
+
+  // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
   void enumerate() {
-    std::vector<int> all = main_;
-    all.insert(all.end(), further_.begin(), further_.end());
-    const Kind one = products(all, 1), main_one = products(main_, 1), main_two = products(main_, 2);
-    Kind nothing, further_two;
-    nothing.members.push_back({});
-    for (const std::vector<int>& pair : products(all, 2).members) {
-      if (std::find(main_two.members.begin(), main_two.members.end(), pair) == main_two.members.end()) {
-        further_two.members.push_back(pair);
-      }
-    }
-    // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
-    kinds_.emplace_back(one, 0.2);
-    kinds_.emplace_back(main_two, 0.2);
-    kinds_.emplace_back(further_two, 0.08);
-    kinds_.emplace_back(times(decays_, nothing), 0.15);
-    kinds_.emplace_back(times(decays_, one), 0.15);
-    kinds_.emplace_back(waves_times(nothing), 0.08);
-    kinds_.emplace_back(times(steps_, nothing), 0.04);
-    kinds_.emplace_back(waves_times(main_one), 0.04);
-    kinds_.emplace_back(products(main_, 3), 0.03);
-    kinds_.emplace_back(times(decays_, main_two), 0.03);
+    const std::vector<Draw> nothing(1), one = products(all_, 1), main_two = products(main_, 2);
+    collect(one, 0.2);
+    collect(products(all_, 2), 0.3);
+    collect(products(main_, 3), 0.04 / (plain_share * plain_share * plain_share));
+    collect(times(decays_, nothing), 0.12);
+    collect(times(decays_, one), 0.15);
+    collect(times(decays_, main_two), 0.03 / (plain_share * plain_share));
+    collect(times(waves_, nothing), 0.07);
+    collect(times(waves_, one), 0.05);
+    collect(times(steps_, nothing), 0.04);
   }
 
-  void collect() {
-    std::vector<Eigen::VectorXd> means;
+  int add_function(const std::vector<int>& factors, double cost) {
+    Eigen::ArrayXd product = values_[static_cast<std::size_t>(factors.front())];
+    for (std::size_t k = 1; k < factors.size(); ++k) {
+      product *= values_[static_cast<std::size_t>(factors[k])];
+    }
+    Eigen::VectorXd mean = sums_.means(product);
     const double total = sums_.piece_dt.sum();
-    const auto add_function = [&](const std::vector<int>& factors, double cost) {
-      Eigen::ArrayXd product = values_[static_cast<std::size_t>(factors.front())];
-      for (std::size_t k = 1; k < factors.size(); ++k) {
-        product *= values_[static_cast<std::size_t>(factors[k])];
-      }
-      Eigen::VectorXd mean = sums_.means(product);
-      const double average = mean.dot(sums_.piece_dt) / total;
-      const double square = (mean.array().square() * sums_.piece_dt.array()).sum() / total;
-      if (!(square > 0.0) || square - average * average < 1e-9 * square) {
-        return -1;  // zero, or a constant: that is the bias
-      }
-      const double rms = std::sqrt(square);
-      means.push_back(mean / rms);
-      scales_.push_back(rms);
-      Function function{factors, Kernel::none, 0.0, -1, cost};
-      const Factor& first = dictionary_.factors[static_cast<std::size_t>(factors.front())];
-      function.kernel = first.kernel;
-      function.constant = first.constant;
-      dictionary_.functions.push_back(std::move(function));
-      return static_cast<int>(dictionary_.functions.size()) - 1;
-    };
-    for (const auto& [kind, belief] : kinds_) {
-      const auto count = static_cast<double>(std::max<std::size_t>(1, kind.members.size()) * axis_count);
-      const double cost = std::log(count / belief);
-      for (std::size_t k = 0; k < kind.members.size(); ++k) {
-        const int index = add_function(kind.members[k], cost);
-        if (index >= 0 && !kind.partners.empty()) {
-          dictionary_.functions[static_cast<std::size_t>(index)].partner = add_function(kind.partners[k], cost);
+    const double average = mean.dot(sums_.piece_dt) / total;
+    const double square = (mean.array().square() * sums_.piece_dt.array()).sum() / total;
+    if (!(square > 0.0) || square - average * average < 1e-9 * square) {
+      return -1;  // zero, or a constant: that is the bias
+    }
+    const double rms = std::sqrt(square);
+    means_.push_back(mean / rms);
+    scales_.push_back(rms);
+    Function function{factors, Kernel::none, 0.0, -1, false, cost};
+    const Factor& first = dictionary_.factors[static_cast<std::size_t>(factors.front())];
+    function.kernel = first.kernel;
+    function.constant = first.constant;
+    dictionary_.functions.push_back(std::move(function));
+    return static_cast<int>(dictionary_.functions.size()) - 1;
+  }
+
+  void collect(const std::vector<Draw>& draws, double belief) {
+    for (const Draw& draw : draws) {
+      const double cost = std::log(axis_count / (belief * draw.belief));
+      const int index = add_function(draw.factors, cost);
+      const auto cosine = cosine_.find(draw.factors.front());
+      if (index >= 0 && cosine != cosine_.end()) {
+        std::vector<int> partner = draw.factors;
+        partner.front() = cosine->second;
+        const int other = add_function(partner, cost);  // dictionary_.functions may move
+        dictionary_.functions[static_cast<std::size_t>(index)].partner = other;
+        if (other >= 0) {
+          dictionary_.functions[static_cast<std::size_t>(other)].second = true;
         }
       }
     }
-    dictionary_.means.resize(sums_.piece_dt.size(), static_cast<Eigen::Index>(means.size()));
+  }
+
+  void finish() {
+    dictionary_.means.resize(sums_.piece_dt.size(), static_cast<Eigen::Index>(means_.size()));
     dictionary_.scale = Eigen::Map<const Eigen::VectorXd>(scales_.data(), static_cast<Eigen::Index>(scales_.size()));
-    for (std::size_t k = 0; k < means.size(); ++k) {
-      dictionary_.means.col(static_cast<Eigen::Index>(k)) = means[k];
+    for (std::size_t k = 0; k < means_.size(); ++k) {
+      dictionary_.means.col(static_cast<Eigen::Index>(k)) = means_[k];
     }
   }
 
@@ -209,25 +243,30 @@ class Builder {
   Dictionary dictionary_;
   std::vector<Eigen::ArrayXd> values_;  // [factors]
   std::vector<double> scales_;
-  std::vector<int> main_, further_, decays_, steps_;
-  std::vector<std::pair<int, int>> waves_;
-  std::vector<std::pair<Kind, double>> kinds_;
+  std::vector<Choice> main_, all_, decays_, steps_, waves_;
+  std::map<int, int> cosine_;  // of a wave's sine
+  std::vector<Eigen::VectorXd> means_;
 };
 
 }  // namespace
 
 std::string Dictionary::pattern(const Function& function) const {
+  constexpr std::string_view squared = "**2";
+  std::vector<std::pair<std::string, int>> powers;  // of each quantity, in order
+  for (const int factor : function.factors) {
+    std::string base = factors[static_cast<std::size_t>(factor)].text;
+    const bool square = base.ends_with(squared);
+    base.resize(base.size() - (square ? squared.size() : 0));
+    const auto same = std::find_if(powers.begin(), powers.end(), [&](const auto& p) { return p.first == base; });
+    if (same == powers.end()) {
+      powers.emplace_back(base, square ? 2 : 1);
+    } else {
+      same->second += square ? 2 : 1;
+    }
+  }
   std::string text;
-  for (std::size_t k = 0; k < function.factors.size();) {
-    std::size_t last = k;
-    while (last < function.factors.size() && function.factors[last] == function.factors[k]) {
-      ++last;
-    }
-    text += (text.empty() ? "" : "*") + factors[static_cast<std::size_t>(function.factors[k])].text;
-    if (last - k > 1) {
-      text += "**" + std::to_string(last - k);
-    }
-    k = last;
+  for (const auto& [base, power] : powers) {
+    text += (text.empty() ? "" : "*") + base + (power > 1 ? "**" + std::to_string(power) : "");
   }
   return text;
 }

@@ -26,8 +26,9 @@ struct Function {
   std::vector<int> factors;  // of the dictionary
   Kernel kernel = Kernel::none;
   double constant = 0.0;
-  int partner = -1;   // of a wave's sine: the function with the cosine in its place, with the same factors
-  double cost = 0.0;  // minus the natural logarithm of its probability before any data, over all axes
+  int partner = -1;     // of a wave's sine: the function with the cosine in its place, with the same factors
+  bool second = false;  // that partner: tried with its sine only
+  double cost = 0.0;    // minus the natural logarithm of its probability before any data, over all axes
 };
 
 struct Dictionary {

@@ -6,8 +6,10 @@
 #include <memory>
 #include <type_traits>
 
+#include "estimator/discovery/carry_over.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
+#include "estimator/discovery/stability.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
@@ -40,7 +42,8 @@ FittedRecording without_any_law(const CalibrationResult& calibration) {
 class Search {
  public:
   Search(std::span<const UnitRecording> recordings, const DiscoveryOptions& options, const Progress& progress)
-      : options_(options),
+      : recordings_(recordings),
+        options_(options),
         progress_(progress),
         scenes_(scenes_of(recordings)),
         sums_(said("pieces of the recording", [&] { return sum_scenes(); })),
@@ -58,22 +61,15 @@ class Search {
     state_ = empty_;
   }
 
-  // Laws first, for a random process can stand for any of them. Where they leave something that a process takes up, or one
-  // process explains far more than the best law, processes first; the way of the greater posterior probability is reported.
+  // Laws first, and beside them what a random process takes up; then processes first. The way of the greater posterior
+  // probability is reported: a process can stand for any law, and laws added up can stand for a process.
   Discovery run() {
-    constexpr double far_more = 1.5;
-    const ProcessFit process = best_process();
-    const std::vector<Candidate> laws = shortlist_.best(*model_, 1);
-    if (significant(process) && (laws.empty() || process.log_likelihood_gain > far_more * laws.front().merit())) {
-      take_processes();
-      take_laws();
-    } else {
-      take_laws();
-      settle();
-      take_laws();
-      if (significant(best_process())) {
-        processes_too();
-      }
+    const bool process_alone = significant(best_process());
+    take_laws();
+    settle();
+    take_laws();
+    if (process_alone || significant(best_process())) {
+      processes_too();
     }
     tell();
     return std::move(result_);
@@ -178,8 +174,12 @@ class Search {
   }
 
   bool significant(const ProcessFit& process) const {
-    return log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
-           std::log(options_.false_alarm_rate);
+    // What is less than this share of a strong law is the error of its linearisation as likely as anything else.
+    constexpr double least_share = 0.005;
+    const double taken_off = state_.fit.square_before - state_.fit.square_after;
+    return 2.0 * process.log_likelihood_gain > least_share * taken_off &&
+           log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
+               std::log(options_.false_alarm_rate);
   }
 
   void take_processes() {
@@ -223,8 +223,8 @@ class Search {
       state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p_of_law(candidates.front()));
       return false;
     }
-    if (state_.processes.empty()) {
-      make_exact(candidates, state_.terms);
+    if (state_.processes.empty()) {  // with a process in play the pieces stand
+      candidates = best_of(exact_alternatives(laws_on_, state_.terms, candidates, options_.stop));
     }
     for (const Candidate& candidate : candidates) {
       state_.log_p_remaining = std::min(0.0, log_p_of_law(candidate));
@@ -240,30 +240,6 @@ class Search {
     return false;
   }
 
-  // Gains over the pieces become those of the signatures themselves, at the best of some constants; with a process in play the
-  // pieces stand.
-  void make_exact(std::vector<Candidate>& candidates, const std::vector<LawTerm>& given) const {
-    static constexpr std::array<double, 5> factors = {0.7, 0.85, 1.0, 1.18, 1.4};
-    std::vector<LawTerm> alternatives;
-    for (const Candidate& candidate : candidates) {
-      for (const double factor : factors) {
-        alternatives.push_back(candidate.term);
-        if (candidate.term.constants.size() == 1 && !candidate.step) {
-          alternatives.back().constants.front() *= factor;
-        }
-      }
-    }
-    const std::vector<double> gains = exact_gains(laws_on_, given, alternatives, options_.stop);
-    for (std::size_t k = 0; k < candidates.size(); ++k) {
-      const auto first = gains.begin() + static_cast<std::ptrdiff_t>(factors.size() * k);
-      const auto best = std::max_element(first, first + static_cast<std::ptrdiff_t>(factors.size()));
-      candidates[k].gain = *best;
-      candidates[k].term = alternatives[static_cast<std::size_t>(best - gains.begin())];
-    }
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
-  }
-
   bool predicts(const LawFit& fit, std::size_t k) const {
     return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k];
   }
@@ -272,7 +248,7 @@ class Search {
     std::vector<LawTerm> terms = state_.terms;
     terms.push_back(candidate.term);
     const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
-    if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1)) {
+    if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1) || fit.terms.back().at_its_limit()) {
       return false;
     }
     state_.costs.push_back(candidate.cost);
@@ -304,16 +280,16 @@ class Search {
     return others;
   }
 
-  // What explains the recording in the place of term k, exactly; the term itself as it stands has gain `own`.
-  std::vector<Candidate> rivals(std::size_t k, std::size_t most, double& own) {
+  // What explains the recording in the place of term k, exactly, with other values of its constant; `own`: the term as it stands.
+  std::vector<std::vector<Candidate>> rivals(std::size_t k, std::size_t most, Candidate& own) {
     PieceModel& model = raw_model_ ? *raw_model_ : *model_;  // what settle() took out is what the rivals are to explain
     project_out(model, k);
-    std::vector<Candidate> candidates = shortlist_.best(model, most);
+    const std::vector<Candidate> candidates = shortlist_.best(model, most);
     project_out(model, state_.terms.size());
     const std::vector<LawTerm> others = all_but(k);
-    own = exact_gains(laws_on_, others, {state_.terms[k]}, options_.stop).front();
-    make_exact(candidates, others);
-    return candidates;
+    const SingleFit alone = fit_each(laws_on_, others, {state_.terms[k]}, options_.stop).front();
+    own = {state_.terms[k], alone.gain, state_.costs[k], false, alone.coefficient};
+    return exact_alternatives(laws_on_, others, candidates, options_.stop);
   }
 
   // Each term in turn against all functions, the others staying: what was taken first may have stood for two. What is then
@@ -323,20 +299,26 @@ class Search {
       return;
     }
     for (std::size_t k = 0; k + 1 < state_.terms.size(); ++k) {
-      double own = 0.0;
-      const std::vector<Candidate> candidates = rivals(k, shortlist_size, own);
-      if (candidates.empty() || candidates.front().merit() < 0.5 * own - state_.costs[k] + 1.0) {
-        continue;
-      }
-      std::vector<LawTerm> terms = state_.terms;
-      terms[k] = candidates.front().term;
-      const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
-      if (fit.square_after < state_.fit.square_after && predicts(fit, k)) {
-        state_.costs[k] = candidates.front().cost;
-        adopt(fit);
+      Candidate own;
+      const std::vector<Candidate> candidates = best_of(rivals(k, shortlist_size, own));
+      if (!candidates.empty() && candidates.front().merit() > own.merit() + 1.0) {
+        put_in_place(k, candidates.front(), true);
       }
     }
     drop_weak();
+  }
+
+  bool put_in_place(std::size_t k, const Candidate& candidate, bool must_gain) {
+    std::vector<LawTerm> terms = state_.terms;
+    terms[k] = candidate.term;
+    const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
+    if (fit.terms.size() != terms.size() || (must_gain && fit.square_after >= state_.fit.square_after) ||
+        !predicts(fit, k) || fit.terms[k].at_its_limit()) {
+      return false;
+    }
+    state_.costs[k] = candidate.cost;
+    adopt(fit);
+    return true;
   }
 
   void drop_weak() {
@@ -351,35 +333,113 @@ class Search {
     }
   }
 
-  std::vector<ClassMember> ambiguity_class(std::size_t k) {
-    double own_gain = 0.0;
-    const std::vector<Candidate> candidates = rivals(k, class_size, own_gain);
-    const LawTerm& term = state_.terms[k];
-    const double own = 0.5 * own_gain - state_.costs[k];
-    struct Member {
-      ClassMember member;
-      double cost = 0.0;
-    };
-    std::vector<Member> members = {{{term.expression.text(term.constants), term.axis, 1.0}, state_.costs[k]}};
-    for (const Candidate& c : candidates) {
-      const double odds = std::exp(std::min(50.0, c.merit() - own));
-      const bool itself = c.term.axis == term.axis && c.term.expression.text() == term.expression.text();
-      if (odds > options_.least_odds && !itself) {
-        members.push_back({{c.text(), c.term.axis, odds}, c.cost});
+  // The term itself first, then all that stands within `least_odds` of it, each value of a constant by itself.
+  std::vector<Candidate> possible(const Candidate& own, const std::vector<std::vector<Candidate>>& others) const {
+    std::vector<Candidate> all = {own};
+    for (const std::vector<Candidate>& alternatives : others) {
+      for (const Candidate& c : alternatives) {
+        Candidate weighed = c;
+        weighed.cost += alternatives.size() > 1 ? std::log(static_cast<double>(alternatives.size())) : 0.0;
+        const bool itself = same_law(c.term, own.term) && nearly(c.term.constants, own.term.constants);
+        if (weighed.merit() > own.merit() + std::log(options_.least_odds) && !itself) {
+          all.push_back(std::move(weighed));
+        }
       }
     }
-    std::stable_sort(members.begin(), members.end(), [](const Member& a, const Member& b) { return a.cost < b.cost; });
+    return all;
+  }
+
+  static bool nearly(const std::vector<double>& a, const std::vector<double>& b) {
+    constexpr double tolerance = 0.1;  // alternatives of a constant are farther apart
+    return a.empty() || std::abs(a.front() - b.front()) < tolerance * std::abs(b.front());
+  }
+  static bool same_law(const LawTerm& a, const LawTerm& b) {
+    return a.axis == b.axis && a.expression.text() == b.expression.text();
+  }
+
+  CarryOver carry_over_of(const std::vector<Candidate>& all) const {
+    std::vector<PossibleLaw> laws;
+    laws.reserve(all.size());
+    for (const Candidate& c : all) {
+      laws.push_back({c.term, c.coefficient, std::exp(std::min(50.0, c.merit() - all.front().merit()))});
+    }
+    return carry_over(recordings_.back(), laws, options_.stop);
+  }
+
+  // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the
+  // class and that probability.
+  void settle_class(std::size_t k, DiscoveredLaw& law) {
+    constexpr double worth_a_change = 0.02;  // of the probability
+    for (bool changed = true, once = false; changed; once = true) {
+      Candidate own;
+      const std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
+      const std::vector<Candidate> all = possible(own, others);
+      const CarryOver on_another = carry_over_of(all);
+      const auto best = static_cast<std::size_t>(std::max_element(on_another.merit.begin(), on_another.merit.end()) -
+                                                 on_another.merit.begin());
+      changed =
+          !once && on_another.merit[best] > on_another.merit[0] + worth_a_change && put_in_place(k, all[best], false);
+      law.carries_over = on_another.probability[0];
+      if (!changed) {
+        const std::vector<Candidate> best_each = best_of(others);
+        law.ambiguous = class_of(own, best_each);
+        law.stability = stability_of(k, own, best_each);
+      }
+    }
+  }
+
+  double stability_of(std::size_t k, const Candidate& own, const std::vector<Candidate>& others) const {
+    std::vector<Candidate> members = {own}, all;
+    for (const Candidate& c : others) {
+      if (!same_law(c.term, own.term)) {
+        (c.merit() > own.merit() + std::log(options_.least_odds) ? members : all).push_back(c);
+      }
+    }
+    const std::size_t count = members.size();
+    members.insert(members.end(), all.begin(), all.end());
+    return stability(laws_on_, all_but(k), members, count, options_.stop);
+  }
+
+  std::vector<ClassMember> class_of(const Candidate& own, const std::vector<Candidate>& candidates) const {
+    std::vector<std::pair<double, ClassMember>> members = {{own.cost, {own.text(), own.term.axis, 1.0}}};
+    for (const Candidate& c : candidates) {
+      const double odds = std::exp(std::min(50.0, c.merit() - own.merit()));
+      if (odds > options_.least_odds && !same_law(c.term, own.term)) {
+        members.push_back({c.cost, {c.text(), c.term.axis, odds}});
+      }
+    }
+    std::stable_sort(members.begin(), members.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<ClassMember> result;
     result.reserve(members.size());
-    for (Member& m : members) {
-      result.push_back(std::move(m.member));
+    for (auto& [cost, member] : members) {
+      result.push_back(std::move(member));
     }
     return result;
+  }
+
+  // Several equations on one axis, the smaller of which take little beside the largest, are more probably one law whose form
+  // none of them has than laws of their own.
+  static bool form_is_known(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) {
+    constexpr double comparable = 0.5;
+    double least = law.gain, most = law.gain;
+    int on_axis = 0;
+    for (const DiscoveredLaw& other : all) {
+      if (other.term.axis == law.term.axis) {
+        ++on_axis;
+        least = std::min(least, other.gain);
+        most = std::max(most, other.gain);
+      }
+    }
+    return on_axis == 1 || (on_axis == 2 && least > comparable * most);
   }
 
   void tell() {
     if (state_.processes.empty()) {
       drop_weak();
+    }
+    std::vector<DiscoveredLaw> laws(state_.terms.size());
+    for (std::size_t k = 0; k < laws.size(); ++k) {
+      settle_class(k, laws[k]);
     }
     result_.processes = state_.processes;
     result_.log_p_remaining = state_.log_p_remaining;
@@ -389,7 +449,7 @@ class Search {
     auto at = static_cast<Eigen::Index>(state_.terms.size());
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      DiscoveredLaw law;
+      DiscoveredLaw& law = laws[k];
       law.term = state_.terms[k];
       law.expression = state_.terms[k].expression.text(state_.terms[k].constants);
       law.coefficient = state_.fit.coefficient(row);
@@ -405,13 +465,15 @@ class Search {
       const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
       law.significance =
           sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
-      law.ambiguous = ambiguity_class(k);
-      result_.laws.push_back(std::move(law));
     }
-    std::stable_sort(result_.laws.begin(), result_.laws.end(),
+    std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
+    for (DiscoveredLaw& law : laws) {
+      (form_is_known(law, laws) ? result_.laws : result_.described).push_back(law);
+    }
   }
 
+  std::span<const UnitRecording> recordings_;
   const DiscoveryOptions& options_;
   const Progress& progress_;
   std::vector<std::unique_ptr<Scene>> scenes_;

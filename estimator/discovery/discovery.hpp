@@ -40,10 +40,13 @@ struct DiscoveredLaw {
   std::string expression;                 // constants as numbers
   double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
   std::vector<Constant> constants;
-  double significance = 0.0;           // sigma, after correction for all that was tried
-  double gain = 0.0;                   // fall of the residuals' square
-  double held_out_gain = 0.0;          // log-likelihood on dwells and rotations left out in turn
-  double share = 0.0;                  // of the misfit beyond noise
+  double significance = 0.0;   // sigma, after correction for all that was tried
+  double gain = 0.0;           // fall of the residuals' square
+  double held_out_gain = 0.0;  // log-likelihood on dwells and rotations left out in turn
+  double share = 0.0;          // of the misfit beyond noise
+  double stability = 0.0;      // share of draws of three quarters of the dwells and rotations in which it, or what
+                               // cannot be told from it, explains most
+  double carries_over = 0.0;   // probability that it leaves at most a tenth of the misfit on a plan never used
   std::vector<ClassMember> ambiguous;  // what this recording cannot tell from it, itself included, simplest first
 };
 
@@ -56,6 +59,9 @@ struct DiscoveredProcess {
 
 struct Discovery {
   std::vector<DiscoveredLaw> laws;  // best first
+  // Equations that only together make up what an axis does: its form is none of them, and on another plan they may be far off.
+  // The fit holds them too.
+  std::vector<DiscoveredLaw> described;
   std::vector<DiscoveredProcess> processes;
   double misfit_before = 0.0, misfit_after = 0.0;  // squares of the residuals beyond their number
   double rows = 0.0;

@@ -58,6 +58,9 @@ void refine_constants(std::vector<LawTerm>& terms, const Eigen::VectorXd& value)
       const double most = largest_step * std::max(std::abs(constant), 1e-6);
       constant += std::isfinite(step) ? std::clamp(step, -most, most) : 0.0;
     }
+    if (!terms[k].constants.empty()) {
+      terms[k].constants.front() = std::clamp(terms[k].constants.front(), terms[k].least, terms[k].most);
+    }
   }
 }
 
@@ -232,7 +235,7 @@ LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> t
   return fit;
 }
 
-std::vector<double> exact_gains(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
+std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
                                 const std::vector<LawTerm>& alternatives, const std::stop_token& stop) {
   std::vector<LawTerm> all = given;
   all.insert(all.end(), alternatives.begin(), alternatives.end());
@@ -246,13 +249,14 @@ std::vector<double> exact_gains(std::span<const LawRecording> recordings, const 
   }
   const std::vector<int> base = first_numbers(given.size());
   const double before = base.empty() ? 0.0 : solve(information(base, base), score(base)).gain;
-  std::vector<double> gains;
+  std::vector<SingleFit> fits;
   for (std::size_t k = 0; k < alternatives.size(); ++k) {
     std::vector<int> with = base;
     with.push_back(static_cast<int>(given.size() + k));
-    gains.push_back(solve(information(with, with), score(with)).gain - before);
+    const Solution solution = solve(information(with, with), score(with));
+    fits.push_back({solution.gain - before, solution.value(solution.value.size() - 1)});
   }
-  return gains;
+  return fits;
 }
 
 namespace {

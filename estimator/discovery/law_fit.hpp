@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -19,6 +20,10 @@ struct LawTerm {
   int axis = 0;
   laws::Expression expression;
   std::vector<double> constants;  // of its `?`
+  // The first constant is fitted within these: beyond them the kernel is a constant, or a polynomial with a large coefficient.
+  double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();
+
+  bool at_its_limit() const { return !constants.empty() && !(constants.front() > least && constants.front() < most); }
 };
 
 // One recording that laws are fitted to. All must outlive it; `table` is that of a pass with this input, a forward pass
@@ -73,8 +78,13 @@ class LawColumns : public ColumnSource {
 LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> terms, int rounds,
                 const std::stop_token& stop = {});
 
-// Fall of the residuals' square by each term alone, given `given`, from one pass over each recording; constants as they are.
-std::vector<double> exact_gains(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
+struct SingleFit {
+  double gain = 0.0;         // fall of the residuals' square
+  double coefficient = 0.0;  // in unit_of(axis)
+};
+
+// Each of the alternatives alone beside `given`, from one pass over each recording; constants as they are.
+std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
                                 const std::vector<LawTerm>& alternatives, const std::stop_token& stop = {});
 
 // The recording less the laws, stretch by stretch, each spread evenly over its samples.

@@ -2,57 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
-#include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/planned_rotation.hpp"
 
 namespace selfcal::discovery {
 namespace {
 
-constexpr double planning_rate_hz = 20.0;
-constexpr double grid_deg = 45.0;
 constexpr int random_plans = 10;
 constexpr std::size_t most_rivals = 12;  // the most probable of a class
 // A plan that adds less than this to the separation of the closest rival settles nothing.
 constexpr double least_help_sigma = 1.0;
 
-// A walk over positions of the grid that visits what it has not seen before if it can, within the limits.
-Schedule random_plan(const ExperimentLimits& limits, double dwell_s, unsigned seed) {
-  std::mt19937 engine(seed);  // the standard fixes its bits; no distribution of the standard is used
-  const auto below = [&engine](int n) { return static_cast<int>(engine() % static_cast<unsigned>(n)); };
-  const int reach = static_cast<int>(limits.largest_move_deg / grid_deg);
-  Schedule plan;
-  plan.rotation_s = limits.rotation_s;
-  GimbalPosition at;
-  const auto count = static_cast<std::size_t>(std::max(3.0, limits.duration_s / (dwell_s + limits.rotation_s)));
-  while (plan.positions.size() < count) {
-    plan.positions.push_back(at);
-    plan.dwell_s.push_back(dwell_s);
-    GimbalPosition next = at;
-    for (int tries = 0; tries < 20; ++tries) {
-      next = {at.outer_deg + grid_deg * (below(2 * reach + 1) - reach),
-              at.inner_deg + grid_deg * (below(2 * reach + 1) - reach)};
-      const bool moves = next.outer_deg != at.outer_deg || next.inner_deg != at.inner_deg;
-      const bool within = std::abs(next.outer_deg) <= 360.0 && std::abs(next.inner_deg) <= 360.0;
-      const bool seen = std::any_of(plan.positions.begin(), plan.positions.end(), [&](const GimbalPosition& p) {
-        return p.outer_deg == next.outer_deg && p.inner_deg == next.inner_deg;
-      });
-      if (moves && within && !seen) {
-        break;
-      }
-      next = moves && within ? next : at;
-    }
-    at = next;
-  }
-  return plan;
-}
-
 std::vector<Schedule> plans(const ExperimentLimits& limits) {
   std::vector<Schedule> all;
   for (unsigned k = 0; k < random_plans; ++k) {
     static constexpr std::array<double, 3> dwells_s = {60.0, 100.0, 150.0};
-    Schedule plan = random_plan(limits, dwells_s[k % dwells_s.size()], 20261122U + k);
+    Schedule plan = walk_over_positions(limits, dwells_s[k % dwells_s.size()], 20261122U + k);
     plan.rotation_s *= k % 2 == 0 ? 1.0 : 2.0;  // another turn rate splits what depends on it
     all.push_back(std::move(plan));
   }
@@ -77,15 +43,6 @@ Closest closest_in(const Eigen::MatrixXd& G) {
   return best;
 }
 
-Eigen::MatrixXd information(const ImuData& data, const PassInput& input, const std::vector<LawTerm>& terms,
-                            const std::stop_token& stop) {
-  const diagnosis::RecordingContext context(data);
-  const LawMotion motion(context);
-  const NodeTable table = collect_nodes(motion, input);
-  LawColumns columns(motion, table, terms, false);
-  return run_columns(input, columns, stop).information;
-}
-
 std::vector<LawTerm> members_of(const DiscoveredLaw& law) {
   std::vector<ClassMember> rivals = law.ambiguous;
   std::erase_if(rivals,
@@ -95,9 +52,8 @@ std::vector<LawTerm> members_of(const DiscoveredLaw& law) {
   std::vector<LawTerm> terms = {law.term};
   for (const ClassMember& m : rivals) {
     auto expression = laws::Expression::parse(m.expression);
-    const bool thermal = expression && (expression->variables().test(static_cast<std::size_t>(laws::Variable::T)) ||
-                                        expression->variables().test(static_cast<std::size_t>(laws::Variable::dT)));
-    if (expression && !thermal && terms.size() <= most_rivals) {  // nobody knows the temperature of a planned recording
+    if (expression && !needs_temperature(*expression) &&
+        terms.size() <= most_rivals) {  // nobody knows the temperature of a planned recording
       terms.push_back({m.axis, std::move(*expression), {}});
     }
   }
@@ -116,7 +72,7 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
   const auto count = static_cast<Eigen::Index>(terms.size());
   Eigen::MatrixXd now = Eigen::MatrixXd::Zero(count, count);
   for (const UnitRecording& r : recordings) {
-    now += square * information(r.data, diagnosis::forward_pass(r.data, r.calibration), terms, stop);
+    now += square * information_of(r.data, diagnosis::forward_pass(r.data, r.calibration), terms, stop);
   }
   const UnitRecording& last = recordings.back();
   NextExperiment best;
@@ -125,11 +81,8 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
     if (stop.stop_requested()) {
       break;
     }
-    const diagnosis::IdealRecording ideal(plan, last.calibration.initial_attitude, last.data.site, planning_rate_hz);
-    PassInput input = diagnosis::forward_pass(ideal.data(), last.calibration);
-    input.parameters.setZero();
-    input.C_nb = ideal.C_nb_start();
-    const Closest closest = closest_in(now + square * information(ideal.data(), input, terms, stop));
+    const Closest closest =
+        closest_in(now + square * planned_information(plan, last, last.calibration.initial_attitude, terms, stop));
     const double separation = std::sqrt(closest.square);
     if (separation > best.separation) {
       const LawTerm& rival = terms[static_cast<std::size_t>(closest.column)];

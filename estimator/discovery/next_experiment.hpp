@@ -13,15 +13,9 @@
 #include <vector>
 
 #include "estimator/discovery/discovery.hpp"
-#include "estimator/geometry/schedule.hpp"
+#include "estimator/discovery/planned_rotation.hpp"
 
 namespace selfcal::discovery {
-
-struct ExperimentLimits {
-  double duration_s = 3000.0;
-  double largest_move_deg = 90.0;  // of one axis in one turn
-  double rotation_s = 5.0;         // the gimbal makes the largest move in it
-};
 
 struct NextExperiment {
   Schedule schedule;

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace selfcal::discovery {
 namespace {
@@ -12,6 +13,8 @@ namespace {
 constexpr double least_left = 1e-4;
 
 }  // namespace
+
+double cost_of_phase(double gain) { return 0.5 * std::log(2.0 * std::numbers::pi * std::max(1.0, gain)); }
 
 PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
     : sums_(sums),
@@ -127,10 +130,10 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
     }
     const auto seen = [&](Eigen::Index k) { return information(k) > least_left * function_information_[f](k); };
     for (Eigen::Index k = 0; k < D.cols(); ++k) {
-      if (!seen(k)) {
+      const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
+      if (function.second || !seen(k)) {
         continue;
       }
-      const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
       Ranked r{axis, static_cast<int>(k), score(k) * score(k) / information(k), 0.0};
       if (function.partner >= 0 && seen(function.partner)) {
         const double a = information(k), c = information(function.partner), x = partner(k);
@@ -140,7 +143,7 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
           r.gain = (c * u * u - 2.0 * x * u * v + a * v * v) / determinant;
         }
       }
-      r.merit = 0.5 * r.gain - function.cost - (function.partner >= 0 ? 1.0 : 0.0);
+      r.merit = 0.5 * r.gain - function.cost - (function.partner >= 0 ? cost_of_phase(r.gain) : 0.0);
       all.push_back(r);
     }
   }

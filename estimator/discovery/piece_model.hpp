@@ -18,6 +18,9 @@ struct Ranked {
   double merit = 0.0;  // gain / 2 less the cost: logarithm of the odds against nothing, but for a constant
 };
 
+// What a phase that is fitted costs in the logarithm of the odds: all of 2 pi before the data, 1/sqrt(gain) rad after them.
+double cost_of_phase(double gain);
+
 // Normal equations over the pieces. Laws are vectors over pieces and axes; what was chosen is projected out, what is a
 // random process is integrated out.
 class PieceModel {

@@ -1,9 +1,10 @@
 #include "estimator/discovery/shortlist.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-#include <set>
+#include <map>
 #include <utility>
 
 #include "estimator/discovery/discovery.hpp"
@@ -39,6 +40,48 @@ double highest_between(double low, double high, int rounds, F&& value) {
 
 }  // namespace
 
+std::vector<std::vector<Candidate>> exact_alternatives(std::span<const LawRecording> recordings,
+                                                       const std::vector<LawTerm>& given,
+                                                       const std::vector<Candidate>& candidates,
+                                                       const std::stop_token& stop) {
+  static constexpr std::array<double, 7> factors = {0.35, 0.6, 0.85, 1.0, 1.18, 1.7, 2.9};
+  std::vector<std::vector<Candidate>> all;
+  std::vector<LawTerm> terms;
+  for (const Candidate& candidate : candidates) {
+    all.emplace_back();
+    const bool varied = candidate.term.constants.size() == 1 && !candidate.step;
+    for (const double factor : factors) {
+      if (varied || factor == 1.0) {
+        all.back().push_back(candidate);
+        if (varied) {
+          all.back().back().term.constants.front() *= factor;
+        }
+        terms.push_back(all.back().back().term);
+      }
+    }
+  }
+  const std::vector<SingleFit> fits = fit_each(recordings, given, terms, stop);
+  auto fit = fits.begin();
+  for (std::vector<Candidate>& alternatives : all) {
+    for (Candidate& c : alternatives) {
+      c.gain = fit->gain;
+      c.coefficient = fit->coefficient;
+      ++fit;
+    }
+  }
+  return all;
+}
+
+std::vector<Candidate> best_of(const std::vector<std::vector<Candidate>>& alternatives) {
+  std::vector<Candidate> best;
+  for (const std::vector<Candidate>& some : alternatives) {
+    best.push_back(*std::max_element(some.begin(), some.end(),
+                                     [](const Candidate& a, const Candidate& b) { return a.gain < b.gain; }));
+  }
+  std::sort(best.begin(), best.end(), [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
+  return best;
+}
+
 Shortlist::Shortlist(const PieceSums& sums, const Dictionary& dictionary) : sums_(sums), dictionary_(dictionary) {}
 
 double Shortlist::gain_of(const PieceModel& model, const LawTerm& term) const {
@@ -53,7 +96,7 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
   const Function& function = dictionary_.functions[static_cast<std::size_t>(ranked.function)];
   std::string pattern = dictionary_.pattern(function);
   Candidate c;
-  c.cost = function.cost + (function.partner >= 0 ? 1.0 : 0.0);
+  c.cost = function.cost;
   c.term.axis = ranked.axis;
   c.gain = ranked.gain;
   if (function.partner >= 0) {
@@ -73,9 +116,11 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
     const auto [G, b] = model.project(ranked.axis, X);
     const Eigen::VectorXd size = G.ldlt().solve(b);
     c.gain = std::max(c.gain, model.gain(ranked.axis, X));
+    c.cost += cost_of_phase(c.gain);
     pattern.replace(pattern.find(wave), std::string(wave).size(), wave_with_phase);
     c.term.expression = *laws::Expression::parse(pattern);
     c.term.constants = {period, std::atan2(size(1), size(0))};
+    limit(c.term, Kernel::wave);
     return c;
   }
   c.term.expression = *laws::Expression::parse(pattern);
@@ -91,14 +136,18 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
       return gain_of(model, term);
     });
     c.term.constants = {constant};
+    limit(c.term, function.kernel);
   }
   c.gain = std::max(c.gain, gain_of(model, c.term));
   return c;
 }
 
 std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most) const {
-  constexpr std::size_t looked_at = 6;  // neighbours on the grid of a constant are one law
-  std::set<std::pair<int, std::string>> seen;
+  constexpr std::size_t looked_at = 12;  // neighbours on the grid of a constant are one law
+  // On a plan of equal dwells what turns only is seen at equal times: waves of several periods are then the same.
+  constexpr std::size_t most_waves = 4;
+  constexpr double another_period = 1.25;
+  std::map<std::pair<int, std::string>, std::vector<double>> taken;  // constants of a pattern on an axis
   std::vector<Candidate> all;
   for (const Ranked& ranked : model.rank(looked_at * most)) {
     const Function& function = dictionary_.functions[static_cast<std::size_t>(ranked.function)];
@@ -106,9 +155,15 @@ std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most
     if (function.kernel == Kernel::step) {
       key += std::to_string(function.constant);
     }
-    if (ranked.gain <= 0.0 || !seen.emplace(ranked.axis, key).second) {
+    std::vector<double>& others = taken[{ranked.axis, key}];
+    const bool wave_apart = function.kernel == Kernel::wave && others.size() < most_waves &&
+                            std::all_of(others.begin(), others.end(), [&](double other) {
+                              return std::max(other / function.constant, function.constant / other) > another_period;
+                            });
+    if (ranked.gain <= 0.0 || !(others.empty() || wave_apart)) {
       continue;
     }
+    others.push_back(function.constant);
     all.push_back(candidate(model, ranked));
     if (all.size() == most) {
       break;
@@ -134,6 +189,18 @@ void Shortlist::add_columns(const PieceModel& model, const LawTerm& term, std::v
       columns.push_back(derivative);
     }
   }
+}
+
+void Shortlist::limit(LawTerm& term, Kernel kernel) const {
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (const Factor& factor : dictionary_.factors) {
+    if (factor.kernel == kernel) {
+      least = std::min(least, factor.constant);
+      most = std::max(most, factor.constant);
+    }
+  }
+  term.least = 0.5 * least;
+  term.most = 2.0 * most;
 }
 
 std::vector<Constant> Shortlist::constants(const LawTerm& term) const {

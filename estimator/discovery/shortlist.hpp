@@ -1,6 +1,8 @@
 // From the ranking over the pieces to laws: constants refined, doubles left out.
 #pragma once
 
+#include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -13,11 +15,20 @@ struct Constant;
 
 struct Candidate {
   LawTerm term;
-  double gain = 0.0, cost = 0.0;  // as in Ranked and Function; two constants and a free phase cost one more
+  double gain = 0.0, cost = 0.0;  // as in Ranked and Function, the cost of a free phase included
   bool step = false;              // its constant is an instant
+  double coefficient = 0.0;       // where it was fitted exactly
   double merit() const { return 0.5 * gain - cost; }
   std::string text() const { return term.expression.text(term.constants); }
 };
+
+// Each candidate beside `given`, exactly, with its constant as it is and at six others around it.
+std::vector<std::vector<Candidate>> exact_alternatives(std::span<const LawRecording> recordings,
+                                                       const std::vector<LawTerm>& given,
+                                                       const std::vector<Candidate>& candidates,
+                                                       const std::stop_token& stop);
+// The best alternative of each, best first.
+std::vector<Candidate> best_of(const std::vector<std::vector<Candidate>>& alternatives);
 
 class Shortlist {
  public:
@@ -34,6 +45,7 @@ class Shortlist {
 
  private:
   Candidate candidate(const PieceModel& model, const Ranked& ranked) const;
+  void limit(LawTerm& term, Kernel kernel) const;  // to twice the range in which its kernel is looked for
   double gain_of(const PieceModel& model, const LawTerm& term) const;
 
   const PieceSums& sums_;

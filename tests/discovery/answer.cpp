@@ -26,6 +26,10 @@ using nlohmann::ordered_json;
 ordered_json to_json(const discovery::Discovery& d) {
   ordered_json j = {{"misfit_before", d.misfit_before}, {"misfit_after", d.misfit_after}, {"refused", d.refused}};
   j["laws"] = ordered_json::array();
+  j["described"] = ordered_json::array();
+  for (const discovery::DiscoveredLaw& law : d.described) {
+    j["described"].push_back({{"axis", law.term.axis}, {"expression", law.expression}, {"gain", law.gain}});
+  }
   for (const discovery::DiscoveredLaw& law : d.laws) {
     ordered_json members = ordered_json::array();
     for (const discovery::ClassMember& m : law.ambiguous) {
@@ -38,6 +42,8 @@ ordered_json to_json(const discovery::Discovery& d) {
                          {"significance", law.significance},
                          {"held_out_gain", law.held_out_gain},
                          {"share", law.share},
+                         {"stability", law.stability},
+                         {"carries_over", law.carries_over},
                          {"class", members}});
   }
   j["processes"] = ordered_json::array();

@@ -54,19 +54,18 @@ function symbolsNote(findings) {
 
 // Laws and processes that take away all but a tenth of the misfit.
 function explained(d) {
-  return d.unexplained && objectOf(d.discovery).explained_share >= 0.9;
+  return d.unexplained && objectOf(d.discovery).explained_share >= 0.9 && listOf(d.described).length === 0;
 }
 
-function discoveredTable(d) {
-  const laws = listOf(d.discovered);
-  const processes = listOf(d.processes);
+function discoveredTable(laws, processes, id) {
   const all = [...laws, ...processes];
   return table([
     {title: 'sensor', cells: all.map((l) => textOf(l.axis)), class: 'left'},
     {title: 'law', cells: [...laws.map((l) => lawAsMath(textOf(l.expression))), ...processes.map((p) => textOf(p.process))], class: 'words'},
     {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
     {title: 'explains it as well', cells: all.map((l) => listOf(l.class).length > 1 ? `${l.class.length - 1} others` : '–'), class: 'words'},
-  ], {id: 'discovered'});
+    {title: 'holds on another plan', cells: all.map((l) => (Number.isFinite(l.carries_over) ? `${significant(100 * l.carries_over, 2)} %` : '–'))},
+  ], {id});
 }
 
 function remainderWords(r) {
@@ -211,7 +210,13 @@ function showDiagnosisTables(d) {
   const found = listOf(d.discovered).length + listOf(d.processes).length > 0;
   if (found) {
     const symbols = lawSymbols(listOf(d.discovered).map((l) => textOf(l.expression)));
-    add('Found beyond the catalogue', discoveredTable(d), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''));
+    add('Found beyond the catalogue', discoveredTable(listOf(d.discovered), listOf(d.processes), 'discovered'), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''));
+  }
+  const described = listOf(d.described);
+  if (described.length > 0) {
+    add('Only described', element('p', {class: 'note'}, 'Only several equations together make up what this axis does: its form is '
+        + 'none of them. They describe this recording and are not to be used on another.'),
+    discoveredTable(described, [], 'described'));
   }
   if (d.unexplained && !explained(d)) {
     add('What to do', adviceForUnexplained(d.adequacy));

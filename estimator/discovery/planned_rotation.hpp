@@ -1,0 +1,33 @@
+// A rotation that nobody has made yet, and what laws would do on it: signatures need no data (diagnosis/ideal_recording.hpp).
+#pragma once
+
+#include <Eigen/Core>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+#include "estimator/geometry/schedule.hpp"
+
+namespace selfcal::discovery {
+
+struct ExperimentLimits {
+  double duration_s = 3000.0;
+  double largest_move_deg = 90.0;  // of one axis in one turn
+  double rotation_s = 5.0;         // the gimbal makes the largest move in it
+};
+
+// A walk over positions 45 degrees apart that visits what it has not seen before where it can, within the limits. The same
+// for the same seed.
+Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, unsigned seed);
+
+// Nobody knows the temperature of a rotation that was not made.
+bool needs_temperature(const laws::Expression& expression);
+
+// Information of the laws' coefficients, per unit_of(axis), the 33 states projected out. [terms x terms]
+Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const std::vector<LawTerm>& terms,
+                               const std::stop_token& stop = {});
+// The same on a plan, with the unit, the site and the noise of `like` and the vehicle in this attitude.
+Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,
+                                    const std::vector<LawTerm>& terms, const std::stop_token& stop = {});
+
+}  // namespace selfcal::discovery
