@@ -103,6 +103,13 @@ std::string equation_text(const Finding& f, double mean_temperature_c, double la
   return text;
 }
 
+// What was assumed stands unless the diagnosis found another density; more of it is in the physics file.
+double density(const Diagnosis& d, std::string_view effect, double found, double assumed) {
+  const bool named =
+      std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& f) { return f.effect == effect; });
+  return named ? std::min(found, assumed) : assumed;
+}
+
 }  // namespace
 
 std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, double latitude) {
@@ -138,13 +145,15 @@ std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& a
   text += "\n[attitude]\n" + key_value("roll_deg", attitude.roll / units::degree) +
           key_value("pitch_deg", attitude.pitch / units::degree) +
           key_value("heading_deg", attitude.heading / units::degree);
-  text += "\n[noise]\n" +
-          key_value("gyro_arw_deg_per_sqrt_h",
-                    std::min(d.calibration.gyro_arw, assumed.gyro_arw) / units::degree_per_sqrt_hour) +
-          key_value("accel_vrw_ug_per_sqrt_hz",
-                    std::min(d.calibration.accel_vrw, assumed.accel_vrw) / units::micro_g_per_sqrt_hz) +
-          key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
-          key_value("accel_lsb_m_per_s", assumed.accel_quantum);
+  text +=
+      "\n[noise]\n" +
+      key_value("gyro_arw_deg_per_sqrt_h", density(d, "gyro_noise_level", d.calibration.gyro_arw, assumed.gyro_arw) /
+                                               units::degree_per_sqrt_hour) +
+      key_value(
+          "accel_vrw_ug_per_sqrt_hz",
+          density(d, "accel_noise_level", d.calibration.accel_vrw, assumed.accel_vrw) / units::micro_g_per_sqrt_hz) +
+      key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
+      key_value("accel_lsb_m_per_s", assumed.accel_quantum);
   text += "\n[gimbal]\npositioning_error_deg = 0\n";
   text += "\n[parameters]\n";
   for (int k = 0; k < sensor_parameter_count; ++k) {

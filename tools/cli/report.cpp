@@ -13,6 +13,7 @@
 #include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/left_out.hpp"
 #include "daemon/host/wall_clock.hpp"
+#include "estimator/diagnosis/still_calibration.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/file_hash.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -30,6 +31,7 @@
 #include "tools/report/calibration_document.hpp"
 #include "tools/report/fleet_document.hpp"
 #include "tools/report/misfit_map.hpp"
+#include "tools/report/overlay_document.hpp"
 #include "tools/report/page.hpp"
 #include "tools/report/plan_document.hpp"
 #include "tools/report/run_document.hpp"
@@ -46,6 +48,7 @@ struct ReportArguments {
   std::vector<std::string> subjects;
   std::string output;
   std::string past;
+  std::string against;
   std::string hub;
   std::vector<std::string> tolerance;
   NoiseArguments noise;
@@ -122,6 +125,62 @@ Expected<Json> recording_document(const std::string& file, const ReportArguments
   return sha256_of_file(file).map([&](const std::string& hash) {
     document["input"] = {{"name", std::filesystem::path(file).filename().string()}, {"sha256", hash}};
     return std::move(document);
+  });
+}
+
+// A recording and the calibration that its noise and innovations are of.
+struct Calibrated {
+  LoadedRecording loaded;
+  std::unique_ptr<SoundPart> sound;
+  std::vector<double> first_temperature;
+  ImuData data;
+  CalibrationResult calibration;
+};
+
+Expected<std::unique_ptr<Calibrated>> calibrated(const std::string& file, const CalibrationOptions& options) {
+  Expected<LoadedRecording> loaded = read_recording(file, {.gaps_are_errors = false});
+  if (!loaded) {
+    return tl::unexpected(loaded.error());
+  }
+  auto all = std::make_unique<Calibrated>();
+  all->loaded = std::move(*loaded);
+  all->sound = sound_part_or_all(all->loaded.recording);
+  all->data = all->sound ? all->sound->aside.data() : imu_view(all->loaded.recording, all->first_temperature);
+  CalibrationOutcome outcome = diagnosis::calibrate_still(all->data, options, {});
+  if (!outcome.result) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, outcome.failure.message));
+  }
+  all->calibration = std::move(*outcome.result);
+  all->data.coasts = all->calibration.coasts;
+  return all;
+}
+
+// The recording over the simulation, and what is inside the bands on standard output.
+Expected<Json> overlay_page(const std::string& file, const ReportArguments& arguments) {
+  const Expected<CalibrationOptions> options = options_from(arguments);
+  if (!options) {
+    return tl::unexpected(options.error());
+  }
+  const auto recording = calibrated(file, *options);
+  if (!recording) {
+    return tl::unexpected(recording.error());
+  }
+  const auto simulation = calibrated(arguments.against, *options);
+  if (!simulation) {
+    return tl::unexpected(simulation.error());
+  }
+  if (std::abs((*recording)->data.sample_rate_hz / (*simulation)->data.sample_rate_hz - 1.0) > 1e-3) {
+    return fail(ErrorKind::bad_input, fmt::format("{} has {} Hz, {} has {} Hz", file, (*recording)->data.sample_rate_hz,
+                                                  arguments.against, (*simulation)->data.sample_rate_hz));
+  }
+  const report::Overlay overlay =
+      report::lay_over((*recording)->data, (*recording)->calibration, (*simulation)->data, (*simulation)->calibration);
+  fmt::print("{}", report::overlay_text(overlay));
+  const auto name = [](const std::string& path) { return std::filesystem::path(path).filename().string(); };
+  return sha256_of_file(file).map([&](const std::string& hash) {
+    Json document = report::overlay_document(overlay, name(file), name(arguments.against));
+    document["input"]["sha256"] = hash;
+    return document;
   });
 }
 
@@ -215,6 +274,9 @@ Expected<Json> page_of_document(const std::string& file, const ReportArguments& 
 }
 
 Expected<Json> page_of(const std::string& subject, const ReportArguments& arguments) {
+  if (!arguments.against.empty()) {
+    return overlay_page(subject, arguments);
+  }
   if (is_number(subject)) {
     return run_of_daemon(subject).and_then([&](const Json& run) { return page_of_run(run, true, arguments); });
   }
@@ -320,6 +382,9 @@ CommandRun configure(Options& options) {
       "of the daemon");
   options.text("-o,--output", arguments->output, "page to write: .html, or .pdf (printed by Chromium)", Needed::yes);
   options.flag("--history", arguments->fleet, "all units: who is due, who drifts, and when it passes its limit");
+  options.text("--against", arguments->against,
+               "a simulation of the same schedule: spectra, Allan deviation and innovations over each other");
+  options.exclude("--against", "--history");
   options.text("--past", arguments->past, "file with what `history SERIAL --json` said, for the unit's past");
 #ifndef SELFCAL_WITHOUT_HUB
   options.text("--hub", arguments->hub, "with --history: all units of a depot's hub, by its connection string");

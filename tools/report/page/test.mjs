@@ -85,6 +85,7 @@ const wanted = {
   plan: ['timeline-0', 'timeline-1', 'sphere-0', 'sphere-1', 'forecast-accel_bias_x', 'forecast-gyro_misalignment_zy'],
   fleet: ['trend-accel_bias_x', 'trend-gyro_misalignment_zy'],
   investigation: ['rotation-1'],
+  overlay: ['overlay-spectrum-0', 'overlay-allan-5', 'overlay-correlation-north', 'overlay-sizes', 'overlay-histogram'],
 };
 
 // Every plot is drawn as wide as its place (a canvas of another width is squeezed), holds its data, and has room for the
@@ -396,6 +397,16 @@ async function check_paper(page, where) {
   await check_drawing(page, `${where}, on the sheet`);
 }
 
+// The table is what the program said on standard output; EXPECTED: {lines: [...]}.
+async function check_overlay(page) {
+  const rows = await page.$$eval('#judgements tbody tr', (lines) => lines.map((line) => [...line.cells].map((cell) => cell.textContent)));
+  expect(rows.length === 4, `${rows.length} judgements`);
+  for (const [what, points, share] of rows) {
+    const said = expected.lines.find((line) => line.startsWith(what + ' '));
+    expect(said?.includes(` ${points} `) && said.includes(` ${share} `), `${what}: ${points} points, ${share} on the page, "${said}" said`);
+  }
+}
+
 // At the foot of every sheet: program and version, hash of the recording, date, number of the sheet and of all.
 async function check_sheets(page, where) {
   const boxes = await page.evaluate(() => Object.fromEntries([...document.getElementById('paper-margins').sheet.cssRules]
@@ -448,7 +459,8 @@ async function check_page(browser, page_file) {
     await check_width(page, where);
     if (width === 1400) {
       await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep,
-             unexplained: check_unexplained, plan: check_plan, fleet: check_fleet, investigation: check_investigation}[kind](page);
+             unexplained: check_unexplained, plan: check_plan, fleet: check_fleet, investigation: check_investigation,
+             overlay: check_overlay}[kind](page);
       if (kind === 'calibration') {
         await check_keyboard(page);
         await check_saving(page, 'nis');

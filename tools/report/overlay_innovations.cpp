@@ -1,0 +1,200 @@
+#include "tools/report/overlay_innovations.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/passes/pass.hpp"
+#include "tools/report/overlay_bands.hpp"
+
+namespace selfcal::report {
+namespace {
+
+constexpr std::size_t axes = 3;
+constexpr std::size_t most_lags = 30;
+constexpr double block_s = 60.0;
+constexpr std::array<const char*, axes> axis_names = {"north", "up", "east"};
+
+struct Innovations {
+  std::vector<double> time_s;
+  std::array<std::vector<double>, axes> value;        // over their predicted sigma
+  std::array<std::vector<double>, axes> correlation;  // at lags 0, 1, ...
+};
+
+std::vector<double> correlations(const std::vector<double>& x, std::size_t lags) {
+  double mean = 0.0;
+  for (const double v : x) {
+    mean += v / static_cast<double>(x.size());
+  }
+  std::vector<double> r(lags + 1, 0.0);
+  for (std::size_t k = 0; k <= lags; ++k) {
+    for (std::size_t i = k; i < x.size(); ++i) {
+      r[k] += (x[i] - mean) * (x[i - k] - mean);
+    }
+  }
+  for (std::size_t k = lags + 1; k-- > 0;) {
+    r[k] /= r[0];
+  }
+  return r;
+}
+
+Innovations innovations_of(const PassInput& input) {
+  const PassOutput pass = run_pass(input);
+  Innovations all;
+  for (const Epoch& e : pass.epochs) {
+    all.time_s.push_back(e.time_s);
+    for (std::size_t a = 0; a < axes; ++a) {
+      const auto row = static_cast<Eigen::Index>(a);
+      all.value[a].push_back(e.innovation(row) / std::sqrt(e.variance(row)));
+    }
+  }
+  for (std::size_t a = 0; a < axes; ++a) {
+    all.correlation[a] = correlations(all.value[a], 2 * most_lags);
+  }
+  return all;
+}
+
+// What chance makes of a correlation at lag k (Bartlett 1946), times n. `r`: those of both series, zero where chance makes them.
+double bartlett(const std::vector<double>& r, std::size_t k) {
+  const auto at = [&](std::size_t lag) { return lag < r.size() ? r[lag] : 0.0; };
+  double sum = 0.0;
+  for (std::size_t j = 1; j < r.size(); ++j) {
+    const double term = at(k + j) + at(k > j ? k - j : j - k) - 2.0 * at(k) * at(j);
+    sum += term * term;
+  }
+  return sum;
+}
+
+// Mean of both, without what chance makes.
+std::vector<double> common(const std::vector<double>& a, const std::vector<double>& b, std::size_t n) {
+  std::vector<double> r(a.size());
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    r[k] = 0.5 * (a[k] + b[k]);
+    r[k] = std::abs(r[k]) > 2.0 / std::sqrt(2.0 * static_cast<double>(n)) ? r[k] : 0.0;
+  }
+  return r;
+}
+
+// Of how many values one is worth: of squares, or of what is counted.
+double inflation(const std::vector<double>& r, double power) {
+  double sum = 1.0;
+  for (std::size_t k = 1; k < r.size(); ++k) {
+    sum += 2.0 * std::pow(std::abs(r[k]), power);
+  }
+  return sum;
+}
+
+OverlayCurve autocorrelation(const Innovations& a, const Innovations& b, std::size_t axis) {
+  OverlayCurve curve{OverlayKind::innovations,
+                     std::string("correlation-") + axis_names[axis],
+                     std::string("innovations ") + axis_names[axis],
+                     "lag",
+                     "s",
+                     "correlation",
+                     "1",
+                     false,
+                     {}};
+  const std::size_t n = std::min(a.time_s.size(), b.time_s.size());
+  const std::vector<double> r = common(a.correlation[axis], b.correlation[axis], n);
+  for (std::size_t k = 1; k <= std::min(most_lags, n / 10); ++k) {
+    const double one = bartlett(r, k);
+    curve.points.push_back(
+        difference_point(static_cast<double>(k), a.correlation[axis][k], b.correlation[axis][k],
+                         one / static_cast<double>(a.time_s.size()) + one / static_cast<double>(b.time_s.size())));
+  }
+  return curve;
+}
+
+// Mean squares of a minute's innovations, each minute of the recording beside the same of the simulation.
+OverlayCurve sizes(const Innovations& a, const Innovations& b) {
+  OverlayCurve curve{
+      OverlayKind::innovations, "sizes", "size of the innovations", "time", "s", "mean square", "1", true, {}};
+  const std::size_t n = std::min(a.time_s.size(), b.time_s.size());
+  double shared = 0.0;
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    shared += inflation(common(a.correlation[axis], b.correlation[axis], n), 2.0) / axes;
+  }
+  const auto block = static_cast<std::size_t>(block_s);
+  for (std::size_t first = 0; first + block <= n; first += block) {
+    double own = 0.0, other = 0.0;
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      for (std::size_t i = first; i < first + block; ++i) {
+        own += a.value[axis][i] * a.value[axis][i];
+        other += b.value[axis][i] * b.value[axis][i];
+      }
+    }
+    const double count = static_cast<double>(axes * block);
+    curve.points.push_back(
+        ratio_point(a.time_s[first + block / 2], own / count, other / count, count / shared, count / shared));
+  }
+  return curve;
+}
+
+// Bins of half a sigma, the outermost with all beyond; a bin counts where both hold ten.
+OverlayCurve histogram(const Innovations& a, const Innovations& b) {
+  constexpr double width = 0.5, farthest = 3.5;
+  constexpr auto bins = static_cast<std::size_t>(2.0 * farthest / width);
+  OverlayCurve curve{OverlayKind::histogram,
+                     "histogram",
+                     "histogram of the innovations",
+                     "innovation over its sigma",
+                     "1",
+                     "share",
+                     "1",
+                     false,
+                     {}};
+  std::array<double, bins> own{}, other{};
+  double n_own = 0.0, n_other = 0.0, shared = 0.0;
+  const auto count = [&](const Innovations& all, std::array<double, bins>& into, double& n) {
+    for (const std::vector<double>& values : all.value) {
+      for (const double v : values) {
+        const double at = std::clamp((v + farthest) / width, 0.0, static_cast<double>(bins) - 0.5);
+        into[static_cast<std::size_t>(at)] += 1.0;
+        n += 1.0;
+      }
+    }
+  };
+  count(a, own, n_own);
+  count(b, other, n_other);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    const std::size_t n = std::min(a.time_s.size(), b.time_s.size());
+    shared += inflation(common(a.correlation[axis], b.correlation[axis], n), 1.0) / axes;
+  }
+  constexpr double enough = 10.0;
+  for (std::size_t k = 0; k < bins; ++k) {
+    if (own[k] + other[k] < 2.0 * enough) {
+      continue;
+    }
+    const double p = (own[k] + other[k]) / (n_own + n_other);
+    curve.points.push_back(difference_point(width * (static_cast<double>(k) + 0.5) - farthest, own[k] / n_own,
+                                            other[k] / n_other,
+                                            shared * p * (1.0 - p) * (1.0 / n_own + 1.0 / n_other)));
+  }
+  return curve;
+}
+
+}  // namespace
+
+std::vector<OverlayCurve> overlay_innovations(const ImuData& recording, const CalibrationResult& of_recording,
+                                              const ImuData& simulation, const CalibrationResult& of_simulation) {
+  const PassInput own = diagnosis::forward_pass(recording, of_recording);
+  PassInput other = diagnosis::forward_pass(simulation, of_simulation);
+  other.noise = own.noise;
+  other.noise.disturbed.clear();  // what shook the recording shakes no simulation
+  other.force = own.force;
+  const Innovations a = innovations_of(own), b = innovations_of(other);
+  constexpr std::size_t enough = 100;
+  if (a.time_s.size() < enough || b.time_s.size() < enough) {
+    return {};
+  }
+  std::vector<OverlayCurve> curves;
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    curves.push_back(autocorrelation(a, b, axis));
+  }
+  curves.push_back(sizes(a, b));
+  curves.push_back(histogram(a, b));
+  return curves;
+}
+
+}  // namespace selfcal::report
