@@ -23,7 +23,9 @@ constexpr auto full_queue_retry = 1ms;  // ENOBUFS has no event
 
 isotp::Options transport_options(const InsConfig& config) {
   isotp::Options options;
-  options.address = {config.request_id, config.response_id, config.functional_id, config.extended_ids};
+  const profile::Bus& bus = config.profile->bus;
+  options.address = {config.request_id, config.response_id, config.functional_id, config.extended_ids,
+                     bus.request_byte,  bus.response_byte,  bus.functional_byte};
   options.fd = config.fd;
   options.frame_bytes = config.fd ? can::max_fd_bytes : can::max_classic_bytes;
   options.padding_byte = config.profile->bus.padding;

@@ -32,8 +32,8 @@ Decoded decode_single(std::span<const std::uint8_t> data) {
 }
 
 // 9.6.3: 12 bits of length, or zeros and then 32 bits of a length that 12 do not hold.
-Decoded decode_first(std::span<const std::uint8_t> data) {
-  if (data.size() < 8) {
+Decoded decode_first(std::span<const std::uint8_t> data, std::size_t address_bytes) {
+  if (data.size() + address_bytes < 8) {
     return no(CodecError::truncated);
   }
   const std::uint32_t length = (data[0] & 0x0FU) << 8U | data[1];
@@ -66,13 +66,13 @@ Decoded decode_flow_control(std::span<const std::uint8_t> data) {
 
 }  // namespace
 
-tl::expected<Pdu, CodecError> decode(std::span<const std::uint8_t> data) {
+tl::expected<Pdu, CodecError> decode(std::span<const std::uint8_t> data, std::size_t address_bytes) {
   if (data.empty()) {
     return no(CodecError::empty);
   }
   switch (data[0] >> 4U) {
     case 0: return decode_single(data);
-    case 1: return decode_first(data);
+    case 1: return decode_first(data, address_bytes);
     case 2:
       if (data.size() < 2) {
         return no(CodecError::truncated);
@@ -89,11 +89,12 @@ std::size_t first_frame_payload(std::uint32_t length, std::size_t frame_bytes) {
   return frame_bytes - (length <= max_short_length ? 2 : 6);
 }
 
-std::size_t encode_single(std::span<const std::uint8_t> payload, std::span<std::uint8_t> out) {
+std::size_t encode_single(std::span<const std::uint8_t> payload, std::span<std::uint8_t> out,
+                          std::size_t address_bytes) {
   if (payload.empty() || payload.size() > max_single_payload(out.size())) {
     return 0;
   }
-  const bool fits_classic = payload.size() <= 7;
+  const bool fits_classic = payload.size() + address_bytes <= 7;
   const std::size_t header = fits_classic ? 1 : 2;
   out[0] = fits_classic ? static_cast<std::uint8_t>(payload.size()) : std::uint8_t{0};
   if (!fits_classic) {

@@ -1,4 +1,7 @@
-// The frames of ISO 15765-2:2016 (normal addressing), bytes to values and back. No state, no allocation.
+// The frames of ISO 15765-2:2016, bytes to values and back. No state, no allocation.
+//
+// Extended and mixed addressing have an address byte before them, which is not seen here: a frame then has one byte less, and
+// `address_bytes` says so where that matters.
 #pragma once
 
 #include <cstddef>
@@ -40,12 +43,13 @@ enum class CodecError : std::uint8_t {
 };
 
 // `data` is the payload of one CAN frame (up to 64 bytes). Spans point into it.
-tl::expected<Pdu, CodecError> decode(std::span<const std::uint8_t> data);
+tl::expected<Pdu, CodecError> decode(std::span<const std::uint8_t> data, std::size_t address_bytes = 0);
 
 // Encoders write into `out`, as long as the frame may become (8, or an FD length); padding is the transport's.
 // Single, consecutive, flow control: return the bytes in use; single 0 if the payload does not fit. First: fills all of
 // `out` from the beginning of the payload and returns how much of it went in.
-std::size_t encode_single(std::span<const std::uint8_t> payload, std::span<std::uint8_t> out);
+std::size_t encode_single(std::span<const std::uint8_t> payload, std::span<std::uint8_t> out,
+                          std::size_t address_bytes = 0);
 std::size_t encode_first(std::uint32_t length, std::span<const std::uint8_t> payload, std::span<std::uint8_t> out);
 std::size_t encode_consecutive(std::uint8_t sequence, std::span<const std::uint8_t> payload,
                                std::span<std::uint8_t> out);

@@ -56,8 +56,9 @@ Transport::Transport(const Options& options) : options_(options) {
   functional_message_.resize(can::max_fd_bytes);
 }
 
-can::CanFrame Transport::blank_frame(std::uint32_t id) const {
+can::CanFrame Transport::blank_frame(std::uint32_t id, std::optional<std::uint8_t> address_byte) const {
   can::CanFrame frame;
+  frame.data[0] = address_byte.value_or(0);
   frame.id = id;
   frame.extended = options_.address.extended;
   frame.fd = options_.fd;
@@ -65,16 +66,23 @@ can::CanFrame Transport::blank_frame(std::uint32_t id) const {
   return frame;
 }
 
+std::span<std::uint8_t> Transport::room(can::CanFrame& frame) const {
+  return std::span(frame.data).first(options_.frame_bytes).subspan(address_bytes());
+}
+
+// `used` of its room.
 void Transport::finish_frame(can::CanFrame& frame, std::size_t used) const {
+  used += address_bytes();
   const std::size_t wanted = options_.padding ? std::max<std::size_t>(used, 8) : used;
   frame.size = static_cast<std::uint8_t>(can::frame_size_for(wanted));
   std::fill(frame.data.begin() + static_cast<std::ptrdiff_t>(used), frame.data.begin() + frame.size,
             options_.padding_byte);
 }
 
-can::CanFrame Transport::single_frame(std::span<const std::uint8_t> message, std::uint32_t id) const {
-  can::CanFrame frame = blank_frame(id);
-  finish_frame(frame, encode_single(message, std::span(frame.data).first(options_.frame_bytes)));
+can::CanFrame Transport::single_frame(std::span<const std::uint8_t> message, std::uint32_t id,
+                                      std::optional<std::uint8_t> address_byte) const {
+  can::CanFrame frame = blank_frame(id, address_byte);
+  finish_frame(frame, encode_single(message, room(frame), address_bytes()));
   return frame;
 }
 
@@ -87,26 +95,29 @@ bool Transport::send(std::span<const std::uint8_t> message, Time now) {
   sender_.done = 0;
   sender_.due = now;
   sender_.waits = 0;
-  sender_.state = message.size() <= max_single_payload(options_.frame_bytes) ? SendState::single : SendState::first;
+  sender_.state = message.size() <= max_single_payload(options_.frame_bytes - address_bytes()) ? SendState::single
+                                                                                               : SendState::first;
   return true;
 }
 
 bool Transport::send_functional(std::span<const std::uint8_t> message, Time now) {
   if (functional_.waiting || !options_.address.functional_id || message.empty() ||
-      message.size() > max_single_payload(options_.frame_bytes)) {
+      message.size() > max_single_payload(options_.frame_bytes - address_bytes())) {
     return false;
   }
-  functional_ = {true, now, single_frame(message, *options_.address.functional_id)};
+  functional_ = {true, now, single_frame(message, *options_.address.functional_id, options_.address.functional_byte)};
   return true;
 }
 
-bool Transport::is_ours(std::uint32_t id, const can::CanFrame& frame) const {
-  return frame.id == id && frame.extended == options_.address.extended && !frame.remote && (options_.fd || !frame.fd);
+bool Transport::is_ours(std::uint32_t id, std::optional<std::uint8_t> address_byte, const can::CanFrame& frame) const {
+  return frame.id == id && (!address_byte || (frame.size > 0 && frame.data[0] == *address_byte)) &&
+         frame.extended == options_.address.extended && !frame.remote && (options_.fd || !frame.fd);
 }
 
 bool Transport::accepts(const can::CanFrame& frame) const {
   const Address& address = options_.address;
-  return is_ours(address.receive_id, frame) || (address.functional_id && is_ours(*address.functional_id, frame));
+  return is_ours(address.receive_id, address.receive_byte, frame) ||
+         (address.functional_id && is_ours(*address.functional_id, address.functional_byte, frame));
 }
 
 Events Transport::on_frame(const can::CanFrame& frame, Time now) {
@@ -114,8 +125,9 @@ Events Transport::on_frame(const can::CanFrame& frame, Time now) {
   if (!accepts(frame)) {
     return events;
   }
-  const auto pdu = decode(frame.payload());
-  if (options_.address.functional_id && is_ours(*options_.address.functional_id, frame)) {
+  const auto pdu = decode(frame.payload().subspan(address_bytes()), address_bytes());
+  if (options_.address.functional_id &&
+      is_ours(*options_.address.functional_id, options_.address.functional_byte, frame)) {
     if (const auto* single = pdu ? std::get_if<SingleFrame>(&*pdu) : nullptr) {
       std::ranges::copy(single->payload, functional_message_.begin());
       message_ = std::span(functional_message_).first(single->payload.size());
@@ -214,8 +226,8 @@ void Transport::grant_or_wait(Time now, Events& events) {
 }
 
 void Transport::owe_flow_control(FlowStatus status, Time now) {
-  flow_ = {true, now, blank_frame(options_.address.transmit_id)};
-  finish_frame(flow_.frame, encode_flow_control({status, options_.block_size, options_.st_min}, flow_.frame.data));
+  flow_ = {true, now, blank_frame(options_.address.transmit_id, options_.address.transmit_byte)};
+  finish_frame(flow_.frame, encode_flow_control({status, options_.block_size, options_.st_min}, room(flow_.frame)));
 }
 
 void Transport::on_consecutive(const ConsecutiveFrame& consecutive, Time now, Events& events) {
@@ -307,22 +319,21 @@ std::size_t Transport::pending(std::span<can::CanFrame> out, Time now) const {
 can::CanFrame Transport::opening_frame() const {
   const auto message = std::span(sender_.buffer).first(sender_.length);
   if (sender_.state == SendState::single) {
-    return single_frame(message, options_.address.transmit_id);
+    return single_frame(message, options_.address.transmit_id, options_.address.transmit_byte);
   }
-  can::CanFrame frame = blank_frame(options_.address.transmit_id);
-  encode_first(static_cast<std::uint32_t>(message.size()), message, std::span(frame.data).first(options_.frame_bytes));
-  finish_frame(frame, options_.frame_bytes);
+  can::CanFrame frame = blank_frame(options_.address.transmit_id, options_.address.transmit_byte);
+  encode_first(static_cast<std::uint32_t>(message.size()), message, room(frame));
+  finish_frame(frame, options_.frame_bytes - address_bytes());
   return frame;
 }
 
 can::CanFrame Transport::consecutive_frame(std::size_t at, std::size_t part, std::uint8_t sequence) const {
-  can::CanFrame frame = blank_frame(options_.address.transmit_id);
-  finish_frame(frame, encode_consecutive(sequence, std::span(sender_.buffer).subspan(at, part),
-                                         std::span(frame.data).first(options_.frame_bytes)));
+  can::CanFrame frame = blank_frame(options_.address.transmit_id, options_.address.transmit_byte);
+  finish_frame(frame, encode_consecutive(sequence, std::span(sender_.buffer).subspan(at, part), room(frame)));
   return frame;
 }
 
-std::size_t Transport::consecutive_payload() const { return options_.frame_bytes - 1; }
+std::size_t Transport::consecutive_payload() const { return options_.frame_bytes - address_bytes() - 1; }
 
 Events Transport::sent(std::size_t count, Time now) {
   Events events;
@@ -349,7 +360,8 @@ void Transport::advance_sender(Time now, Events& events) {
     case SendState::wait_flow: assert(false && "sent() without pending()"); return;
     case SendState::single: sender_.done = sender_.length; break;
     case SendState::first:
-      sender_.done = first_frame_payload(static_cast<std::uint32_t>(sender_.length), options_.frame_bytes);
+      sender_.done =
+          first_frame_payload(static_cast<std::uint32_t>(sender_.length), options_.frame_bytes - address_bytes());
       sender_.sequence = 1;
       sender_.state = SendState::wait_flow;
       sender_.deadline = now + options_.n_bs;

@@ -24,6 +24,8 @@ struct Address {
   std::uint32_t receive_id = 0;
   std::optional<std::uint32_t> functional_id;  // one-to-many requests: single frames only
   bool extended = false;                       // 29-bit identifiers
+  // Extended and mixed addressing: the first byte of each frame. All three or none.
+  std::optional<std::uint8_t> transmit_byte = std::nullopt, receive_byte = std::nullopt, functional_byte = std::nullopt;
 };
 
 struct Options {
@@ -150,9 +152,12 @@ class Transport {
     can::CanFrame frame;
   };
 
-  can::CanFrame blank_frame(std::uint32_t id) const;
+  std::size_t address_bytes() const { return options_.address.transmit_byte ? 1 : 0; }
+  can::CanFrame blank_frame(std::uint32_t id, std::optional<std::uint8_t> address_byte) const;
+  std::span<std::uint8_t> room(can::CanFrame& frame) const;
   void finish_frame(can::CanFrame& frame, std::size_t used) const;
-  can::CanFrame single_frame(std::span<const std::uint8_t> message, std::uint32_t id) const;
+  can::CanFrame single_frame(std::span<const std::uint8_t> message, std::uint32_t id,
+                             std::optional<std::uint8_t> address_byte) const;
   void owe_flow_control(FlowStatus status, Time now);
   void grant_or_wait(Time now, Events& events);
   void end_reception();
@@ -160,7 +165,7 @@ class Transport {
   can::CanFrame opening_frame() const;
   can::CanFrame consecutive_frame(std::size_t at, std::size_t part, std::uint8_t sequence) const;
   std::size_t consecutive_payload() const;
-  bool is_ours(std::uint32_t id, const can::CanFrame& frame) const;
+  bool is_ours(std::uint32_t id, std::optional<std::uint8_t> address_byte, const can::CanFrame& frame) const;
   void on_single(const SingleFrame& single, Events& events);
   void on_first(const FirstFrame& first, Time now, Events& events);
   void on_consecutive(const ConsecutiveFrame& consecutive, Time now, Events& events);

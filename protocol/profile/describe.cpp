@@ -100,6 +100,18 @@ void write_record(Writer& out, const Layout& layout, const RecordRole& role) {
   out.picture(byte_picture(layout));
 }
 
+std::string address_words(const Bus& bus) {
+  if (!bus.request_byte) {
+    return "There is no address byte in the data.";
+  }
+  return fmt::format(
+      "The first byte of each frame is an address: 0x{:02X} in requests, 0x{:02X} in responses, 0x{:02X} in what is "
+      "told to "
+      "all. All else stands one byte later, and a frame has room for one byte less. Frames with another address are "
+      "not meant.",
+      *bus.request_byte, *bus.response_byte, *bus.functional_byte);
+}
+
 class Document {
  public:
   Document(const Profile& profile, Markup markup)
@@ -129,9 +141,8 @@ class Document {
   void write_bus() {
     const Bus& b = p_.bus;
     out_.heading("Bus");
-    out_.say(
-        fmt::format("CAN{}, identifiers of {} bits, ISO 15765-2 with normal addressing (no address byte in the data).",
-                    b.fd ? " FD with bit rate switch" : ", classic", b.extended_ids ? 29 : 11));
+    out_.say(fmt::format("CAN{}, identifiers of {} bits, ISO 15765-2. {}",
+                         b.fd ? " FD with bit rate switch" : ", classic", b.extended_ids ? 29 : 11, address_words(b)));
     std::vector<Row> rows{
         {id_text(b.request, b.extended_ids), "tester to INS", "requests"},
         {id_text(b.response, b.extended_ids), "INS to tester", "responses"},

@@ -19,6 +19,8 @@ struct Bus {
   bool extended_ids = false;  // 29-bit identifiers
   bool fd = false;
   std::uint32_t request = 0, response = 0, functional = 0;
+  // Extended and mixed addressing: the first byte of each frame. All three or none.
+  std::optional<std::uint8_t> request_byte, response_byte, functional_byte;
   std::optional<std::uint32_t> status;  // of the state frame; the gimbal frame has the next one
   std::uint8_t padding = 0xCC;
   std::uint8_t block_size = 0, st_min = 0;  // told to the INS when it sends

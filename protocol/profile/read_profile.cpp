@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/read_bus.hpp"
 #include "protocol/profile/read_frames.hpp"
 #include "protocol/profile/read_layout.hpp"
 #include "protocol/profile/read_security.hpp"
@@ -18,13 +19,7 @@ constexpr std::uint64_t most_did = 0xFFFF;
 constexpr std::uint32_t longest_message = 4094;  // ISO-TP's 12 bits of length, less the service
 constexpr std::uint64_t most_samples = 145;      // of a page, as the service keeps it
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
-constexpr std::array<std::string_view, 4> addressings{"normal", "normal-29", "normal-fixed", "none"};
-constexpr std::string_view no_uds = "none";
 constexpr std::array<std::string_view, 2> address_units{"page", "byte"};
-
-// ISO 15765-2: the identifiers that normal fixed addressing makes of two addresses, with priority 6.
-constexpr std::uint32_t fixed_physical = 0x18DA0000, fixed_functional = 0x18DB0000;
-constexpr std::uint32_t all_nodes = 0x33;
 
 // One number must not mean two things.
 class Numbers {
@@ -54,7 +49,8 @@ class ProfileReader {
   Expected<ProfilePtr> read() {
     profile_.name = root_.text("name", true).value_or("");
     order_ = root_.word("byte_order", orders).value_or("big") == "little" ? ByteOrder::little : ByteOrder::big;
-    read_bus() == no_uds ? read_plain_frames() : read_uds();
+    Section bus = root_.table("bus", true);
+    read_bus(bus, profile_.bus) == no_uds ? read_plain_frames() : read_uds();
     read_axes();
     root_.only_these();
     if (!faults_.none()) {
@@ -110,56 +106,6 @@ class ProfileReader {
     }
     dids_.take(section, key, *number);
     return static_cast<std::uint16_t>(*number);
-  }
-
-  std::uint32_t can_id(Section& bus, Numbers& ids, std::string_view key, bool needed) {
-    const auto id = bus.whole(key, 0, profile_.bus.extended_ids ? 0x1FFFFFFF : 0x7FF, needed);
-    if (id) {
-      ids.take(bus, key, *id);
-    }
-    return static_cast<std::uint32_t>(id.value_or(0));
-  }
-
-  // The addressing.
-  std::string read_bus() {
-    Section bus = root_.table("bus", true);
-    if (!bus.there()) {
-      return {};
-    }
-    Bus& b = profile_.bus;
-    const std::string addressing = bus.word("addressing", addressings, true).value_or("normal");
-    b.extended_ids = addressing == no_uds ? bus.flag("extended_ids").value_or(false) : addressing != "normal";
-    b.fd = bus.flag("fd").value_or(false);
-    if (addressing == no_uds) {
-      bus.only_these();
-      return addressing;
-    }
-    Numbers ids("identifier");
-    if (addressing == "normal-fixed") {
-      const auto ins = static_cast<std::uint32_t>(bus.whole("ins_address", 0, 255, true).value_or(0));
-      const auto tester = static_cast<std::uint32_t>(bus.whole("tester_address", 0, 255, true).value_or(0xF1));
-      if (ins == tester) {
-        bus.fault("tester_address", fmt::format("0x{:02X} is that of the INS already", tester));
-      }
-      b.request = fixed_physical | ins << 8U | tester;
-      b.response = fixed_physical | tester << 8U | ins;
-      b.functional = fixed_functional | all_nodes << 8U | tester;
-    } else {
-      b.request = can_id(bus, ids, "request", true);
-      b.response = can_id(bus, ids, "response", true);
-      b.functional = can_id(bus, ids, "functional", true);
-    }
-    if (bus.has("status")) {
-      b.status = can_id(bus, ids, "status", true);
-    }
-    b.padding = static_cast<std::uint8_t>(bus.whole("padding", 0, 255).value_or(0xCC));
-    b.block_size = static_cast<std::uint8_t>(bus.whole("block_size", 0, 255).value_or(0));
-    b.st_min = static_cast<std::uint8_t>(bus.whole("st_min", 0, 0xF9).value_or(0));
-    if (b.st_min > 0x7F && b.st_min < 0xF1) {
-      bus.fault("st_min", fmt::format("0x{:02X} is reserved: 0 to 0x7F ms, 0xF1 to 0xF9 times 100 us", b.st_min));
-    }
-    bus.only_these();
-    return addressing;
   }
 
   void read_timing() {

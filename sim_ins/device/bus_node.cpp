@@ -37,7 +37,9 @@ Time stretched(Time time, double factor) { return std::chrono::duration_cast<Tim
 
 isotp::Options transport_options(const NodeOptions& o) {
   isotp::Options options;
-  options.address = {o.response_id, o.request_id, o.functional_id, o.extended_ids};
+  const profile::Bus& bus = o.diagnostics.profile->bus;
+  options.address = {o.response_id,     o.request_id,     o.functional_id,    o.extended_ids,
+                     bus.response_byte, bus.request_byte, bus.functional_byte};
   options.fd = o.fd;
   options.frame_bytes = o.fd ? can::max_fd_bytes : can::max_classic_bytes;
   options.max_message = 65535;

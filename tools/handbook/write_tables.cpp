@@ -264,7 +264,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | table | keys |
 |---|---|
 | | `name`; `byte_order` big or little, of every number that says nothing else |
-| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), none (no UDS, with `extended_ids`: see `frames`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
+| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), extended, extended-29 (with the three identifiers, of which requests to one and to all may be the same, and `ins_address`, `tester_address`, `functional_address`), mixed (with the three identifiers and `address_extension`), mixed-29 (with `ins_address`, `tester_address`, `address_extension`), none (no UDS, with `extended_ids`: see `frames`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
 | `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |

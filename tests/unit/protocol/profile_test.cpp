@@ -303,6 +303,47 @@ TEST(MemoryProfile, HasAnIdentifierForEachFieldAndOneFactor) {
   EXPECT_NEAR(held->value[minus], -100e-6, 1e-15);
 }
 
+// ISO 15765-2, 10.3: extended addressing has the address of who is meant in the first byte, mixed addressing the extension.
+TEST(Profile, FramesMayBeginWithAnAddress) {
+  const std::string normal =
+      "addressing = \"normal\"      # identifiers of 11 bits\nrequest = 0x640\nresponse = 0x648\nfunctional = 0x7DF\n";
+  const std::string extended = with(own_text(), normal,
+                                    "addressing = \"extended\"\nrequest = 0x6F1\nresponse = 0x612\nfunctional = 0x6F1\n"
+                                    "ins_address = 0x12\ntester_address = 0xF1\nfunctional_address = 0xDF\n");
+  const auto one = parse_profile(extended, "p.toml");
+  ASSERT_TRUE(one) << one.error().message;
+  const Bus& a = (*one)->bus;
+  EXPECT_FALSE(a.extended_ids);
+  EXPECT_EQ(std::tuple(a.request, a.request_byte, a.response, a.response_byte, a.functional, a.functional_byte),
+            std::tuple(0x6F1, 0x12, 0x612, 0xF1, 0x6F1, 0xDF));
+  EXPECT_THAT(
+      describe(**one, Markup::markdown),
+      testing::HasSubstr("The first byte of each frame is an address: 0x12 in requests, 0xF1 in responses, 0xDF in"));
+
+  const std::string mixed = with(own_text(), normal,
+                                 "addressing = \"mixed-29\"\nins_address = 0x2A\ntester_address = 0xF1\n"
+                                 "address_extension = 0x5C\n");
+  const auto other = parse_profile(mixed, "p.toml");
+  ASSERT_TRUE(other) << other.error().message;
+  const Bus& b = (*other)->bus;
+  EXPECT_TRUE(b.extended_ids);
+  EXPECT_EQ(std::tuple(b.request, b.response, b.functional), std::tuple(0x18CE2AF1, 0x18CEF12A, 0x18CD33F1));
+  EXPECT_EQ(b.request_byte, 0x5C);
+
+  EXPECT_THAT(complaint(with(extended, "functional_address = 0xDF", "functional_address = 0x12")),
+              testing::HasSubstr("bus.functional_address: 0x12 is that of the INS already"));
+  EXPECT_THAT(complaint(with(extended, "response = 0x612", "response = 0x6F1")),
+              testing::HasSubstr("bus.response: identifier 0x06F1 is that of bus.request already"));
+  EXPECT_THAT(complaint(with(extended, "tester_address = 0xF1\n", "")),
+              testing::HasSubstr("bus.tester_address: missing"));
+  EXPECT_THAT(complaint(with(extended, "tester_address = 0xF1", "tester_address = 256")),
+              testing::HasSubstr("bus.tester_address: is 256"));
+  EXPECT_THAT(complaint(with(mixed, "address_extension = 0x5C", "address_extension = 0x15C")),
+              testing::HasSubstr("bus.address_extension: is 348"));
+  EXPECT_THAT(complaint(with(mixed, "ins_address", "request = 0x640\nins_address")),
+              testing::HasSubstr("bus.request: no such key"));
+}
+
 // By a program of the user's own; its path begins in the folder of the profile.
 TEST(Profile, ALockMayBeOpenedByAProgram) {
   const std::string lock = "method = \"program\"\nprogram = \"keys/open\"\nseed_bytes = 6\nkey_bytes = 4\n";

@@ -11,8 +11,8 @@ namespace selfcal::cli::device {
 // As an error is told: one line. Our own INS's where no file is named.
 [[nodiscard]] Expected<profile::ProfilePtr> chosen_profile(const std::string& file);
 
-// What is told of an INS that cannot be asked by UDS.
-std::string without_uds(const profile::Profile& profile);
+// Why `check` and `probe` cannot ask such an INS; empty: they can.
+std::string cannot_try(const profile::Profile& profile);
 
 struct CheckArguments {
   std::string interface, profile, key_file;

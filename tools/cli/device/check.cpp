@@ -67,8 +67,8 @@ Expected<int> check(const CheckArguments& arguments) {
   if (!profile) {
     return tl::unexpected(profile.error());
   }
-  if ((*profile)->frames) {
-    return fail(ErrorKind::bad_input, without_uds(**profile));
+  if (const std::string why = cannot_try(**profile); !why.empty()) {
+    return fail(ErrorKind::bad_input, why);
   }
   Permission permission;
   permission.write = arguments.write;

@@ -22,7 +22,13 @@ Expected<profile::ProfilePtr> chosen_profile(const std::string& file) {
                   (more > 0 ? fmt::format(" (and {} more: selfcal device lint)", more) : std::string()));
 }
 
-std::string without_uds(const profile::Profile& profile) {
+std::string cannot_try(const profile::Profile& profile) {
+  if (profile.bus.request_byte) {
+    return fmt::format("{}: bus.addressing: only frames without an address byte are tried as yet", profile.file);
+  }
+  if (!profile.frames) {
+    return {};
+  }
   return fmt::format("{}: bus.addressing: none: an INS that speaks no UDS has none of the services that are tried",
                      profile.file);
 }

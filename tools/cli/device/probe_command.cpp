@@ -106,8 +106,8 @@ Expected<int> probe(const ProbeArguments& arguments) {
   if (!profile) {
     return tl::unexpected(profile.error());
   }
-  if ((*profile)->frames) {
-    return fail(ErrorKind::bad_input, without_uds(**profile));
+  if (const std::string why = cannot_try(**profile); !why.empty()) {
+    return fail(ErrorKind::bad_input, why);
   }
   if (arguments.last_did > 0xFFFF) {
     return fail(ErrorKind::usage,
