@@ -1,6 +1,8 @@
 // Answers one recording of the discovery trial. Links no simulation.
 //
-//   selfcal_discovery_answer RECORDING [--discover]   one JSON line; with --discover also where the catalogue leaves nothing
+//   selfcal_discovery_answer RECORDING [--discover | --catalogue | --stepwise | --process]
+//
+// One JSON line; with --discover also where the catalogue leaves nothing; the others are rivals (rivals.hpp).
 #include <fmt/format.h>
 
 #include <chrono>
@@ -16,7 +18,9 @@
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/scene.hpp"
 #include "protocol/recording/recording_file.hpp"
+#include "tests/discovery/rivals.hpp"
 
 namespace {
 
@@ -58,7 +62,22 @@ ordered_json to_json(const discovery::Discovery& d) {
   return j;
 }
 
-int answer(const std::string& path, bool always) {
+// The same recording answered by a rival, in the same form.
+ordered_json rival_json(const std::string& rival, const ImuData& data, const CalibrationResult& calibration) {
+  const discovery::Scene scene({data, calibration});
+  const discovery::PieceSums sums = discovery::sum_over_pieces(scene.motion, scene.input);
+  const auto laws = rival == "--stepwise" ? discovery_trial::stepwise(sums, scene.motion.available())
+                                          : discovery_trial::gaussian_process(sums, scene.motion.available());
+  ordered_json j = {
+      {"laws", ordered_json::array()}, {"described", ordered_json::array()}, {"processes", ordered_json::array()}};
+  for (const discovery_trial::RivalLaw& law : laws) {
+    j["laws"].push_back({{"axis", law.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
+  }
+  return j;
+}
+
+int answer(const std::string& path, const std::string& way) {
+  const bool always = !way.empty() && way != "--catalogue";
   const auto loaded = read_recording(path, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
   if (!loaded) {
     fmt::print(stderr, "selfcal_discovery_answer: {}\n", loaded.error().message);
@@ -78,7 +97,7 @@ int answer(const std::string& path, bool always) {
       for (const auto& finding : outcome.diagnosis->findings) {
         j["names"].push_back(finding.effect);
       }
-      wanted = outcome.diagnosis->unexplained;
+      wanted = outcome.diagnosis->unexplained && way.empty();
     }
   }
   j["diagnosis_s"] = elapsed();
@@ -86,7 +105,8 @@ int answer(const std::string& path, bool always) {
     const CalibrationOutcome calibration = diagnosis::calibrate_still(data, {});
     if (calibration.result) {
       const std::vector<discovery::UnitRecording> recordings{{data, *calibration.result}};
-      j["discovery"] = to_json(discovery::discover(recordings, {}));
+      j["discovery"] = way == "--stepwise" || way == "--process" ? rival_json(way, data, *calibration.result)
+                                                                 : to_json(discovery::discover(recordings, {}));
     }
   }
   j["seconds"] = elapsed();
@@ -99,12 +119,15 @@ int answer(const std::string& path, bool always) {
 int main(int count, char** values) {
   try {
     const std::span<char*> arguments(values, static_cast<std::size_t>(count));
-    const bool always = arguments.size() == 3 && std::string(arguments[2]) == "--discover";
-    if (arguments.size() != 2 && !always) {
-      fmt::print(stderr, "usage: selfcal_discovery_answer RECORDING [--discover]\n");
+    const std::string way = arguments.size() == 3 ? arguments[2] : "";
+    const bool known =
+        way.empty() || way == "--catalogue" || way == "--discover" || way == "--stepwise" || way == "--process";
+    if (arguments.size() < 2 || arguments.size() > 3 || !known) {
+      fmt::print(stderr,
+                 "usage: selfcal_discovery_answer RECORDING [--discover | --catalogue | --stepwise | --process]\n");
       return 2;
     }
-    return answer(arguments[1], always);
+    return answer(arguments[1], way);
   } catch (const std::exception& problem) {
     fmt::print(stderr, "selfcal_discovery_answer: {}\n", problem.what());
     return 5;
