@@ -9,7 +9,7 @@ import markdown
 
 # Order of the navigation; every page of the folder stands here.
 PAGES = ["index", "first-calibration", "your-recordings", "reading-a-verdict", "when-they-differ", "planning", "service", "your-ins", "depot", "trouble",
-         "recording-format", "frames-and-signs", "parameters", "ins-interface", "profile", "effects", "laws", "files", "documents", "exit-status",
+         "recording-format", "frames-and-signs", "parameters", "ins-interface", "profile", "effects", "equations", "files", "documents", "exit-status",
          "glossary"]
 REFERENCE_FROM = "recording-format"
 STYLE = """
