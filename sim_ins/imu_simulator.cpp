@@ -19,6 +19,7 @@ constexpr std::uint64_t gyro_noise_stream = 11;
 constexpr std::uint64_t accel_noise_stream = 12;
 constexpr std::uint64_t instability_stream = 13;
 constexpr std::uint64_t readout_stream = 14;
+constexpr std::uint64_t integral_stream = 15;
 
 Vector3 normal3(Random& random) {
   const double x = random.normal();
@@ -121,7 +122,8 @@ ImuSimulator::ImuSimulator(const SimConfig& config, TrueMotion motion, const Sen
       gyro_noise_(seed, gyro_noise_stream),
       accel_noise_(seed, accel_noise_stream),
       instability_(seed, instability_stream),
-      readout_(seed, readout_stream) {
+      readout_(seed, readout_stream),
+      integral_(seed, integral_stream) {
   gyro_arw_.setConstant(config.gyro_arw_deg_per_sqrt_h * units::degree_per_sqrt_hour);
   accel_vrw_.setConstant(config.accel_vrw_ug_per_sqrt_hz * units::micro_g_per_sqrt_hz);
   gyro_quantiser_.lsb = config.gyro_lsb_arcsec * units::arcsecond;
@@ -148,8 +150,11 @@ void ImuSimulator::take(const PhysicsEffect& effect) {
   } else if (effect.id == "accel_random_walk") {
     more(accel_walk_asd_);
   } else if (effect.id == "quantisation") {
-    gyro_hidden_.lsb = v[0];
-    accel_hidden_.lsb = v[1];
+    gyro_hidden_.lsb = std::max(gyro_hidden_.lsb, v[0]);  // one entry may be the gyros', another the accelerometers'
+    accel_hidden_.lsb = std::max(accel_hidden_.lsb, v[1]);
+  } else if (effect.id == "integral_noise") {
+    angle_sigma_ = (angle_sigma_.cwiseAbs2() + axes(0).cwiseAbs2()).cwiseSqrt();
+    velocity_sigma_ = (velocity_sigma_.cwiseAbs2() + axes(3).cwiseAbs2()).cwiseSqrt();
   } else if (effect.id == "vibration_line") {
     lines_.push_back({axes(0), axes(3), 2.0 * std::numbers::pi * v[6], v[7]});
   } else if (effect.id == "lost_samples") {
@@ -274,6 +279,14 @@ void ImuSimulator::add_noise(IdealIncrement& increment, double begin, double end
   if (!gyro_walk_asd_.isZero(0.0) || !accel_walk_asd_.isZero(0.0)) {
     gyro_wander_ += root_h * gyro_walk_asd_.cwiseProduct(normal3(instability_));
     accel_wander_ += root_h * accel_walk_asd_.cwiseProduct(normal3(instability_));
+  }
+  if (!angle_sigma_.isZero(0.0) || !velocity_sigma_.isZero(0.0)) {
+    const Vector3 angle = angle_sigma_.cwiseProduct(normal3(integral_));
+    const Vector3 velocity = velocity_sigma_.cwiseProduct(normal3(integral_));
+    increment.delta_theta += angle - angle_before_;
+    increment.delta_v += velocity - velocity_before_;
+    angle_before_ = angle;
+    velocity_before_ = velocity;
   }
   add_law_noise(increment, h);
   if (config_.gyro_bias_instability_deg_per_h > 0.0 || config_.accel_bias_instability_ug > 0.0) {

@@ -90,7 +90,7 @@ class ImuSimulator {
   SimConfig config_;
   TrueMotion motion_;
   SensorErrors errors_;
-  Random gyro_noise_, accel_noise_, instability_, readout_;
+  Random gyro_noise_, accel_noise_, instability_, readout_, integral_;
   std::vector<ActiveEffect> effects_;
   std::vector<ActiveLaw> laws_;
   std::vector<std::array<double, 2>> senses_;  // of the axes after k turns have begun
@@ -107,6 +107,9 @@ class ImuSimulator {
   Vector3 accel_walk_asd_ = Vector3::Zero();
   Vector3 gyro_wander_ = Vector3::Zero(), gyro_markov_ = Vector3::Zero();    // rad/s
   Vector3 accel_wander_ = Vector3::Zero(), accel_markov_ = Vector3::Zero();  // m/s^2
+  // White noise of the integrals: what dither leaves.
+  Vector3 angle_sigma_ = Vector3::Zero(), velocity_sigma_ = Vector3::Zero();    // rad, m/s
+  Vector3 angle_before_ = Vector3::Zero(), velocity_before_ = Vector3::Zero();  // at the end of the sample before
   Quantiser gyro_hidden_{0.0}, accel_hidden_{0.0};  // concealed coarser quantisation; lsb 0: none
   Quantiser gyro_quantiser_, accel_quantiser_;
   std::uint64_t index_ = 0;

@@ -88,6 +88,9 @@ constexpr auto accel_noise = axes("ug/sqrt(Hz)", units::micro_g_per_sqrt_hz);
 constexpr auto gyro_walk = axes("deg/h/sqrt(h)", dph / 60.0);  // 60 = sqrt(3600 s)
 constexpr auto accel_walk = axes("ug/sqrt(h)", ug / 60.0);
 constexpr std::array quantum{P{"gyro_lsb", "arcsec", arcsec}, P{"accel_lsb", "m/s", 1.0}};
+constexpr std::array integral_noise{P{"gyro_x", "arcsec", arcsec}, P{"gyro_y", "arcsec", arcsec},
+                                    P{"gyro_z", "arcsec", arcsec}, P{"accel_x", "m/s", 1.0},
+                                    P{"accel_y", "m/s", 1.0},      P{"accel_z", "m/s", 1.0}};
 constexpr std::array vibration{P{"gyro_x", "deg/h", dph},
                                P{"gyro_y", "deg/h", dph},
                                P{"gyro_z", "deg/h", dph},
@@ -114,7 +117,7 @@ constexpr auto hysteresis = axes("ug", ug);
 constexpr std::array gimbal_field{P{"outer_x", "deg/h", dph}, P{"outer_y", "deg/h", dph}, P{"outer_z", "deg/h", dph},
                                   P{"inner_x", "deg/h", dph}, P{"inner_y", "deg/h", dph}, P{"inner_z", "deg/h", dph}};
 
-constexpr std::array<EffectDescription, 34> effects{{
+constexpr std::array<EffectDescription, 35> effects{{
     {"gyro_g_sensitivity", true, gyro_g},
     {"gyro_magnetic_sensitivity", true, gyro_magnetic},
     {"gyro_scale_asymmetry", true, gyro_asymmetry},
@@ -144,6 +147,7 @@ constexpr std::array<EffectDescription, 34> effects{{
     {"vibration_line", true, vibration},
     {"lost_samples", true, lost},
     {"time_base", true, clock_scale},
+    {"integral_noise", false, integral_noise},
     {"bearing_stick_slip", false, stick_slip},
     {"gyro_g_rate_sensitivity", false, g_rate},
     {"lagged_thermal_gradient", false, lagged},

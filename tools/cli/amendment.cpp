@@ -76,6 +76,26 @@ std::string noise_text(const Finding& f, const diagnosis::AssumedNoise& assumed)
   return effect_head(f.effect) + key_value("x", more) + key_value("y", more) + key_value("z", more);
 }
 
+// A quantum is one for a triad and makes the same noise on its axes. Where they differ, or one has it alone, it is white noise of the
+// integral, as dither leaves it; a coarse quantum at a slow steady rate would be lines instead. The increments' own quantum stays.
+bool is_integral_noise(const Finding& f) {
+  constexpr double alike = 1.1;
+  const auto by_value = [](const FindingParameter& a, const FindingParameter& b) { return a.value < b.value; };
+  const auto [least, most] = std::minmax_element(f.parameters.begin(), f.parameters.end(), by_value);
+  return f.parameters.size() < 3 || most->value > alike * least->value;
+}
+
+std::string integral_noise_text(const Finding& f, const CalibrationResult& calibration) {
+  const bool gyro = f.parameters.front().name.starts_with("gyro");
+  const double own = gyro ? calibration.gyro_quantum / units::arcsecond : calibration.accel_quantum;
+  std::string text = own > 0.0 ? effect_head("quantisation") + key_value(gyro ? "gyro_lsb" : "accel_lsb", own) : "";
+  text += effect_head("integral_noise");
+  for (const FindingParameter& p : f.parameters) {
+    text += key_value(p.name, std::sqrt(std::max(0.0, p.value * p.value - own * own) / 12.0));
+  }
+  return text;
+}
+
 std::string quantum_text(const Finding& f) {
   double gyro = 0.0, accel = 0.0;
   for (const FindingParameter& p : f.parameters) {
@@ -103,11 +123,11 @@ std::string equation_text(const Finding& f, double mean_temperature_c, double la
   return text;
 }
 
-// What was assumed stands unless the diagnosis found another density; more of it is in the physics file.
-double density(const Diagnosis& d, std::string_view effect, double found, double assumed) {
-  const bool named =
-      std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& f) { return f.effect == effect; });
-  return named ? std::min(found, assumed) : assumed;
+// In the finding's unit. What was assumed stands unless the diagnosis found less; more of it is in the physics file.
+double density(const Diagnosis& d, std::string_view effect, double assumed) {
+  const auto found =
+      std::find_if(d.findings.begin(), d.findings.end(), [&](const Finding& f) { return f.effect == effect; });
+  return found != d.findings.end() ? std::min(found->parameters.front().value, assumed) : assumed;
 }
 
 }  // namespace
@@ -122,7 +142,7 @@ std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assu
     } else if (moves) {
       text += settling_text(f, heading);
     } else if (f.effect == "quantisation") {
-      text += quantum_text(f);
+      text += is_integral_noise(f) ? integral_noise_text(f, d.calibration) : quantum_text(f);
     } else if (f.effect == "gyro_noise_level" || f.effect == "accel_noise_level") {
       text += noise_text(f, assumed);
     } else {
@@ -145,15 +165,13 @@ std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& a
   text += "\n[attitude]\n" + key_value("roll_deg", attitude.roll / units::degree) +
           key_value("pitch_deg", attitude.pitch / units::degree) +
           key_value("heading_deg", attitude.heading / units::degree);
-  text +=
-      "\n[noise]\n" +
-      key_value("gyro_arw_deg_per_sqrt_h", density(d, "gyro_noise_level", d.calibration.gyro_arw, assumed.gyro_arw) /
-                                               units::degree_per_sqrt_hour) +
-      key_value(
-          "accel_vrw_ug_per_sqrt_hz",
-          density(d, "accel_noise_level", d.calibration.accel_vrw, assumed.accel_vrw) / units::micro_g_per_sqrt_hz) +
-      key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
-      key_value("accel_lsb_m_per_s", assumed.accel_quantum);
+  text += "\n[noise]\n" +
+          key_value("gyro_arw_deg_per_sqrt_h",
+                    density(d, "gyro_noise_level", assumed.gyro_arw / units::degree_per_sqrt_hour)) +
+          key_value("accel_vrw_ug_per_sqrt_hz",
+                    density(d, "accel_noise_level", assumed.accel_vrw / units::micro_g_per_sqrt_hz)) +
+          key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
+          key_value("accel_lsb_m_per_s", assumed.accel_quantum);
   text += "\n[gimbal]\npositioning_error_deg = 0\n";
   text += "\n[parameters]\n";
   for (int k = 0; k < sensor_parameter_count; ++k) {
