@@ -10,6 +10,7 @@
 #include "estimator/diagnosis/data/axes.hpp"
 #include "estimator/diagnosis/data/disturbance.hpp"
 #include "estimator/models/segments.hpp"
+#include "estimator/models/sensor_noise.hpp"
 #include "estimator/navigation/coarse_alignment.hpp"
 
 namespace selfcal::diagnosis {
@@ -136,6 +137,10 @@ SetAside::SetAside(const ImuData& data) : data_(data) {
     return;
   }
   leave_out(faults, {});
+  const bool gyros = std::any_of(coasts_.begin(), coasts_.end(), [](const Coast& c) { return c.gyros; });
+  if (refused_.empty() && gyros && estimate_sensor_noise(data_, observed(find_segments(data_), data_)).base_moves) {
+    refused_ = "the base moves, and how it turned while the gyros were lost nothing else says";
+  }
   if (refused_.empty()) {
     leave_out({}, find_disturbed(data_, find_segments(data_)));
   }

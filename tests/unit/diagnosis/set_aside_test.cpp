@@ -206,6 +206,18 @@ TEST(SetAsideWhole, NotMoreThanATenth) {
   EXPECT_TRUE(aside.left_out().empty());
 }
 
+// A base that sways by degrees is nowhere while the gyros are lost; without accelerometers alone it is.
+TEST(SetAsideWhole, NotTheGyrosOnAMooredBase) {
+  sim::SimConfig moored = config();
+  moored.base_motion = test::rough_mooring();
+  const Recording recording = *sim::simulate(moored, schedule(), seed, {});
+  EXPECT_EQ(SetAside(test::view_of(recording)).refused(), "");
+  EXPECT_TRUE(SetAside(test::view_of(recording)).left_out().empty());
+  Recording stuck = recording;
+  stick(stuck);
+  EXPECT_NE(SetAside(test::view_of(stuck)).refused().find("the base moves"), std::string::npos);
+}
+
 // A triad in other axes is wrong all along, whatever else is.
 TEST(SetAsideWhole, NotAFaultOfAllOfIt) {
   Recording recording = clean();
