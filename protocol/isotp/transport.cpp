@@ -47,7 +47,8 @@ bool concerns_sending(Result result) {
          result == Result::invalid_flow_status || result == Result::too_many_waits || result == Result::overflow;
 }
 
-Transport::Transport(const Options& options) : options_(options) {
+Transport::Transport(const Options& options)
+    : options_(options), address_bytes_(options.address.transmit_byte ? 1 : 0) {
   assert(options.frame_bytes >= 8 && options.frame_bytes <= (options.fd ? can::max_fd_bytes : 8));
   assert(can::frame_size_for(options.frame_bytes) == options.frame_bytes);
   assert(options.max_message > 0);
@@ -56,9 +57,11 @@ Transport::Transport(const Options& options) : options_(options) {
   functional_message_.resize(can::max_fd_bytes);
 }
 
-can::CanFrame Transport::blank_frame(std::uint32_t id, std::optional<std::uint8_t> address_byte) const {
+can::CanFrame Transport::blank_frame(std::uint32_t id, const std::optional<std::uint8_t>& address_byte) const {
   can::CanFrame frame;
-  frame.data[0] = address_byte.value_or(0);
+  if (address_bytes_ != 0) {
+    frame.data[0] = *address_byte;
+  }
   frame.id = id;
   frame.extended = options_.address.extended;
   frame.fd = options_.fd;
@@ -80,7 +83,7 @@ void Transport::finish_frame(can::CanFrame& frame, std::size_t used) const {
 }
 
 can::CanFrame Transport::single_frame(std::span<const std::uint8_t> message, std::uint32_t id,
-                                      std::optional<std::uint8_t> address_byte) const {
+                                      const std::optional<std::uint8_t>& address_byte) const {
   can::CanFrame frame = blank_frame(id, address_byte);
   finish_frame(frame, encode_single(message, room(frame), address_bytes()));
   return frame;
@@ -109,9 +112,10 @@ bool Transport::send_functional(std::span<const std::uint8_t> message, Time now)
   return true;
 }
 
-bool Transport::is_ours(std::uint32_t id, std::optional<std::uint8_t> address_byte, const can::CanFrame& frame) const {
-  return frame.id == id && (!address_byte || (frame.size > 0 && frame.data[0] == *address_byte)) &&
-         frame.extended == options_.address.extended && !frame.remote && (options_.fd || !frame.fd);
+bool Transport::is_ours(std::uint32_t id, const std::optional<std::uint8_t>& address_byte,
+                        const can::CanFrame& frame) const {
+  return frame.id == id && frame.extended == options_.address.extended && !frame.remote && (options_.fd || !frame.fd) &&
+         (address_bytes_ == 0 || (frame.size > 0 && frame.data[0] == *address_byte));
 }
 
 bool Transport::accepts(const can::CanFrame& frame) const {

@@ -152,12 +152,12 @@ class Transport {
     can::CanFrame frame;
   };
 
-  std::size_t address_bytes() const { return options_.address.transmit_byte ? 1 : 0; }
-  can::CanFrame blank_frame(std::uint32_t id, std::optional<std::uint8_t> address_byte) const;
+  std::size_t address_bytes() const { return address_bytes_; }
+  can::CanFrame blank_frame(std::uint32_t id, const std::optional<std::uint8_t>& address_byte) const;
   std::span<std::uint8_t> room(can::CanFrame& frame) const;
   void finish_frame(can::CanFrame& frame, std::size_t used) const;
   can::CanFrame single_frame(std::span<const std::uint8_t> message, std::uint32_t id,
-                             std::optional<std::uint8_t> address_byte) const;
+                             const std::optional<std::uint8_t>& address_byte) const;
   void owe_flow_control(FlowStatus status, Time now);
   void grant_or_wait(Time now, Events& events);
   void end_reception();
@@ -165,7 +165,7 @@ class Transport {
   can::CanFrame opening_frame() const;
   can::CanFrame consecutive_frame(std::size_t at, std::size_t part, std::uint8_t sequence) const;
   std::size_t consecutive_payload() const;
-  bool is_ours(std::uint32_t id, std::optional<std::uint8_t> address_byte, const can::CanFrame& frame) const;
+  bool is_ours(std::uint32_t id, const std::optional<std::uint8_t>& address_byte, const can::CanFrame& frame) const;
   void on_single(const SingleFrame& single, Events& events);
   void on_first(const FirstFrame& first, Time now, Events& events);
   void on_consecutive(const ConsecutiveFrame& consecutive, Time now, Events& events);
@@ -175,6 +175,7 @@ class Transport {
   void give_up_sending(Result why, Events& events);
 
   Options options_;
+  std::size_t address_bytes_ = 0;  // before all else in each frame: 0 or 1
   Sender sender_;
   Receiver receiver_;
   std::uint32_t announced_ = 0;  // by the last first frame
