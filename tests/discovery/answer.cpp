@@ -1,14 +1,18 @@
 // Answers one recording of the discovery trial. Links no simulation.
 //
-//   selfcal_discovery_answer RECORDING [--discover | --catalogue | --stepwise | --process]
+//   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process] [--plan FILE]
 //
-// One JSON line; with --discover also where the catalogue leaves nothing; the others are rivals (rivals.hpp).
+// One JSON line; with --discover also where the catalogue leaves nothing; the others are rivals (rivals.hpp). Further
+// recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -18,8 +22,10 @@
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/next_experiment.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "protocol/recording/recording_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
 #include "tests/discovery/rivals.hpp"
 
 namespace {
@@ -76,37 +82,89 @@ ordered_json rival_json(const std::string& rival, const ImuData& data, const Cal
   return j;
 }
 
-int answer(const std::string& path, const std::string& way) {
-  const bool always = !way.empty() && way != "--catalogue";
-  const auto loaded = read_recording(path, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
-  if (!loaded) {
-    fmt::print(stderr, "selfcal_discovery_answer: {}\n", loaded.error().message);
-    return 3;
-  }
+struct Request {
+  std::string way, plan;  // plan: where the schedule of the next experiment goes
+  std::vector<std::string> files;
+};
+
+// A recording with its calibration; both stay where they are.
+struct Loaded {
+  Recording recording;
   std::vector<double> temperature;
-  const ImuData data = imu_view(loaded->recording, temperature);
+  ImuData data;
+  CalibrationResult calibration;
+};
+
+std::unique_ptr<Loaded> load(const std::string& path) {
+  auto read = read_recording(path, {.gaps_are_errors = false, .gimbal_contradiction_is_error = false});
+  if (!read) {
+    fmt::print(stderr, "selfcal_discovery_answer: {}\n", read.error().message);
+    return nullptr;
+  }
+  auto loaded = std::make_unique<Loaded>();
+  loaded->recording = std::move(read->recording);
+  loaded->data = imu_view(loaded->recording, loaded->temperature);
+  return loaded;
+}
+
+void write_plan(const std::string& file, std::span<const discovery::UnitRecording> recordings,
+                const discovery::Discovery& found, double duration_s) {
+  std::optional<discovery::NextExperiment> next;
+  discovery::ExperimentLimits limits;
+  limits.duration_s = duration_s;
+  for (const discovery::DiscoveredLaw& law : found.laws) {
+    auto planned = discovery::plan_experiment(recordings, law, limits);
+    if (planned && (!next || planned->separation_now < next->separation_now)) {
+      next = std::move(planned);
+    }
+  }
+  if (next) {
+    std::ofstream(file) << format_schedule(next->schedule);
+  }
+}
+
+int answer(const Request& request) {
+  constexpr double experiment_s = 3000.0;
+  std::vector<std::unique_ptr<Loaded>> all;
+  for (const std::string& file : request.files) {
+    all.push_back(load(file));
+    if (!all.back()) {
+      return 3;
+    }
+  }
   const auto begin = std::chrono::steady_clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
   ordered_json j;
-  bool wanted = always;
-  if (!always) {
-    const diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, {});
+  bool wanted = request.way != "--catalogue";
+  if (request.way.empty() || !wanted) {
+    const diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(all.front()->data, {});
     if (outcome.diagnosis) {
       j["verdict"] = verdict_name(outcome.diagnosis->verdict);
       j["names"] = ordered_json::array();
       for (const auto& finding : outcome.diagnosis->findings) {
         j["names"].push_back(finding.effect);
       }
-      wanted = outcome.diagnosis->unexplained && way.empty();
+      wanted = outcome.diagnosis->unexplained && request.way.empty();
     }
   }
   j["diagnosis_s"] = elapsed();
-  if (wanted) {
-    const CalibrationOutcome calibration = diagnosis::calibrate_still(data, {});
-    if (calibration.result) {
-      const std::vector<discovery::UnitRecording> recordings{{data, *calibration.result}};
-      j["discovery"] = way == "--stepwise" || way == "--process" ? rival_json(way, data, *calibration.result)
-                                                                 : to_json(discovery::discover(recordings, {}));
+  std::vector<discovery::UnitRecording> recordings;
+  for (const auto& one : all) {
+    CalibrationOutcome outcome = diagnosis::calibrate_still(one->data, {});
+    if (outcome.result) {
+      one->calibration = std::move(*outcome.result);
+      recordings.push_back({one->data, one->calibration});
+    }
+  }
+  if (wanted && recordings.size() == all.size()) {
+    if (request.way == "--stepwise" || request.way == "--process") {
+      j["discovery"] = rival_json(request.way, all.front()->data, all.front()->calibration);
+    } else {
+      const discovery::Discovery found = discovery::discover(recordings, {});
+      j["discovery"] = to_json(found);
+      if (!request.plan.empty()) {
+        write_plan(request.plan, recordings, found, experiment_s);
+      }
     }
   }
   j["seconds"] = elapsed();
@@ -114,20 +172,35 @@ int answer(const std::string& path, const std::string& way) {
   return 0;
 }
 
+bool parse(std::span<char*> arguments, Request& request) {
+  for (std::size_t k = 1; k < arguments.size(); ++k) {
+    const std::string word = arguments[k];
+    if (word == "--plan" && k + 1 < arguments.size()) {
+      request.plan = arguments[++k];
+    } else if (word == "--discover" || word == "--catalogue" || word == "--stepwise" || word == "--process") {
+      request.way = word;
+    } else if (!word.starts_with("-")) {
+      request.files.push_back(word);
+    } else {
+      return false;
+    }
+  }
+  return !request.files.empty();
+}
+
 }  // namespace
 
 int main(int count, char** values) {
   try {
     const std::span<char*> arguments(values, static_cast<std::size_t>(count));
-    const std::string way = arguments.size() == 3 ? arguments[2] : "";
-    const bool known =
-        way.empty() || way == "--catalogue" || way == "--discover" || way == "--stepwise" || way == "--process";
-    if (arguments.size() < 2 || arguments.size() > 3 || !known) {
+    Request request;
+    if (!parse(arguments, request)) {
       fmt::print(stderr,
-                 "usage: selfcal_discovery_answer RECORDING [--discover | --catalogue | --stepwise | --process]\n");
+                 "usage: selfcal_discovery_answer RECORDING [RECORDING...] "
+                 "[--discover | --catalogue | --stepwise | --process] [--plan FILE]\n");
       return 2;
     }
-    return answer(arguments[1], way);
+    return answer(request);
   } catch (const std::exception& problem) {
     fmt::print(stderr, "selfcal_discovery_answer: {}\n", problem.what());
     return 5;

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
 #include "tests/blind/response.hpp"
 
@@ -181,6 +183,32 @@ sim::SimConfig other_installation(const sim::SimConfig& config) {
   other.pitch_deg = 14.0;
   other.heading_deg = std::fmod(config.heading_deg + 77.0, 360.0);
   return other;
+}
+
+Expected<Schedule> random_plan(std::uint64_t seed) {
+  constexpr std::uint64_t stream = 7;
+  constexpr double length_s = 3000.0, step_deg = 45.0;
+  Random random(seed, stream);
+  Schedule plan;
+  plan.rotation_s = 5.0;
+  double outer = 0.0, inner = 0.0, spent_s = 0.0;
+  while (spent_s < length_s) {
+    plan.positions.push_back({outer, inner});
+    plan.dwell_s.push_back(random.uniform(60.0, 150.0));
+    spent_s += plan.dwell_s.back() + plan.rotation_s;
+    const double before_outer = outer, before_inner = inner;
+    while (outer == before_outer && inner == before_inner) {
+      outer = std::clamp(before_outer + step_deg * std::round(random.uniform(-2.49, 2.49)), -360.0, 360.0);
+      inner = std::clamp(before_inner + step_deg * std::round(random.uniform(-2.49, 2.49)), -360.0, 360.0);
+    }
+  }
+  return plan;
+}
+
+void keep_errors(sim::SimConfig& config, const sim::SensorErrors& errors) {
+  for (std::size_t k = 0; k < sensor_parameters.size(); ++k) {
+    config.explicit_parameters[k] = errors[k] / sensor_parameters[k].si_per_unit;
+  }
 }
 
 }  // namespace selfcal::discovery_trial

@@ -1,7 +1,7 @@
 // Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
 //
 //   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE   one JSON line a case, as far as missing
-//   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
+//   selfcal_discovery_generate record KEY NUMBER FILE [PLAN] the recording of a case; on another schedule: a file, or "random"
 //   selfcal_discovery_generate left KEY NUMBER LAWS.toml     share of the misfit's power that these laws leave on a plan
 //                                                            that was never used: |true - told|^2 / |true|^2
 #include <fmt/format.h>
@@ -17,6 +17,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/recording_file.hpp"
+#include "protocol/schedule_file/schedule_file.hpp"
 #include "sim_ins/simulate.hpp"
 #include "tests/blind/response.hpp"
 #include "tests/discovery/drawn.hpp"
@@ -151,16 +152,32 @@ int run(std::span<char*> arguments) {
   if (verb == "key" && arguments.size() == 9) {
     return write_key(arguments.subspan(2));
   }
-  if ((verb == "record" || verb == "left") && arguments.size() == 5 && to_number(arguments[3])) {
-    const auto c = case_in(arguments[2], *to_number(arguments[3]));
+  const bool elsewhere = verb == "record" && arguments.size() == 6;
+  if ((elsewhere || ((verb == "record" || verb == "left") && arguments.size() == 5)) && to_number(arguments[3])) {
+    auto c = case_in(arguments[2], *to_number(arguments[3]));
     if (!c) {
       return complain(c.error());
+    }
+    if (elsewhere) {
+      const std::string plan = arguments[5];
+      const auto schedule = plan == "random" ? discovery_trial::random_plan(c->seed) : read_schedule(plan);
+      if (!schedule) {
+        return complain(schedule.error());
+      }
+      // The same unit on the same base, later: other noise, the same errors.
+      const auto errors = sim::true_sensor_errors(c->config, c->seed);
+      if (!errors) {
+        return complain(errors.error());
+      }
+      discovery_trial::keep_errors(c->config, *errors);
+      c->schedule = *schedule;
+      ++c->seed;
     }
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
   fmt::print(stderr,
              "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE | "
-             "record KEY NUMBER FILE | left KEY NUMBER LAWS.toml\n");
+             "record KEY NUMBER FILE [PLAN] | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 
