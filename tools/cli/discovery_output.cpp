@@ -172,7 +172,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
   text += described_text(found) + left_text(found);
   if (next) {
     text += fmt::format(
-        "  next experiment: {:.0f} min, {} positions: the closest rival {} would be {:.1f} sigma away ({:.1f} now)\n",
+        "  next experiment: {:.0f} min, {} positions: its rival {} would be {:.1f} sigma away ({:.1f} now)\n",
         next->schedule.duration_s() / 60.0, next->schedule.positions.size(), next->closest, next->separation,
         next->separation_now);
   }
