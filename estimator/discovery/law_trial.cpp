@@ -40,10 +40,11 @@ std::optional<LawTrialFailure> not_finite(const NodeTable& table, const std::vec
 
 // Values at which a constant is tried before it is refined: both signs, so close that a wave of ten periods is not missed.
 std::vector<double> logarithmic(double low, double high, double ratio) {
+  const int last = static_cast<int>(std::log(high / low) / std::log(ratio));
   std::vector<double> values;
-  for (double x = low; x <= high; x *= ratio) {
-    values.push_back(x);
-    values.push_back(-x);
+  for (int k = 0; k <= last; ++k) {
+    values.push_back(low * std::pow(ratio, k));
+    values.push_back(-values.back());
   }
   return values;
 }
@@ -129,6 +130,7 @@ Started started(std::vector<LawTerm> laws, const std::vector<std::unique_ptr<Sce
     return result;
   }
   std::vector<PieceSums> each;
+  each.reserve(scenes.size());
   for (const auto& scene : scenes) {
     each.push_back(sum_over_pieces(scene->motion, scene->input));
   }

@@ -74,6 +74,7 @@ std::vector<std::vector<Candidate>> exact_alternatives(std::span<const LawRecord
 
 std::vector<Candidate> best_of(const std::vector<std::vector<Candidate>>& alternatives) {
   std::vector<Candidate> best;
+  best.reserve(alternatives.size());
   for (const std::vector<Candidate>& some : alternatives) {
     best.push_back(*std::max_element(some.begin(), some.end(),
                                      [](const Candidate& a, const Candidate& b) { return a.gain < b.gain; }));

@@ -71,7 +71,7 @@ ordered_json to_json(const discovery::Discovery& d) {
 // The same recording answered by a rival, in the same form.
 ordered_json rival_json(const std::string& rival, const ImuData& data, const CalibrationResult& calibration) {
   const discovery::Scene scene({data, calibration});
-  const discovery::PieceSums sums = discovery::sum_over_pieces(scene.motion, scene.input);
+  const discovery::PieceSums sums = discovery_trial::with_states_held(scene.motion, scene.input);
   const auto laws = rival == "--stepwise" ? discovery_trial::stepwise(sums, scene.motion.available())
                                           : discovery_trial::gaussian_process(sums, scene.motion.available());
   ordered_json j = {

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "estimator/discovery/dictionary.hpp"
-#include "estimator/discovery/law_motion.hpp"
+#include "estimator/discovery/piece_model.hpp"
 
 namespace selfcal::discovery_trial {
 namespace {
@@ -19,93 +19,55 @@ using namespace discovery;
 constexpr int axes = 6;
 constexpr int most_functions = 6;
 
-struct Apparent {
-  Eigen::VectorXd bias, weight;  // [pieces] in unit_of(axis), and one over its variance
-};
-
-Apparent apparent(const PieceSums& sums, int axis) {
-  const auto n = sums.piece_dt.size();
-  Apparent a{Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
-  for (Eigen::Index p = 0; p < n; ++p) {
-    const Eigen::Index k = p * axes + axis;
-    a.weight(p) = std::max(0.0, sums.sums.information(k, k));
-    a.bias(p) = a.weight(p) > 0.0 ? sums.sums.score(k) / a.weight(p) : 0.0;
-  }
-  return a;
-}
-
-struct Fit {
-  double square = 0.0;
-  Eigen::VectorXd value;
-};
-
-Fit weighted(const Eigen::MatrixXd& X, const Apparent& a) {
-  const Eigen::VectorXd root = a.weight.cwiseSqrt();
-  const Eigen::MatrixXd A = root.asDiagonal() * X;
-  const Eigen::VectorXd y = root.cwiseProduct(a.bias);
-  Eigen::MatrixXd G = A.transpose() * A;
-  G.diagonal() *= 1.0 + 1e-9;
-  const Eigen::VectorXd value = G.ldlt().solve(A.transpose() * y);
-  return {(y - A * value).squaredNorm(), value};
-}
-
 }  // namespace
 
+PieceSums with_states_held(const LawMotion& motion, PassInput input) {
+  constexpr double known = 1e-6;  // of what is known before
+  input.prior.position *= known;
+  input.prior.velocity *= known;
+  input.prior.attitude *= known;
+  input.prior.parameter_sigma *= known;
+  return sum_over_pieces(motion, input);
+}
+
 std::vector<RivalLaw> stepwise(const PieceSums& sums, const laws::VariableSet& available) {
-  const Dictionary dictionary = make_dictionary(sums, available);
-  const double price = std::log(static_cast<double>(sums.piece_dt.size() * axes));
-  std::array<Apparent, axes> all;
-  std::array<Eigen::MatrixXd, axes> chosen;  // a constant first: the bias
-  std::array<std::vector<int>, axes> taken;
-  std::array<Fit, axes> fits;
-  for (int axis = 0; axis < axes; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    all[k] = apparent(sums, axis);
-    chosen[k] = Eigen::MatrixXd::Ones(sums.piece_dt.size(), 1);
-    fits[k] = weighted(chosen[k], all[k]);
+  Dictionary dictionary = make_dictionary(sums, available);
+  for (Function& f : dictionary.functions) {
+    f.cost = 0.0;
+    f.partner = -1;
   }
+  const double price = std::log(sums.sums.rows);
+  PieceModel model(sums, dictionary);
+  struct Taken {
+    int axis = 0, function = 0;
+  };
+  std::vector<Taken> taken;
+  std::vector<Eigen::VectorXd> columns;
   for (int step = 0; step < most_functions; ++step) {
-    double best_fall = price;
-    int best_axis = -1, best_function = -1;
-    for (int axis = 0; axis < axes; ++axis) {
-      const auto k = static_cast<std::size_t>(axis);
-      const Eigen::VectorXd root = all[k].weight.cwiseSqrt();
-      const Eigen::MatrixXd A = root.asDiagonal() * chosen[k];
-      const Eigen::MatrixXd Q = A.householderQr().householderQ() * Eigen::MatrixXd::Identity(A.rows(), A.cols());
-      Eigen::VectorXd r = root.cwiseProduct(all[k].bias);
-      r -= Q * (Q.transpose() * r);
-      for (std::size_t f = 0; f < dictionary.functions.size(); ++f) {
-        Eigen::VectorXd x = root.cwiseProduct(dictionary.means.col(static_cast<Eigen::Index>(f)));
-        const double before = x.squaredNorm();
-        x -= Q * (Q.transpose() * x);
-        const double left = x.squaredNorm();
-        const double fall = left > 1e-6 * before ? std::pow(x.dot(r), 2.0) / left : 0.0;
-        if (fall > best_fall) {
-          best_fall = fall;
-          best_axis = axis;
-          best_function = static_cast<int>(f);
-        }
-      }
-    }
-    if (best_axis < 0) {
+    const std::vector<Ranked> best = model.rank(1);
+    if (best.empty() || best.front().gain < price) {
       break;
     }
-    const auto k = static_cast<std::size_t>(best_axis);
-    chosen[k].conservativeResize(Eigen::NoChange, chosen[k].cols() + 1);
-    chosen[k].rightCols<1>() = dictionary.means.col(best_function);
-    taken[k].push_back(best_function);
-    fits[k] = weighted(chosen[k], all[k]);
+    taken.push_back({best.front().axis, best.front().function});
+    columns.push_back(model.column(best.front().axis, dictionary.means.col(best.front().function)));
+    model.choose(columns);
   }
+  const auto n = static_cast<Eigen::Index>(columns.size());
+  Eigen::MatrixXd X(sums.sums.score.size(), n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    X.col(k) = columns[static_cast<std::size_t>(k)];
+  }
+  Eigen::MatrixXd G = X.transpose() * sums.sums.information * X;
+  G.diagonal() *= 1.0 + 1e-9;
+  const Eigen::VectorXd size =
+      n > 0 ? Eigen::VectorXd(G.ldlt().solve(X.transpose() * sums.sums.score)) : Eigen::VectorXd();
   std::vector<RivalLaw> laws;
-  for (int axis = 0; axis < axes; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    for (std::size_t c = 0; c < taken[k].size(); ++c) {
-      const Function& function = dictionary.functions[static_cast<std::size_t>(taken[k][c])];
-      const auto expression = laws::Expression::parse(dictionary.pattern(function));
-      const std::vector<double> constants(expression->free_constants(), function.constant);
-      laws.push_back({axis, expression->text(constants),
-                      fits[k].value(static_cast<Eigen::Index>(c) + 1) / dictionary.scale(taken[k][c])});
-    }
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Taken& t = taken[static_cast<std::size_t>(k)];
+    const Function& function = dictionary.functions[static_cast<std::size_t>(t.function)];
+    const auto expression = laws::Expression::parse(dictionary.pattern(function));
+    const std::vector<double> constants(expression->free_constants(), function.constant);
+    laws.push_back({t.axis, expression->text(constants), size(k) / dictionary.scale(t.function)});
   }
   return laws;
 }
@@ -185,10 +147,9 @@ std::vector<RivalLaw> gaussian_process(const PieceSums& sums, const laws::Variab
   const auto m = static_cast<Eigen::Index>(centres.size());
   std::vector<RivalLaw> laws;
   for (int axis = 0; axis < axes; ++axis) {
-    Apparent a = apparent(sums, axis);
-    a.bias.array() -= a.bias.dot(a.weight) / std::max(1e-300, a.weight.sum());  // the bias is fitted anyway
-    const double noise_only = a.weight.dot(a.bias.cwiseAbs2());
-    double best = noise_only, best_length = 0.0;
+    const Eigen::MatrixXd G = sums.information(axis, axis);
+    const Eigen::VectorXd score = sums.score(axis);
+    double best = 0.0, best_length = 0.0;  // of the criterion, against noise alone
     Eigen::VectorXd best_size;
     for (const double length : {0.5, 1.0, 2.0, 4.0}) {
       Eigen::MatrixXd K(n, m), Kmm(m, m);
@@ -202,16 +163,16 @@ std::vector<RivalLaw> gaussian_process(const PieceSums& sums, const laws::Variab
       }
       Kmm.diagonal().array() += 1e-6;
       for (double variance = 1e-6; variance < 1e8; variance *= 10.0) {  // of the process, in the axis' unit squared
-        const Eigen::MatrixXd A = Kmm / variance + K.transpose() * a.weight.asDiagonal() * K;
+        const Eigen::MatrixXd A = Kmm / variance + K.transpose() * G * K;
         const Eigen::LLT<Eigen::MatrixXd> llt(A), prior(Kmm / variance);
         if (llt.info() != Eigen::Success || prior.info() != Eigen::Success) {
           continue;
         }
-        const Eigen::VectorXd b = K.transpose() * a.weight.cwiseProduct(a.bias);
+        const Eigen::VectorXd b = K.transpose() * score;
         const Eigen::VectorXd size = llt.solve(b);
         const double log_determinants =
             2.0 * (llt.matrixLLT().diagonal().array().log().sum() - prior.matrixLLT().diagonal().array().log().sum());
-        const double criterion = noise_only - b.dot(size) + log_determinants + 2.0 * std::log(static_cast<double>(n));
+        const double criterion = log_determinants - b.dot(size) + 2.0 * std::log(sums.sums.rows);
         if (criterion < best) {
           best = criterion;
           best_length = length;

@@ -1,12 +1,11 @@
-// What else one could do with the same recording, for comparison: no filter's projection, no probabilities before the data.
-//
-// Both start from the bias that each piece of the recording seems to show by itself on each axis, score over information, as if
-// nothing else were fitted.
+// What else one could do with the same recording, for comparison: functions fitted to what the calibration leaves, the 33 states
+// held where it put them instead of projected out, no probabilities before the data, no held-out proof.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "estimator/discovery/law_motion.hpp"
 #include "estimator/discovery/pieces.hpp"
 
 namespace selfcal::discovery_trial {
@@ -16,6 +15,9 @@ struct RivalLaw {
   std::string expression;
   double coefficient = 0.0;  // in unit_of(axis)
 };
+
+// What a bias of each axis in each piece does where the states are known.
+discovery::PieceSums with_states_held(const discovery::LawMotion& motion, PassInput input);
 
 // Functions of the search's own dictionary taken one after the other while Schwarz's criterion falls.
 std::vector<RivalLaw> stepwise(const discovery::PieceSums& sums, const laws::VariableSet& available);

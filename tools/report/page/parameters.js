@@ -81,6 +81,9 @@ function doubtOf(report) {
     return lead + 'The diagnosis names what was left out; the corrected values are those of the 24 fitted together with it '
         + '(grey: moved by less than 3 σ).';
   }
+  if (explained(objectOf(report.diagnosis))) {
+    return lead + 'What was left out is in no catalogue; the diagnosis below says what was found.';
+  }
   return lead + (verdict === 'data fault' ? 'The data are faulty: see the diagnosis.'
       : verdict ? 'The diagnosis names no cause, so there are no corrected values.' : 'No diagnosis was made.');
 }
