@@ -251,11 +251,17 @@ std::string Values::text(std::string_view name) const {
 }
 
 std::uint64_t stored_checksum(const Layout& layout, ByteView bytes) {
+  if (bytes.size() < std::max(layout.checksum->field.end(), layout.checksum->to)) {
+    return std::numeric_limits<std::uint64_t>::max();  // no checksum of up to 32 bits
+  }
   return raw_bits(layout.checksum->field, bytes.subspan(layout.checksum->field.at));
 }
 
 std::uint64_t computed_checksum(const Layout& layout, ByteView bytes) {
   const Checksum& sum = *layout.checksum;
+  if (bytes.size() < std::max(sum.field.end(), sum.to)) {
+    return 0;
+  }
   Bytes covered(bytes.begin() + static_cast<std::ptrdiff_t>(sum.from),
                 bytes.begin() + static_cast<std::ptrdiff_t>(sum.to));
   for (std::size_t at = std::max(sum.from, sum.field.at); at < std::min(sum.to, sum.field.end()); ++at) {

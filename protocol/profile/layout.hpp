@@ -96,7 +96,7 @@ struct Values {
 // Whether bytes have the length that the layout, and their count of repetitions, ask for.
 bool length_fits(const Layout& layout, ByteView bytes);
 
-// The checksum of a record that holds it: stored and computed.
+// The checksum of a record that holds it: stored and computed. Never equal where the record is too short for either.
 std::uint64_t stored_checksum(const Layout& layout, ByteView bytes);
 std::uint64_t computed_checksum(const Layout& layout, ByteView bytes);
 

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 
@@ -164,6 +166,21 @@ std::string with(std::string text, std::string_view from, std::string_view to) {
 std::string complaint(const std::string& text) {
   const auto profile = parse_profile(text, "p.toml");
   return profile ? std::string() : profile.error().message;
+}
+
+// What an INS tells has any length. Nothing is read beyond it, and no shorter record has a right checksum.
+TEST(BuiltInProfile, ARecordThatIsCutShortHasNoRightChecksum) {
+  for (const Layout* layout : {&built_in()->set, &built_in()->raw.page}) {
+    ASSERT_TRUE(layout->checksum && layout->bytes > 0);
+    for (std::size_t length = 0; length < layout->bytes; ++length) {
+      const auto record =
+          std::make_unique<std::uint8_t[]>(length);  // of just that length, so that a sanitizer sees what is beyond
+      const ByteView told(record.get(), length);
+      if (length < std::max(layout->checksum->field.end(), layout->checksum->to)) {
+        EXPECT_NE(stored_checksum(*layout, told), computed_checksum(*layout, told)) << layout->record << ' ' << length;
+      }
+    }
+  }
 }
 
 TEST(Profile, TellsEveryFaultAtOnceEachWithItsLine) {

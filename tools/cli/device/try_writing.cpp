@@ -124,6 +124,11 @@ void try_set(Conformance& c) {
   if (!record || !p.set_inactive || !c.permission().write) {
     return c.not_tried(written, c.permission().write ? "no set in force can be read" : "needs --write");
   }
+  // What an INS tells has any length: a set is only spoilt and written where it is a whole one.
+  if (told.kind != Exchange::Kind::positive || record->size() != p.set.bytes) {
+    return c.not_tried(written,
+                       fmt::format("the set in force has {} bytes, the profile says {}", record->size(), p.set.bytes));
+  }
   const Bytes set(record->begin(), record->end());
   if (p.erase.id) {
     try_erase(c, {"set.erase", routines, "The inactive slot is erased.", Mode::open, true});
