@@ -45,6 +45,29 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
                       : fmt::format("{} and {} {}", fmt::join(axes, ", "), last, several);
 }
 
+ordered_json law_json(const DiscoveredLaw& law) {
+  ordered_json constants = ordered_json::object();
+  for (const discovery::Constant& c : law.constants) {
+    constants[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
+  }
+  ordered_json members = ordered_json::array();
+  for (const discovery::ClassMember& m : law.ambiguous) {
+    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
+  }
+  return {{"axis", name_of_axis(law.term.axis)},
+          {"expression", law.expression},
+          {"coefficient", law.coefficient},
+          {"sigma", law.sigma},
+          {"unit", unit_of_axis(law.term.axis)},
+          {"constants", constants},
+          {"significance", law.significance},
+          {"held_out_gain", law.held_out_gain},
+          {"share", law.share},
+          {"stability", law.stability},
+          {"carries_over", law.carries_over},
+          {"class", members}};
+}
+
 }  // namespace
 
 double explained_share(const Discovery& found) {
@@ -119,33 +142,6 @@ std::string discovered_figures(const Discovery& found) {
   return fmt::format("{}; NIS {:.3g} becomes {:.3g}", fmt::join(all, "; "), nis(found.misfit_before),
                      nis(found.misfit_after));
 }
-
-namespace {
-
-ordered_json law_json(const DiscoveredLaw& law) {
-  ordered_json constants = ordered_json::object();
-  for (const discovery::Constant& c : law.constants) {
-    constants[c.name] = {{"value", c.value}, {"sigma", c.sigma}, {"unit", c.unit}};
-  }
-  ordered_json members = ordered_json::array();
-  for (const discovery::ClassMember& m : law.ambiguous) {
-    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
-  }
-  return {{"axis", name_of_axis(law.term.axis)},
-          {"expression", law.expression},
-          {"coefficient", law.coefficient},
-          {"sigma", law.sigma},
-          {"unit", unit_of_axis(law.term.axis)},
-          {"constants", constants},
-          {"significance", law.significance},
-          {"held_out_gain", law.held_out_gain},
-          {"share", law.share},
-          {"stability", law.stability},
-          {"carries_over", law.carries_over},
-          {"class", members}};
-}
-
-}  // namespace
 
 void add_discovery(ordered_json& document, const Discovery& found) {
   document["discovered"] = ordered_json::array();

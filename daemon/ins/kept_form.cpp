@@ -6,8 +6,7 @@
 namespace selfcal {
 
 Expected<Bytes> page_as_kept(const profile::Profile& profile, std::span<const std::uint8_t> told) {
-  const profile::Layout& layout = profile.raw.page;
-  if (layout.checksum && profile::stored_checksum(layout, told) != profile::computed_checksum(layout, told)) {
+  if (!profile::checksum_holds(profile.raw.page, told)) {
     return fail(ErrorKind::device, "wrong CRC");
   }
   const auto page = profile::decode_page(profile, told);

@@ -103,7 +103,7 @@ class Search {
       all.push_back(sum_over_pieces(scene->motion, scene->input, options_.stop, pieces_each()));
       scene->table = all.back();
     }
-    return all.size() == 1 ? std::move(all.front()) : join(all);
+    return join(std::move(all));
   }
 
   PieceSums sum_what_is_left() const {
@@ -114,7 +114,7 @@ class Search {
       input.data = &rest.data();
       all.push_back(sum_over_pieces(scenes_[r]->motion, input, options_.stop, pieces_each()));
     }
-    return all.size() == 1 ? std::move(all.front()) : join(all);
+    return join(std::move(all));
   }
 
   laws::VariableSet available_in_all() const {
@@ -333,16 +333,19 @@ class Search {
     }
   }
 
+  bool within_odds(const Candidate& c, const Candidate& own) const {
+    return c.merit() > own.merit() + std::log(options_.least_odds);
+  }
+
   // The term itself first, then all that stands within `least_odds` of it, each value of a constant by itself.
   std::vector<Candidate> possible(const Candidate& own, const std::vector<std::vector<Candidate>>& others) const {
     std::vector<Candidate> all = {own};
     for (const std::vector<Candidate>& alternatives : others) {
-      for (const Candidate& c : alternatives) {
-        Candidate weighed = c;
-        weighed.cost += alternatives.size() > 1 ? std::log(static_cast<double>(alternatives.size())) : 0.0;
+      for (Candidate c : alternatives) {
+        c.cost += std::log(static_cast<double>(alternatives.size()));
         const bool itself = same_law(c.term, own.term) && nearly(c.term.constants, own.term.constants);
-        if (weighed.merit() > own.merit() + std::log(options_.least_odds) && !itself) {
-          all.push_back(std::move(weighed));
+        if (within_odds(c, own) && !itself) {
+          all.push_back(std::move(c));
         }
       }
     }
@@ -357,64 +360,57 @@ class Search {
     return a.axis == b.axis && a.expression.text() == b.expression.text();
   }
 
-  CarryOver carry_over_of(const std::vector<Candidate>& all) const {
+  // A term, what explains the recordings in its place, and which of them hold elsewhere.
+  struct ClassView {
+    Candidate own;
+    std::vector<std::vector<Candidate>> others;
+    std::vector<Candidate> possible;  // the term itself first
+    CarryOver elsewhere;              // of `possible`
+  };
+
+  ClassView view_class(std::size_t k) {
+    ClassView view;
+    view.others = rivals(k, class_size, view.own);
+    view.possible = possible(view.own, view.others);
     std::vector<PossibleLaw> laws;
-    laws.reserve(all.size());
-    for (const Candidate& c : all) {
-      laws.push_back({c.term, c.coefficient, std::exp(std::min(50.0, c.merit() - all.front().merit()))});
+    laws.reserve(view.possible.size());
+    for (const Candidate& c : view.possible) {
+      laws.push_back({c.term, c.coefficient, std::exp(std::min(50.0, c.merit() - view.own.merit()))});
     }
-    return carry_over(recordings_.back(), laws, options_.stop);
+    view.elsewhere = carry_over(recordings_.back(), laws, options_.stop);
+    return view;
   }
 
   // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the
-  // class and that probability.
+  // class, its stability and that probability.
   void settle_class(std::size_t k, DiscoveredLaw& law) {
     constexpr double worth_a_change = 0.02;  // of the probability
-    for (bool changed = true, once = false; changed; once = true) {
-      Candidate own;
-      const std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
-      const std::vector<Candidate> all = possible(own, others);
-      const CarryOver on_another = carry_over_of(all);
-      const auto best = static_cast<std::size_t>(std::max_element(on_another.merit.begin(), on_another.merit.end()) -
-                                                 on_another.merit.begin());
-      changed =
-          !once && on_another.merit[best] > on_another.merit[0] + worth_a_change && put_in_place(k, all[best], false);
-      law.carries_over = on_another.probability[0];
-      if (!changed) {
-        const std::vector<Candidate> best_each = best_of(others);
-        law.ambiguous = class_of(own, best_each);
-        law.stability = stability_of(k, own, best_each);
-      }
+    ClassView view = view_class(k);
+    const std::vector<double>& merit = view.elsewhere.merit;
+    const auto best = static_cast<std::size_t>(std::max_element(merit.begin(), merit.end()) - merit.begin());
+    if (merit[best] > merit.front() + worth_a_change && put_in_place(k, view.possible[best], false)) {
+      view = view_class(k);
     }
+    law.carries_over = view.elsewhere.probability.front();
+    describe_class(k, view, law);
   }
 
-  double stability_of(std::size_t k, const Candidate& own, const std::vector<Candidate>& others) const {
-    std::vector<Candidate> members = {own}, all;
-    for (const Candidate& c : others) {
-      if (!same_law(c.term, own.term)) {
-        (c.merit() > own.merit() + std::log(options_.least_odds) ? members : all).push_back(c);
+  void describe_class(std::size_t k, const ClassView& view, DiscoveredLaw& law) const {
+    std::vector<Candidate> members = {view.own}, outside;
+    for (const Candidate& c : best_of(view.others)) {
+      if (!same_law(c.term, view.own.term)) {
+        (within_odds(c, view.own) ? members : outside).push_back(c);
       }
     }
-    const std::size_t count = members.size();
-    members.insert(members.end(), all.begin(), all.end());
-    return stability(laws_on_, all_but(k), members, count, options_.stop);
-  }
-
-  std::vector<ClassMember> class_of(const Candidate& own, const std::vector<Candidate>& candidates) const {
-    std::vector<std::pair<double, ClassMember>> members = {{own.cost, {own.text(), own.term.axis, 1.0}}};
-    for (const Candidate& c : candidates) {
-      const double odds = std::exp(std::min(50.0, c.merit() - own.merit()));
-      if (odds > options_.least_odds && !same_law(c.term, own.term)) {
-        members.push_back({c.cost, {c.text(), c.term.axis, odds}});
-      }
+    std::vector<Candidate> all = members;
+    all.insert(all.end(), outside.begin(), outside.end());
+    law.stability = stability(laws_on_, all_but(k), all, members.size(), options_.stop);
+    std::stable_sort(members.begin(), members.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+    law.ambiguous.reserve(members.size());
+    for (const Candidate& c : members) {
+      law.ambiguous.push_back({c.text(), c.term.axis, std::exp(std::min(50.0, c.merit() - view.own.merit()))});
     }
-    std::stable_sort(members.begin(), members.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::vector<ClassMember> result;
-    result.reserve(members.size());
-    for (auto& [cost, member] : members) {
-      result.push_back(std::move(member));
-    }
-    return result;
   }
 
   // Several equations on one axis, the smaller of which take little beside the largest, are more probably one law whose form

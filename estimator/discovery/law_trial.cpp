@@ -134,7 +134,7 @@ Started started(std::vector<LawTerm> laws, const std::vector<std::unique_ptr<Sce
   for (const auto& scene : scenes) {
     each.push_back(sum_over_pieces(scene->motion, scene->input));
   }
-  const PieceSums sums = each.size() == 1 ? std::move(each.front()) : join(each);
+  const PieceSums sums = join(std::move(each));
   Dictionary nothing;
   nothing.means.resize(sums.piece_dt.size(), 0);
   PieceModel model(sums, nothing);

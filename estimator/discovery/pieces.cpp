@@ -148,7 +148,9 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
   return result;
 }
 
-PieceSums join(const std::vector<PieceSums>& recordings) {
+namespace {
+
+PieceSums one_behind_the_other(const std::vector<PieceSums>& recordings) {
   Eigen::Index columns = 0, nodes = 0, pieces = 0;
   for (const PieceSums& r : recordings) {
     columns += r.sums.score.size();
@@ -185,6 +187,12 @@ PieceSums join(const std::vector<PieceSums>& recordings) {
     pieces += one.piece_dt.size();
   }
   return all;
+}
+
+}  // namespace
+
+PieceSums join(std::vector<PieceSums> recordings) {
+  return recordings.size() == 1 ? std::move(recordings.front()) : one_behind_the_other(recordings);
 }
 
 }  // namespace selfcal::discovery

@@ -48,7 +48,8 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
                           std::size_t most = most_pieces);
 
 // Recordings one behind the other: what the states of each take up is projected out of each by itself, so that information
-// between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty.
-PieceSums join(const std::vector<PieceSums>& recordings);
+// between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty. One recording
+// stays as it is.
+PieceSums join(std::vector<PieceSums> recordings);
 
 }  // namespace selfcal::discovery

@@ -70,12 +70,12 @@ can::CanFrame Transport::blank_frame(std::uint32_t id, const std::optional<std::
 }
 
 std::span<std::uint8_t> Transport::room(can::CanFrame& frame) const {
-  return std::span(frame.data).first(options_.frame_bytes).subspan(address_bytes());
+  return std::span(frame.data).first(options_.frame_bytes).subspan(address_bytes_);
 }
 
 // `used` of its room.
 void Transport::finish_frame(can::CanFrame& frame, std::size_t used) const {
-  used += address_bytes();
+  used += address_bytes_;
   const std::size_t wanted = options_.padding ? std::max<std::size_t>(used, 8) : used;
   frame.size = static_cast<std::uint8_t>(can::frame_size_for(wanted));
   std::fill(frame.data.begin() + static_cast<std::ptrdiff_t>(used), frame.data.begin() + frame.size,
@@ -85,7 +85,7 @@ void Transport::finish_frame(can::CanFrame& frame, std::size_t used) const {
 can::CanFrame Transport::single_frame(std::span<const std::uint8_t> message, std::uint32_t id,
                                       const std::optional<std::uint8_t>& address_byte) const {
   can::CanFrame frame = blank_frame(id, address_byte);
-  finish_frame(frame, encode_single(message, room(frame), address_bytes()));
+  finish_frame(frame, encode_single(message, room(frame), address_bytes_));
   return frame;
 }
 
@@ -98,14 +98,14 @@ bool Transport::send(std::span<const std::uint8_t> message, Time now) {
   sender_.done = 0;
   sender_.due = now;
   sender_.waits = 0;
-  sender_.state = message.size() <= max_single_payload(options_.frame_bytes - address_bytes()) ? SendState::single
-                                                                                               : SendState::first;
+  sender_.state = message.size() <= max_single_payload(options_.frame_bytes - address_bytes_) ? SendState::single
+                                                                                              : SendState::first;
   return true;
 }
 
 bool Transport::send_functional(std::span<const std::uint8_t> message, Time now) {
   if (functional_.waiting || !options_.address.functional_id || message.empty() ||
-      message.size() > max_single_payload(options_.frame_bytes - address_bytes())) {
+      message.size() > max_single_payload(options_.frame_bytes - address_bytes_)) {
     return false;
   }
   functional_ = {true, now, single_frame(message, *options_.address.functional_id, options_.address.functional_byte)};
@@ -129,7 +129,7 @@ Events Transport::on_frame(const can::CanFrame& frame, Time now) {
   if (!accepts(frame)) {
     return events;
   }
-  const auto pdu = decode(frame.payload().subspan(address_bytes()), address_bytes());
+  const auto pdu = decode(frame.payload().subspan(address_bytes_), address_bytes_);
   if (options_.address.functional_id &&
       is_ours(*options_.address.functional_id, options_.address.functional_byte, frame)) {
     if (const auto* single = pdu ? std::get_if<SingleFrame>(&*pdu) : nullptr) {
@@ -327,7 +327,7 @@ can::CanFrame Transport::opening_frame() const {
   }
   can::CanFrame frame = blank_frame(options_.address.transmit_id, options_.address.transmit_byte);
   encode_first(static_cast<std::uint32_t>(message.size()), message, room(frame));
-  finish_frame(frame, options_.frame_bytes - address_bytes());
+  finish_frame(frame, options_.frame_bytes - address_bytes_);
   return frame;
 }
 
@@ -337,7 +337,7 @@ can::CanFrame Transport::consecutive_frame(std::size_t at, std::size_t part, std
   return frame;
 }
 
-std::size_t Transport::consecutive_payload() const { return options_.frame_bytes - address_bytes() - 1; }
+std::size_t Transport::consecutive_payload() const { return options_.frame_bytes - address_bytes_ - 1; }
 
 Events Transport::sent(std::size_t count, Time now) {
   Events events;
@@ -365,7 +365,7 @@ void Transport::advance_sender(Time now, Events& events) {
     case SendState::single: sender_.done = sender_.length; break;
     case SendState::first:
       sender_.done =
-          first_frame_payload(static_cast<std::uint32_t>(sender_.length), options_.frame_bytes - address_bytes());
+          first_frame_payload(static_cast<std::uint32_t>(sender_.length), options_.frame_bytes - address_bytes_);
       sender_.sequence = 1;
       sender_.state = SendState::wait_flow;
       sender_.deadline = now + options_.n_bs;

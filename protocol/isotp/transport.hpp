@@ -152,7 +152,6 @@ class Transport {
     can::CanFrame frame;
   };
 
-  std::size_t address_bytes() const { return address_bytes_; }
   can::CanFrame blank_frame(std::uint32_t id, const std::optional<std::uint8_t>& address_byte) const;
   std::span<std::uint8_t> room(can::CanFrame& frame) const;
   void finish_frame(can::CanFrame& frame, std::size_t used) const;

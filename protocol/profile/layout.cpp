@@ -250,8 +250,14 @@ std::string Values::text(std::string_view name) const {
   return found == texts.end() ? std::string() : found->second;
 }
 
+namespace {
+
+bool long_enough(const Checksum& sum, ByteView bytes) { return bytes.size() >= std::max(sum.field.end(), sum.to); }
+
+}  // namespace
+
 std::uint64_t stored_checksum(const Layout& layout, ByteView bytes) {
-  if (bytes.size() < std::max(layout.checksum->field.end(), layout.checksum->to)) {
+  if (!long_enough(*layout.checksum, bytes)) {
     return std::numeric_limits<std::uint64_t>::max();  // no checksum of up to 32 bits
   }
   return raw_bits(layout.checksum->field, bytes.subspan(layout.checksum->field.at));
@@ -259,7 +265,7 @@ std::uint64_t stored_checksum(const Layout& layout, ByteView bytes) {
 
 std::uint64_t computed_checksum(const Layout& layout, ByteView bytes) {
   const Checksum& sum = *layout.checksum;
-  if (bytes.size() < std::max(sum.field.end(), sum.to)) {
+  if (!long_enough(sum, bytes)) {
     return 0;
   }
   Bytes covered(bytes.begin() + static_cast<std::ptrdiff_t>(sum.from),
@@ -271,6 +277,10 @@ std::uint64_t computed_checksum(const Layout& layout, ByteView bytes) {
     return flash::crc32c(covered);
   }
   return sum.algorithm == "crc16" ? crc16(covered) : crc_reflected(covered, 0xEDB88320U, 0xFFFFFFFFU);
+}
+
+bool checksum_holds(const Layout& layout, ByteView bytes) {
+  return !layout.checksum || stored_checksum(layout, bytes) == computed_checksum(layout, bytes);
 }
 
 bool length_fits(const Layout& layout, ByteView bytes) {

@@ -99,5 +99,7 @@ bool length_fits(const Layout& layout, ByteView bytes);
 // The checksum of a record that holds it: stored and computed. Never equal where the record is too short for either.
 std::uint64_t stored_checksum(const Layout& layout, ByteView bytes);
 std::uint64_t computed_checksum(const Layout& layout, ByteView bytes);
+// They are equal, or the record has none.
+bool checksum_holds(const Layout& layout, ByteView bytes);
 
 }  // namespace selfcal::profile

@@ -18,11 +18,11 @@
 
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
+#include "daemon/estimate/unit_answer.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
-#include "estimator/discovery/next_experiment.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -107,22 +107,6 @@ std::unique_ptr<Loaded> load(const std::string& path) {
   return loaded;
 }
 
-void write_plan(const std::string& file, std::span<const discovery::UnitRecording> recordings,
-                const discovery::Discovery& found, double duration_s) {
-  std::optional<discovery::NextExperiment> next;
-  discovery::ExperimentLimits limits;
-  limits.duration_s = duration_s;
-  for (const discovery::DiscoveredLaw& law : found.laws) {
-    auto planned = discovery::plan_experiment(recordings, law, limits);
-    if (planned && (!next || planned->separation_now < next->separation_now)) {
-      next = std::move(planned);
-    }
-  }
-  if (next) {
-    std::ofstream(file) << format_schedule(next->schedule);
-  }
-}
-
 int answer(const Request& request) {
   constexpr double experiment_s = 3000.0;
   std::vector<std::unique_ptr<Loaded>> all;
@@ -163,7 +147,11 @@ int answer(const Request& request) {
       const discovery::Discovery found = discovery::discover(recordings, {});
       j["discovery"] = to_json(found);
       if (!request.plan.empty()) {
-        write_plan(request.plan, recordings, found, experiment_s);
+        discovery::ExperimentLimits limits;
+        limits.duration_s = experiment_s;
+        if (const auto next = plan_next(recordings, found, limits)) {
+          std::ofstream(request.plan) << format_schedule(next->schedule);
+        }
       }
     }
   }

@@ -23,8 +23,7 @@ std::string fault_of_page(const profile::Profile& p, ByteView bytes, std::uint32
   if (bytes.size() != p.raw.page.bytes) {
     return fmt::format("{} bytes of a page of {}", bytes.size(), p.raw.page.bytes);
   }
-  const profile::Layout& layout = p.raw.page;
-  if (layout.checksum && profile::stored_checksum(layout, bytes) != profile::computed_checksum(layout, bytes)) {
+  if (!profile::checksum_holds(p.raw.page, bytes)) {
     return "wrong checksum";
   }
   const auto page = profile::decode_page(p, bytes);

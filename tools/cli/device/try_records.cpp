@@ -33,9 +33,7 @@ std::string fault_of_set(const profile::Profile& p, ByteView record) {
   if (!set) {
     return set.error().message;
   }
-  return p.set.checksum && profile::stored_checksum(p.set, record) != profile::computed_checksum(p.set, record)
-             ? "wrong checksum"
-             : "";
+  return profile::checksum_holds(p.set, record) ? "" : "wrong checksum";
 }
 
 // A record that the INS may not have yet: conditionsNotCorrect then.

@@ -1,0 +1,17 @@
+"""Laws as an answer tells them, for the programs of the trial."""
+import json
+import subprocess
+
+AXES = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+SEEN = 3.0   # sigma: a law that the other plan shows with less is not scored
+LEFT = 0.1   # of the misfit's power on the other plan, at most: what the requirement calls predicted
+
+
+def left_elsewhere(programs, key, number, laws, folder):
+    """What these laws leave of a case on the plan that was never used: {"left", "sigmas"}."""
+    path = folder / "told.toml"
+    path.write_text("".join(f'[[law]]\naxis = "{AXES[x["axis"]]}"\nexpression = "{x["expression"]}"\n'
+                            f'coefficient = {x["coefficient"]!r}\nunit = "{"deg/h" if x["axis"] < 3 else "ug"}"\n' for x in laws))
+    done = subprocess.run([f"{programs}/selfcal_discovery_generate", "left", str(key), str(number), str(path)], check=True,
+                          capture_output=True, text=True)
+    return json.loads(done.stdout)
