@@ -52,7 +52,8 @@ ordered_json law_json(const DiscoveredLaw& law) {
   }
   ordered_json members = ordered_json::array();
   for (const discovery::ClassMember& m : law.ambiguous) {
-    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}});
+    members.push_back(
+        {{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}, {"also", m.also}});
   }
   return {{"axis", name_of_axis(law.term.axis)},
           {"expression", law.expression},

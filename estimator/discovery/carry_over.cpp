@@ -12,10 +12,30 @@ namespace {
 
 constexpr double tolerated_share = 0.1;  // of the misfit's power: what is called a prediction
 constexpr unsigned plan_seed = 71;
-constexpr std::array<double, 3> dwells_s = {60.0, 110.0,
-                                            170.0};  // what follows time since a turn is not seen at one alone
-// How far the vehicle leans beside the attitude that it was recorded in.
-constexpr double further_roll = 8.0 * units::degree, further_pitch = -6.0 * units::degree;
+// What follows time since a turn is not seen at one alone.
+constexpr std::array<double, 3> dwells_s = {60.0, 110.0, 170.0};
+
+// Another place: a plan, and how far the vehicle leans beside the attitude that it was recorded in.
+struct Elsewhere {
+  Schedule plan;
+  double roll = 0.0, pitch = 0.0;
+};
+
+std::array<Elsewhere, 2> places() {
+  constexpr Grid between_right_angles{.step_deg = 90.0, .first_deg = 45.0};
+  constexpr double slower = 1.7;  // what follows the rate of the turns is not seen at one alone
+  std::array<Elsewhere, 2> all = {
+      Elsewhere{walk_over_positions({}, dwells_s[1], plan_seed), 8.0 * units::degree, -6.0 * units::degree},
+      Elsewhere{walk_over_positions({}, dwells_s[1], plan_seed + 1, between_right_angles), -10.0 * units::degree,
+                9.0 * units::degree}};
+  all[1].plan.rotation_s *= slower;
+  for (Elsewhere& one : all) {
+    for (std::size_t k = 0; k < one.plan.dwell_s.size(); ++k) {
+      one.plan.dwell_s[k] = dwells_s[k % dwells_s.size()];
+    }
+  }
+  return all;
+}
 
 // What law a leaves of law b.
 double left(const Eigen::MatrixXd& G, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
@@ -29,7 +49,8 @@ double left(const Eigen::MatrixXd& G, const std::vector<PossibleLaw>& laws, std:
 
 CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& laws, const std::stop_token& stop) {
   const std::size_t n = laws.size();
-  CarryOver result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0)};
+  const auto rows = static_cast<Eigen::Index>(n);
+  CarryOver result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0), Eigen::MatrixXd::Zero(rows, rows)};
   std::vector<LawTerm> terms;
   double total = 0.0;
   for (const PossibleLaw& law : laws) {
@@ -40,23 +61,37 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
     }
     total += law.odds;
   }
-  Attitude vehicle = like.calibration.initial_attitude;
-  vehicle.roll += further_roll;
-  vehicle.pitch += further_pitch;
-  Schedule plan = walk_over_positions({}, dwells_s[1], plan_seed);
-  for (std::size_t k = 0; k < plan.dwell_s.size(); ++k) {
-    plan.dwell_s[k] = dwells_s[k % dwells_s.size()];
-  }
-  const Eigen::MatrixXd G = planned_information(plan, like, vehicle, terms, stop);
-  for (std::size_t a = 0; a < n; ++a) {
-    for (std::size_t b = 0; b < n; ++b) {
-      const double share = a == b ? 0.0 : left(G, laws, a, b);
-      const double in_limits = share / tolerated_share;
-      result.probability[a] += (share <= tolerated_share ? laws[b].odds : 0.0) / total;
-      result.merit[a] += laws[b].odds / total / (1.0 + in_limits * in_limits);
+  const std::array<Elsewhere, 2> all = places();
+  for (const Elsewhere& one : all) {
+    Attitude vehicle = like.calibration.initial_attitude;
+    vehicle.roll += one.roll;
+    vehicle.pitch += one.pitch;
+    const Eigen::MatrixXd G = planned_information(one.plan, like, vehicle, terms, stop);
+    result.information += G;
+    for (std::size_t a = 0; a < n; ++a) {
+      for (std::size_t b = 0; b < n; ++b) {
+        const double share = a == b ? 0.0 : left(G, laws, a, b);
+        const double in_limits = share / tolerated_share;
+        const double weight = laws[b].odds / total / static_cast<double>(all.size());
+        result.probability[a] += share <= tolerated_share ? weight : 0.0;
+        result.merit[a] += weight / (1.0 + in_limits * in_limits);
+      }
     }
   }
   return result;
+}
+
+bool one_function(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
+  constexpr double least_share = 0.01;
+  const Eigen::MatrixXd& G = elsewhere.information;
+  const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
+  if (laws[a].term.axis != laws[b].term.axis || !(G(i, i) > 0.0) || !(G(j, j) > 0.0)) {
+    return a == b;
+  }
+  const double share = 1.0 - std::min(1.0, G(i, j) * G(i, j) / (G(i, i) * G(j, j)));
+  const double size =
+      std::max(std::pow(laws[a].coefficient, 2.0) * G(i, i), std::pow(laws[b].coefficient, 2.0) * G(j, j));
+  return share < least_share && share * size < 1.0;
 }
 
 }  // namespace selfcal::discovery

@@ -138,8 +138,8 @@ class Builder {
     double belief = 1.0;
   };
 
-  // All unordered draws of `depth` different choices.
-  static std::vector<Draw> products(const std::vector<Choice>& choices, int depth) {
+  // All unordered draws of `depth` different choices. `alone`: nothing is multiplied to them.
+  static std::vector<Draw> products(const std::vector<Choice>& choices, int depth, bool alone = false) {
     std::vector<Draw> draws(1);
     std::vector<std::size_t> next(1, 0);
     for (int level = 1; level <= depth; ++level) {
@@ -147,7 +147,7 @@ class Builder {
       std::vector<std::size_t> after;
       for (std::size_t d = 0; d < draws.size(); ++d) {
         for (std::size_t k = next[d]; k < choices.size(); ++k) {
-          if (depth == 1 && !choices[k].alone) {
+          if (alone && !choices[k].alone) {
             continue;
           }
           longer.push_back(draws[d]);
@@ -178,7 +178,7 @@ class Builder {
   // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
   void enumerate() {
     const std::vector<Draw> nothing(1), one = products(all_, 1), main_two = products(main_, 2);
-    collect(one, 0.2);
+    collect(products(all_, 1, true), 0.2);
     collect(products(all_, 2), 0.3);
     collect(products(main_, 3), 0.04 / (plain_share * plain_share * plain_share));
     collect(times(decays_, nothing), 0.12);

@@ -6,7 +6,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "estimator/discovery/carry_over.hpp"
+#include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/discovery/stability.hpp"
@@ -333,84 +333,29 @@ class Search {
     }
   }
 
-  bool within_odds(const Candidate& c, const Candidate& own) const {
-    return c.merit() > own.merit() + std::log(options_.least_odds);
-  }
-
-  // The term itself first, then all that stands within `least_odds` of it, each value of a constant by itself.
-  std::vector<Candidate> possible(const Candidate& own, const std::vector<std::vector<Candidate>>& others) const {
-    std::vector<Candidate> all = {own};
-    for (const std::vector<Candidate>& alternatives : others) {
-      for (Candidate c : alternatives) {
-        c.cost += std::log(static_cast<double>(alternatives.size()));
-        const bool itself = same_law(c.term, own.term) && nearly(c.term.constants, own.term.constants);
-        if (within_odds(c, own) && !itself) {
-          all.push_back(std::move(c));
-        }
-      }
-    }
-    return all;
-  }
-
-  static bool nearly(const std::vector<double>& a, const std::vector<double>& b) {
-    constexpr double tolerance = 0.1;  // alternatives of a constant are farther apart
-    return a.empty() || std::abs(a.front() - b.front()) < tolerance * std::abs(b.front());
-  }
-  static bool same_law(const LawTerm& a, const LawTerm& b) {
-    return a.axis == b.axis && a.expression.text() == b.expression.text();
-  }
-
-  // A term, what explains the recordings in its place, and which of them hold elsewhere.
-  struct ClassView {
+  LawClass class_of(std::size_t k) {
     Candidate own;
-    std::vector<std::vector<Candidate>> others;
-    std::vector<Candidate> possible;  // the term itself first
-    CarryOver elsewhere;              // of `possible`
-  };
-
-  ClassView view_class(std::size_t k) {
-    ClassView view;
-    view.others = rivals(k, class_size, view.own);
-    view.possible = possible(view.own, view.others);
-    std::vector<PossibleLaw> laws;
-    laws.reserve(view.possible.size());
-    for (const Candidate& c : view.possible) {
-      laws.push_back({c.term, c.coefficient, std::exp(std::min(50.0, c.merit() - view.own.merit()))});
-    }
-    view.elsewhere = carry_over(recordings_.back(), laws, options_.stop);
-    return view;
+    std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
+    return {recordings_.back(), std::move(own), std::move(others), options_.least_odds, options_.stop};
   }
 
   // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the
   // class, its stability and that probability.
   void settle_class(std::size_t k, DiscoveredLaw& law) {
     constexpr double worth_a_change = 0.02;  // of the probability
-    ClassView view = view_class(k);
-    const std::vector<double>& merit = view.elsewhere.merit;
-    const auto best = static_cast<std::size_t>(std::max_element(merit.begin(), merit.end()) - merit.begin());
-    if (merit[best] > merit.front() + worth_a_change && put_in_place(k, view.possible[best], false)) {
-      view = view_class(k);
+    LawClass all = class_of(k);
+    const std::vector<double>& merit = all.elsewhere().merit;
+    const std::size_t best = all.best_elsewhere();
+    if (merit[best] > merit.front() + worth_a_change && put_in_place(k, all.possible()[best], false)) {
+      all = class_of(k);
     }
-    law.carries_over = view.elsewhere.probability.front();
-    describe_class(k, view, law);
-  }
-
-  void describe_class(std::size_t k, const ClassView& view, DiscoveredLaw& law) const {
-    std::vector<Candidate> members = {view.own}, outside;
-    for (const Candidate& c : best_of(view.others)) {
-      if (!same_law(c.term, view.own.term)) {
-        (within_odds(c, view.own) ? members : outside).push_back(c);
-      }
-    }
-    std::vector<Candidate> all = members;
-    all.insert(all.end(), outside.begin(), outside.end());
-    law.stability = stability(laws_on_, all_but(k), all, members.size(), options_.stop);
-    std::stable_sort(members.begin(), members.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
-    law.ambiguous.reserve(members.size());
-    for (const Candidate& c : members) {
-      law.ambiguous.push_back({c.text(), c.term.axis, std::exp(std::min(50.0, c.merit() - view.own.merit()))});
-    }
+    law.carries_over = all.elsewhere().probability.front();
+    law.ambiguous = all.functions();
+    std::vector<Candidate> tried = all.members();
+    const std::size_t members = tried.size();
+    const std::vector<Candidate> beside = all.tried_beside();
+    tried.insert(tried.end(), beside.begin(), beside.end());
+    law.stability = stability(laws_on_, all_but(k), tried, members, options_.stop);
   }
 
   // Several equations on one axis, the smaller of which take little beside the largest, are more probably one law whose form

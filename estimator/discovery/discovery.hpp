@@ -27,7 +27,8 @@ struct DiscoveryOptions {
 struct ClassMember {
   std::string expression;
   int axis = 0;
-  double odds = 0.0;  // against the law that is reported, 1 for itself
+  double odds = 0.0;              // of this function against the one that is reported, 1 for that
+  std::vector<std::string> also;  // the same function in other words: no rotation tells them apart (carry_over.hpp)
 };
 
 struct Constant {

@@ -11,25 +11,24 @@ namespace selfcal::discovery {
 namespace {
 
 constexpr double planning_rate_hz = 20.0;
-constexpr double grid_deg = 45.0;
 
 }  // namespace
 
-Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, unsigned seed) {
+Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, unsigned seed, const Grid& grid) {
   std::mt19937 engine(seed);  // the standard fixes its bits; no distribution of the standard is used
   const auto below = [&engine](int n) { return static_cast<int>(engine() % static_cast<unsigned>(n)); };
-  const int reach = static_cast<int>(limits.largest_move_deg / grid_deg);
+  const int reach = static_cast<int>(limits.largest_move_deg / grid.step_deg);
   Schedule plan;
   plan.rotation_s = limits.rotation_s;
-  GimbalPosition at;
+  GimbalPosition at{grid.first_deg, grid.first_deg};
   const auto count = static_cast<std::size_t>(std::max(3.0, limits.duration_s / (dwell_s + limits.rotation_s)));
   while (plan.positions.size() < count) {
     plan.positions.push_back(at);
     plan.dwell_s.push_back(dwell_s);
     GimbalPosition next = at;
     for (int tries = 0; tries < 20; ++tries) {
-      next = {at.outer_deg + grid_deg * (below(2 * reach + 1) - reach),
-              at.inner_deg + grid_deg * (below(2 * reach + 1) - reach)};
+      next = {at.outer_deg + grid.step_deg * (below(2 * reach + 1) - reach),
+              at.inner_deg + grid.step_deg * (below(2 * reach + 1) - reach)};
       const bool moves = next.outer_deg != at.outer_deg || next.inner_deg != at.inner_deg;
       const bool within = std::abs(next.outer_deg) <= 360.0 && std::abs(next.inner_deg) <= 360.0;
       const bool seen = std::any_of(plan.positions.begin(), plan.positions.end(), [&](const GimbalPosition& p) {

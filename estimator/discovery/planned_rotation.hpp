@@ -16,9 +16,14 @@ struct ExperimentLimits {
   double rotation_s = 5.0;         // the gimbal makes the largest move in it
 };
 
-// A walk over positions 45 degrees apart that visits what it has not seen before where it can, within the limits. The same
-// for the same seed.
-Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, unsigned seed);
+// Positions of both axes: the first, and how far apart they are.
+struct Grid {
+  double step_deg = 45.0, first_deg = 0.0;
+};
+
+// A walk over the positions of a grid that visits what it has not seen before where it can, within the limits. The same for
+// the same seed.
+Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, unsigned seed, const Grid& grid = {});
 
 // Nobody knows the temperature of a rotation that was not made.
 bool needs_temperature(const laws::Expression& expression);

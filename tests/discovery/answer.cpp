@@ -43,7 +43,7 @@ ordered_json to_json(const discovery::Discovery& d) {
   for (const discovery::DiscoveredLaw& law : d.laws) {
     ordered_json members = ordered_json::array();
     for (const discovery::ClassMember& m : law.ambiguous) {
-      members.push_back({{"expression", m.expression}, {"axis", m.axis}, {"odds", m.odds}});
+      members.push_back({{"expression", m.expression}, {"axis", m.axis}, {"odds", m.odds}, {"also", m.also}});
     }
     j["laws"].push_back({{"axis", law.term.axis},
                          {"expression", law.expression},

@@ -49,7 +49,7 @@ class Investigate(case.OnBench):
         members = [len(law["class"]) for law in first], [len(law["class"]) for law in last]
         self.assertEqual(len(last), 1, last)
         self.assertLessEqual(sum(members[1]), sum(members[0]))
-        told = [(m["axis"], "*".join(sorted(m["expression"].split("*")))) for m in last[0]["class"]]
+        told = [(m["axis"], "*".join(sorted(text.split("*")))) for m in last[0]["class"] for text in [m["expression"], *m["also"]]]
         self.assertIn((LAW["axis"], "*".join(sorted(LAW["expression"].split("*")))), told)
 
         written = unit.document(story["written_by"])

@@ -33,21 +33,40 @@ std::string constants_text(const std::vector<Constant>& constants) {
   return text;
 }
 
-std::string class_text(const DiscoveredLaw& law) {
-  if (law.ambiguous.size() < 2) {
-    return "    no other equation that was tried explains this recording as well\n";
+// Other words for one function, which no rotation tells apart.
+std::string also_text(const ClassMember& m, const char* indent) {
+  constexpr std::size_t most = 3;
+  if (m.also.empty()) {
+    return {};
   }
-  std::string text =
+  const std::vector<std::string> some(m.also.begin(), m.also.begin() + std::min(most, m.also.size()));
+  return fmt::format("{}the same as {}{}\n", indent, fmt::join(some, ", "), m.also.size() > most ? ", ..." : "");
+}
+
+bool is_itself(const ClassMember& m, const DiscoveredLaw& law) {
+  return m.expression == law.expression && m.axis == law.term.axis;
+}
+
+std::string class_text(const DiscoveredLaw& law) {
+  std::string text;
+  for (const ClassMember& m : law.ambiguous) {
+    text += is_itself(m, law) ? also_text(m, "    ") : std::string();
+  }
+  if (law.ambiguous.size() < 2) {
+    return text + "    no other equation that was tried explains this recording as well\n";
+  }
+  text +=
       fmt::format("    {} others explain this recording too (odds against the one above):\n", law.ambiguous.size() - 1);
   std::size_t shown = 0;
   for (const ClassMember& m : law.ambiguous) {
-    if (m.expression == law.expression && m.axis == law.term.axis) {
+    if (is_itself(m, law)) {
       continue;
     }
     if (shown++ == members_shown) {
       return text + "      ...\n";
     }
-    text += fmt::format("      {:<8} {}  ({:.2g})\n", name_of_axis(m.axis), m.expression, m.odds);
+    text += fmt::format("      {:<8} {}  ({:.2g})\n", name_of_axis(m.axis), m.expression, m.odds) +
+            also_text(m, "               ");
   }
   return text;
 }

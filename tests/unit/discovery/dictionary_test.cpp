@@ -56,6 +56,21 @@ TEST(Dictionary, NoFunctionTwice) {
   EXPECT_EQ(doubles, 0U) << "of " << dictionary.functions.size();
 }
 
+// sin(outer)**2 alone is cos(2*outer) and a constant; times a kernel it is neither.
+TEST(Dictionary, SquaresOfSinesStandBesideAKernelAndNotAlone) {
+  laws::VariableSet all;
+  all.set();
+  const Dictionary dictionary = make_dictionary(everything_varies(), all);
+  std::set<std::string> patterns;
+  for (const Function& f : dictionary.functions) {
+    patterns.insert(dictionary.pattern(f));
+  }
+  EXPECT_FALSE(patterns.contains("cos(inner)**2"));
+  for (const char* kernel : {"exp(-since/?)", "log(1+rest/?)*sign(n)", "exp(-t/?)", "sin(2*pi*t/?)"}) {
+    EXPECT_TRUE(patterns.contains(std::string(kernel) + "*cos(inner)**2")) << kernel;
+  }
+}
+
 TEST(Dictionary, OfWavesThatOnePlanCannotTellApartTheLongerOneIsMoreProbable) {
   laws::VariableSet all;
   all.set();

@@ -66,7 +66,7 @@ SLOW, FAST = "exp(-since/45.2)*so", "exp(-since/30)*-so**2/(1+abs(fx))"
 def law(expression, members, size, sigma):
     return {"axis": "accel_y", "expression": expression, "coefficient": size, "sigma": sigma, "unit": "ug", "constants": {},
             "significance": size / sigma, "held_out_gain": 120.0, "share": 0.97,
-            "class": [{"expression": e, "axis": "accel_y", "odds": odds} for e, odds in members]}
+            "class": [{"expression": e, "axis": "accel_y", "odds": odds, "also": ["exp(-since/45.2)*abs(so)"] if e == SLOW else []} for e, odds in members]}
 
 
 def told(verdict, standing, following):

@@ -15,6 +15,16 @@ function lawSizes(laws) {
   ], {class: 'laws'});
 }
 
+// No rotation tells these apart.
+function otherWords(member) {
+  const most = 3;
+  const some = listOf(member.also);
+  const cell = element('span', {}, some.length === 0 ? '–' : '');
+  some.slice(0, most).forEach((text, k) => cell.append(k > 0 ? ', ' : '', lawAsMath(textOf(text))));
+  cell.append(some.length > most ? ` and ${some.length - most} more` : '');
+  return cell;
+}
+
 // Every equation that was in a class before or is now, with its odds against the best. A class before of the same law: of that with
 // which it shares an equation.
 function classTable(law, before) {
@@ -27,6 +37,9 @@ function classTable(law, before) {
     {title: 'equation', cells: all.map((m) => lawAsMath(textOf(m.expression))), class: 'words'},
     {title: 'sensor', cells: all.map((m) => textOf(m.axis)), class: 'left'},
   ];
+  if (all.some((m) => listOf(m.also).length > 0)) {
+    columns.push({title: 'the same in other words', cells: all.map(otherWords), class: 'words'});
+  }
   if (before.length > 0) {
     columns.push({title: 'odds before', cells: all.map((m) => shown(odds(earlier, m), '–'))});
   }

@@ -333,8 +333,8 @@ async function check_investigation(page) {
     expect(text.includes(wanted), `the story lacks "${wanted}"`);
   }
   const odds = await page.$$eval('table.odds', (tables) => tables.map((one) => [...one.querySelectorAll('tbody tr')].map(
-      (row) => [...row.cells].slice(2).map((cell) => cell.textContent))));
-  const right = [[['best'], ['0.21']], [['best', 'best'], ['0.21', 'ruled out']]];
+      (row) => [row.cells[2].querySelectorAll('math').length, ...[...row.cells].slice(3).map((cell) => cell.textContent)])));
+  const right = [[[1, 'best'], [0, '0.21']], [[1, 'best', 'best'], [0, '0.21', 'ruled out']]];   // the first is written in two ways
   expect(JSON.stringify(odds) === JSON.stringify(right), `odds: ${JSON.stringify(odds)}`);
   // 4 minutes of dwells and two turns of 6 s.
   const ends = await page.evaluate(() => livePlots.find(({spec}) => spec.id === 'rotation-1').spec.x.values.at(-1));

@@ -1,0 +1,108 @@
+#include "estimator/discovery/law_class.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr double largest_log_odds = 50.0;
+
+bool same_law(const LawTerm& a, const LawTerm& b) {
+  return a.axis == b.axis && a.expression.text() == b.expression.text();
+}
+
+bool nearly(const std::vector<double>& a, const std::vector<double>& b) {
+  constexpr double tolerance = 0.1;  // alternatives of a constant are farther apart
+  return a.empty() || std::abs(a.front() - b.front()) < tolerance * std::abs(b.front());
+}
+
+bool same_value(const LawTerm& a, const LawTerm& b) { return same_law(a, b) && nearly(a.constants, b.constants); }
+
+}  // namespace
+
+LawClass::LawClass(const UnitRecording& like, Candidate own, std::vector<std::vector<Candidate>> others,
+                   double least_odds, const std::stop_token& stop)
+    : own_(std::move(own)), others_(std::move(others)), least_odds_(least_odds), possible_{own_} {
+  for (const std::vector<Candidate>& alternatives : others_) {
+    for (Candidate c : alternatives) {
+      if (is_member(c) && !same_value(c.term, own_.term)) {
+        c.cost += std::log(static_cast<double>(alternatives.size()));
+        possible_.push_back(std::move(c));
+      }
+    }
+  }
+  laws_.reserve(possible_.size());
+  for (const Candidate& c : possible_) {
+    laws_.push_back({c.term, c.coefficient, odds(c)});
+  }
+  elsewhere_ = carry_over(like, laws_, stop);
+}
+
+double LawClass::odds(const Candidate& c) const {
+  return std::exp(std::min(largest_log_odds, c.merit() - own_.merit()));
+}
+
+bool LawClass::is_member(const Candidate& c) const { return c.merit() > own_.merit() + std::log(least_odds_); }
+
+std::size_t LawClass::best_elsewhere() const {
+  std::size_t best = 0;
+  for (std::size_t a = 1; a < possible_.size(); ++a) {
+    const bool most_probable = std::none_of(possible_.begin(), possible_.end(), [&](const Candidate& other) {
+      return same_law(other.term, possible_[a].term) && other.merit() > possible_[a].merit();
+    });
+    best = most_probable && elsewhere_.merit[a] > elsewhere_.merit[best] ? a : best;
+  }
+  return best;
+}
+
+std::vector<Candidate> LawClass::split(bool members) const {
+  std::vector<Candidate> some;
+  if (members) {
+    some.push_back(own_);
+  }
+  for (const Candidate& c : best_of(others_)) {
+    if (!same_law(c.term, own_.term) && is_member(c) == members) {
+      some.push_back(c);
+    }
+  }
+  return some;
+}
+
+std::size_t LawClass::place(const Candidate& c) const {
+  const auto found =
+      std::find_if(possible_.begin(), possible_.end(), [&](const Candidate& p) { return same_value(p.term, c.term); });
+  return static_cast<std::size_t>(found - possible_.begin());
+}
+
+bool LawClass::written_otherwise(const Candidate& a, const Candidate& b) const {
+  const std::size_t of_a = place(a), of_b = place(b), none = possible_.size();
+  return of_a != none && of_b != none && one_function(elsewhere_, laws_, of_a, of_b);
+}
+
+// `own` stands for its function, and the most probable expression for each other one.
+std::vector<ClassMember> LawClass::functions() const {
+  std::vector<std::pair<Candidate, ClassMember>> all;
+  for (const Candidate& c : members()) {
+    const auto same =
+        std::find_if(all.begin(), all.end(), [&](const auto& one) { return written_otherwise(one.first, c); });
+    if (same == all.end()) {
+      all.push_back({c, {c.text(), c.term.axis, odds(c), {}}});
+    } else {
+      same->second.odds += odds(c);
+      same->second.also.push_back(c.text());
+    }
+  }
+  const double own_odds = all.front().second.odds;
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first.cost < b.first.cost; });
+  std::vector<ClassMember> result;
+  result.reserve(all.size());
+  for (auto& [candidate, member] : all) {
+    member.odds /= own_odds;
+    result.push_back(std::move(member));
+  }
+  return result;
+}
+
+}  // namespace selfcal::discovery

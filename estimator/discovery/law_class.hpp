@@ -1,0 +1,48 @@
+// What explains the recordings in the place of a law, and which of that is one function in other words.
+#pragma once
+
+#include <cstddef>
+#include <stop_token>
+#include <vector>
+
+#include "estimator/discovery/carry_over.hpp"
+#include "estimator/discovery/shortlist.hpp"
+
+namespace selfcal::discovery {
+
+class LawClass {
+ public:
+  // `others`: every function that was tried in the place of `own`, each with several values of its constant. `like`: the unit,
+  // its noise and its site. Members have at least `least_odds` against `own`.
+  LawClass(const UnitRecording& like, Candidate own, std::vector<std::vector<Candidate>> others, double least_odds,
+           const std::stop_token& stop);
+
+  // Members with each value of a constant by itself, `own` first, and what holds of them elsewhere.
+  const std::vector<Candidate>& possible() const { return possible_; }
+  const CarryOver& elsewhere() const { return elsewhere_; }
+  // The place in `possible` of what holds elsewhere with the greatest probability. Of values of one constant only the most
+  // probable one is asked: a fit would move the others to it.
+  std::size_t best_elsewhere() const;
+
+  // Each expression once, `own` first.
+  std::vector<Candidate> members() const { return split(true); }
+  std::vector<Candidate> tried_beside() const { return split(false); }
+  // One entry for each function, simplest first.
+  std::vector<ClassMember> functions() const;
+
+ private:
+  double odds(const Candidate& c) const;
+  bool is_member(const Candidate& c) const;
+  std::vector<Candidate> split(bool members) const;
+  std::size_t place(const Candidate& c) const;
+  bool written_otherwise(const Candidate& a, const Candidate& b) const;
+
+  Candidate own_;
+  std::vector<std::vector<Candidate>> others_;
+  double least_odds_;
+  std::vector<Candidate> possible_;
+  std::vector<PossibleLaw> laws_;  // the same, with odds against `own`
+  CarryOver elsewhere_;            // of them
+};
+
+}  // namespace selfcal::discovery
