@@ -130,6 +130,18 @@ class OperatorService::Manager : public sdbus::AdaptorInterfaces<org::selfcal::M
     request.user = caller();
     return static_cast<std::uint64_t>(granted(operations_.amend(request)));
   }
+  std::uint64_t Import(const sdbus::UnixFd& recording, const Entries& given) override {
+    Entries options = given;
+    ImportRequest request;
+    request.file = std::make_shared<OpenFile>(sdbus::UnixFd(recording).release());
+    request.serial = take<std::string>(options, "serial", "");
+    request.source = take<std::string>(options, "source", "");
+    request.ins = take<std::string>(options, "ins", "");
+    request.measured_utc = take<std::string>(options, "measured_utc", "");
+    refuse_others(options);
+    request.user = caller();
+    return static_cast<std::uint64_t>(granted(operations_.import_run(request)));
+  }
   void Abort(const std::string& ins, const std::string& reason) override {
     granted(operations_.abort(ins, fmt::format("aborted by {}{}{}", caller(), reason.empty() ? "" : ": ", reason)));
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/run/calibration_run.hpp"
+#include "daemon/run/imported_run.hpp"
 
 namespace selfcal {
 
@@ -55,6 +56,7 @@ class Operations {
   virtual ~Operations() = default;
   virtual Granted<RunId> start(const StartRequest& request) = 0;
   virtual Granted<RunId> amend(const AmendRequest& request) = 0;
+  virtual Granted<RunId> import_run(const ImportRequest& request) = 0;
   virtual Granted<RunId> rollback(const std::string& serial, const std::string& reason, const std::string& user) = 0;
   virtual Granted<Done> abort(const std::string& ins, const std::string& reason) = 0;
   virtual Granted<std::string> show(RunId run) = 0;

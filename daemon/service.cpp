@@ -153,6 +153,10 @@ void Service::resume_unfinished() {
     return journal::write(journal::Level::error, runs.error().message);
   }
   for (RunRecord run : *runs) {
+    if (!run.source.empty()) {
+      begin_import(std::move(run), nullptr);
+      continue;
+    }
     Session* owner = session(run.ins);
     const auto attached = owner == nullptr || owner->active()
                               ? fail(ErrorKind::device, fmt::format("ins.{} is configured no more", run.ins))

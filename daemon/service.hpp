@@ -15,6 +15,7 @@
 #include "daemon/lcm_publisher.hpp"
 #include "daemon/operator_service.hpp"
 #include "daemon/run/calibration_run.hpp"
+#include "daemon/run/imported_run.hpp"
 #include "daemon/store/run_store.hpp"
 
 namespace selfcal {
@@ -69,6 +70,8 @@ class Service : public Operations, public RunObserver {
 
   Granted<RunId> start(const StartRequest& request) override;
   Granted<RunId> amend(const AmendRequest& request) override;
+  Granted<RunId> import_run(const ImportRequest& request) override;
+  void begin_import(RunRecord record, std::shared_ptr<const OpenFile> file);
   Granted<RunId> rollback(const std::string& serial, const std::string& reason, const std::string& user) override;
   Granted<Done> abort(const std::string& ins, const std::string& reason) override;
   Granted<std::string> show(RunId run) override;
@@ -95,6 +98,7 @@ class Service : public Operations, public RunObserver {
   StateLock lock_;
   std::unique_ptr<RunStore> store_;
   std::map<std::string, Session> sessions_;
+  std::unique_ptr<ImportedRun> import_;  // one at a time
   LcmPublisher publisher_;
   std::unique_ptr<sdbus::IConnection> connection_;
   std::unique_ptr<OperatorService> operator_service_;

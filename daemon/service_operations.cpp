@@ -225,6 +225,10 @@ Granted<RunId> Service::amend(const AmendRequest& request) {
                                 later.started_utc));
     }
   }
+  if (!amended.source.empty()) {
+    return refuse(operator_api::error_nothing,
+                  fmt::format("run {} is an imported recording: selfcal diagnose takes its file", amended.id));
+  }
   Session* chosen = session(amended.ins);
   if (chosen == nullptr) {
     return refuse(operator_api::error_unknown, fmt::format("ins.{} is configured no more", amended.ins));
@@ -319,7 +323,10 @@ Granted<std::string> Service::history(const std::string& serial) {
     return unavailable(runs.error());
   }
   // Limits are those of the place where the INS was calibrated last.
-  const InsConfig* last = runs->empty() ? nullptr : config_.find(runs->back().ins);
+  const InsConfig* last = nullptr;
+  for (const RunRecord& run : *runs) {
+    last = run.source.empty() || !run.ins.empty() ? config_.find(run.ins) : last;
+  }
   auto document = history_document(*store_, serial, last == nullptr ? Limits() : last->limit);
   if (!document) {
     return unavailable(document.error());
@@ -456,7 +463,7 @@ Standing Service::standing(const std::string& ins) const {
     standing.serial = run.serial;
     standing.last_calibration = run.id;
     standing.last_calibration_utc = run.ended_utc;
-    standing.last_calibration_kind = run.rollback ? "rollback" : run.amends != 0 ? "amendment" : "calibration";
+    standing.last_calibration_kind = run_kind(run);
   }
   if (const auto set = store_->set(standing.last_calibration, SetRole::written); set && *set) {
     const auto coefficients = ins::decode_coefficients(**set);

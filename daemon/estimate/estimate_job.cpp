@@ -43,14 +43,21 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
     }
   }
   estimate.recording = recording_path(request.folder).string();
-  const auto suspect = check_recording(*recording);
+  return estimate_of(*recording, std::move(estimate), request.config, progress, stop);
+}
+
+}  // namespace
+
+Expected<Estimate> estimate_of(const Recording& recording, Estimate estimate, const InsConfig& config,
+                               const EstimateProgress& progress, const std::stop_token& stop) {
+  const auto suspect = check_recording(recording);
   if (!suspect) {
     return tl::unexpected(with_warnings(suspect.error(), estimate.warnings));
   }
   estimate.warnings.insert(estimate.warnings.end(), suspect->begin(), suspect->end());
-  const CalibrationOptions options = calibration_options(request.config);
-  const auto result = judged_calibration(*recording, options, request.config.limit, {estimate.recording, 0}, true,
-                                         {progress, {}}, stop);
+  const CalibrationOptions options = calibration_options(config);
+  const auto result =
+      judged_calibration(recording, options, config.limit, {estimate.recording, 0}, true, {progress, {}}, stop);
   if (!result) {
     return tl::unexpected(result.error());
   }
@@ -60,11 +67,9 @@ Expected<Estimate> run_estimate(const EstimateRequest& request, const EstimatePr
   }
   estimate.result = result->result;
   estimate.objections = result->gate.words();
-  estimate.result_json = result_json_text(*result, options, *recording, estimate.warnings, false, *input);
+  estimate.result_json = result_json_text(*result, options, recording, estimate.warnings, false, *input);
   return estimate;
 }
-
-}  // namespace
 
 CalibrationOptions calibration_options(const InsConfig& config) {
   CalibrationOptions options;

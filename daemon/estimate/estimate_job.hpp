@@ -16,6 +16,10 @@ CalibrationOptions calibration_options(const InsConfig& config);
 // All samples of the pages, gap-free from the first; warnings are about saturation.
 Expected<Recording> recording_from_pages(const EstimateRequest& request, std::vector<std::string>& warnings);
 
+// Checks, calibrates and judges it. `estimate` holds its file and the warnings so far.
+Expected<Estimate> estimate_of(const Recording& recording, Estimate estimate, const InsConfig& config,
+                               const EstimateProgress& progress, const std::stop_token& stop);
+
 EstimateJob estimate_job(EstimateRequest request);
 
 // A recording that a run kept, as `selfcal diagnose` would read it.

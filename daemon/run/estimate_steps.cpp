@@ -9,7 +9,7 @@
 #include "daemon/estimate/estimate_job.hpp"
 #include "daemon/host/wall_clock.hpp"
 #include "daemon/run/ins_checks.hpp"
-#include "daemon/store/parameter_trend.hpp"
+#include "daemon/run/measured_parameters.hpp"
 
 namespace selfcal {
 
@@ -81,15 +81,11 @@ void EstimateSteps::judge() {
 }
 
 Expected<void> EstimateSteps::store_result() {
-  RunStore::Parameters parameters;
-  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    const auto index = static_cast<Eigen::Index>(i);
-    parameters.value[i] = data_.estimate->result.value(index) / sensor_parameters[i].si_per_unit;
-    parameters.sigma[i] = data_.estimate->result.sigma(index) / sensor_parameters[i].si_per_unit;
-    parameters.determined[i] = data_.estimate->result.determined[i];
-  }
+  const RunStore::Parameters parameters = measured_parameters(data_.estimate->result);
   journal_.show_estimate(data_.estimate->result.value, data_.estimate->result.sigma);
-  warn_of_history(parameters);
+  for (const std::string& text : history_warnings(store_, journal_.record, utc_now(), parameters, data_.config.limit)) {
+    journal_.warn(text);
+  }
   journal_.record.recording = data_.estimate->recording;
   journal_.record.result_json = data_.estimate->result_json;
   if (auto stored = store_.store_parameters(journal_.record.id, parameters); !stored) {
@@ -139,22 +135,6 @@ Expected<void> EstimateSteps::make_new_set() {
   const auto bytes = ins::encode(fresh);
   data_.new_set.assign(bytes.begin(), bytes.end());
   return store_.store_set(journal_.record.id, SetRole::written, data_.new_set);
-}
-
-void EstimateSteps::warn_of_history(const RunStore::Parameters& parameters) {
-  for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    const auto past = store_.parameter_history(journal_.record.serial, static_cast<int>(i));
-    if (!past) {
-      return;
-    }
-    const ParameterRecord now{journal_.record.id, utc_now(), parameters.value[i], parameters.sigma[i],
-                              parameters.determined[i]};
-    const SensorParameter& parameter = sensor_parameters[i];
-    for (const std::string& text : trend_warnings(std::string(parameter.name), std::string(parameter.unit), *past, now,
-                                                  data_.config.limit[i].value_or(0.0))) {
-      journal_.warn(text);
-    }
-  }
 }
 
 }  // namespace selfcal

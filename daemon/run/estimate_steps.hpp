@@ -27,7 +27,6 @@ class EstimateSteps : public RunSteps {
   void on_estimate(Expected<Estimate> answer);
   Expected<void> store_result();
   Expected<void> make_new_set();
-  void warn_of_history(const RunStore::Parameters& parameters);
 
   Estimators& estimators_;
   RunningSteps& running_;

@@ -29,9 +29,8 @@ Expected<ordered_json> heading(const RunStore& store, const RunRecord& run) {
       {"exit_status", run.exit_status < 0 ? ordered_json() : ordered_json(run.exit_status)},
       {"reason", run.reason},
       {"user", run.user},
-      {"kind", run.rollback      ? "rollback"
-               : run.amends != 0 ? "amendment"
-                                 : "calibration"},
+      {"kind", run_kind(run)},
+      {"source", run.source},
       {"amends", run.amends == 0 ? ordered_json() : ordered_json(run.amends)},
       {"amends_with", run.amends_with},
       {"rolls_back", *undone == 0 ? ordered_json() : ordered_json(*undone)},

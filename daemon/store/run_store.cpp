@@ -62,13 +62,16 @@ CREATE INDEX hub_past_by_serial ON hub_past(serial, arrival);
 CREATE TABLE hub_past_parameters(
   arrival INTEGER NOT NULL REFERENCES hub_past(arrival), name TEXT NOT NULL,
   value REAL NOT NULL, sigma REAL NOT NULL, determined INTEGER NOT NULL, PRIMARY KEY(arrival, name)) WITHOUT ROWID;
+)sql",
+                                  R"sql(
+ALTER TABLE runs ADD COLUMN source TEXT NOT NULL DEFAULT '';
 )sql"};
 constexpr auto schema_version = static_cast<std::int64_t>(schema_steps.size());
 
 constexpr std::string_view run_columns =
     "id, ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, started_utc, ended_utc, "
     "software, exit_status, reason, abort_wanted, rotation, recording, result_json, drift_old_m, drift_new_m, "
-    "stop_when_met, early_end_s, amends, amends_with";
+    "stop_when_met, early_end_s, amends, amends_with, source";
 
 constexpr const char* final_states = "('completed','refused','failed','aborted')";
 
@@ -123,6 +126,7 @@ RunRecord read_run(Statement& row) {
   run.early_end_s = row.real();
   run.amends = row.integer();
   run.amends_with = numbers_of(row.text());
+  run.source = row.text();
   return run;
 }
 
@@ -182,6 +186,10 @@ Expected<Handle> open_handle(const std::filesystem::path& file, int flags) {
 
 }  // namespace
 
+std::string_view run_kind(const RunRecord& run) {
+  return run.rollback ? "rollback" : run.amends != 0 ? "amendment" : !run.source.empty() ? "recording" : "calibration";
+}
+
 Expected<std::unique_ptr<RunStore>> RunStore::open(const std::filesystem::path& file) {
   auto database = open_handle(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   if (!database) {
@@ -220,12 +228,12 @@ Expected<RunId> RunStore::create_run(const RunRecord& run) {
       database_,
       "INSERT INTO runs(ins, serial, ins_software, state, user, schedule, dry_run, force_reason, rollback, "
       "started_utc, ended_utc, software, exit_status, reason, abort_wanted, rotation, recording, "
-      "result_json, drift_old_m, drift_new_m, stop_when_met, amends, amends_with) "
-      "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,'','',-1,-1,?,?,?)");
+      "result_json, drift_old_m, drift_new_m, stop_when_met, amends, amends_with, source) "
+      "VALUES(?,?,?,?,?,?,?,?,?,?,'',?,-1,'',0,0,?,'',-1,-1,?,?,?,?)");
   insert.bind(run.ins).bind(run.serial).bind(run.ins_software).bind(std::string(name(run.state))).bind(run.user);
   insert.bind(run.schedule).bind(std::int64_t{run.dry_run}).bind(run.force_reason).bind(std::int64_t{run.rollback});
-  insert.bind(run.started_utc).bind(run.software).bind(std::int64_t{run.stop_when_met});
-  insert.bind(run.amends).bind(text_of(run.amends_with));
+  insert.bind(run.started_utc).bind(run.software).bind(run.recording).bind(std::int64_t{run.stop_when_met});
+  insert.bind(run.amends).bind(text_of(run.amends_with)).bind(run.source);
   if (auto ok = insert.run(); !ok) {
     return tl::unexpected(ok.error());
   }
@@ -331,11 +339,12 @@ Expected<std::optional<std::vector<std::uint8_t>>> RunStore::set(RunId run, SetR
 
 // Of this set and, as run 0, of others of the depot: what the hub told of them.
 Expected<std::vector<ParameterRecord>> RunStore::parameter_history(const std::string& serial, int index) const {
-  Statement select(database_,
-                   "SELECT r.id, r.ended_utc AS utc, p.value, p.sigma, p.determined FROM parameters p JOIN runs r ON "
-                   "p.run=r.id WHERE r.serial=?1 AND r.state='completed' AND r.dry_run=0 AND p.name=?2 UNION ALL "
-                   "SELECT 0, h.utc, p.value, p.sigma, p.determined FROM hub_past_parameters p JOIN hub_past h ON "
-                   "p.arrival=h.arrival WHERE h.serial=?1 AND p.name=?2 ORDER BY utc, 1");
+  Statement select(
+      database_,
+      "SELECT r.id, r.ended_utc AS utc, p.value, p.sigma, p.determined FROM parameters p JOIN runs r ON "
+      "p.run=r.id WHERE r.serial=?1 AND r.state='completed' AND (r.dry_run=0 OR r.source<>'') AND p.name=?2 UNION ALL "
+      "SELECT 0, h.utc, p.value, p.sigma, p.determined FROM hub_past_parameters p JOIN hub_past h ON "
+      "p.arrival=h.arrival WHERE h.serial=?1 AND p.name=?2 ORDER BY utc, 1");
   select.bind(serial).bind(std::string(sensor_parameters.at(static_cast<std::size_t>(index)).name));
   std::vector<ParameterRecord> history;
   while (true) {

@@ -27,13 +27,14 @@ struct RunRecord {
   std::string ins_software;
   State state = State::connecting;
   std::string user;
-  std::string schedule;  // as asked for: name or file
-  bool dry_run = false;
+  std::string schedule;            // as asked for: name or file
+  bool dry_run = false;            // writes no set; an imported recording never does
   std::string force_reason;        // empty: not forced
   bool rollback = false;           // writes a former set instead of calibrating
   RunId amends = 0;                // estimates this run's recording again, with the physics named in it; 0: none
   std::vector<RunId> amends_with;  // further runs of the same INS whose recordings are looked at together with it
   bool stop_when_met = false;      // the rotation may end as soon as every tolerance is met
+  std::string source;              // of a recording that was imported as a run: nothing was asked of an INS, or written
   std::string started_utc, ended_utc;
   std::string software;  // of the daemon
   int exit_status = -1;  // -1: not ended
@@ -48,6 +49,8 @@ struct RunRecord {
 
 // Its coefficients went into force.
 inline bool wrote_its_set(const RunRecord& run) { return run.state == State::completed && !run.dry_run; }
+// "calibration", "amendment", "rollback" or "recording".
+std::string_view run_kind(const RunRecord& run);
 
 struct EventRecord {
   std::string utc;
@@ -89,7 +92,7 @@ class RunStore {
   Expected<std::vector<RunRecord>> runs_of_serial(const std::string& serial) const;  // empty serial: of all
   Expected<std::vector<EventRecord>> events(RunId run) const;
   Expected<std::optional<std::vector<std::uint8_t>>> set(RunId run, SetRole role) const;
-  // Oldest first; completed runs that wrote their set.
+  // Oldest first; completed runs that wrote their set, and recordings that were imported as runs.
   Expected<std::vector<ParameterRecord>> parameter_history(const std::string& serial, int index) const;
   Expected<std::vector<RunRecord>> runs_with_recordings() const;  // oldest first
 

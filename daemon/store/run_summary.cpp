@@ -13,10 +13,6 @@ std::string sentence(const std::string& clause) {
   return clause.empty() || clause.ends_with(".") ? clause : clause + ".";
 }
 
-const char* kind_of(const RunRecord& run) {
-  return run.rollback ? "rollback" : run.amends != 0 ? "amendment" : "calibration";
-}
-
 std::string drift_text(const RunRecord& run) {
   if (run.drift_old_m < 0 || run.drift_new_m < 0) {
     return {};
@@ -59,6 +55,10 @@ Summary completed_summary(const RunRecord& run, const InForce& force, RunId roll
             in_force_text(run, force),
             sentence(undone.empty() ? run.force_reason : undone + ": " + run.force_reason),
             {}};
+  }
+  if (!run.source.empty()) {
+    return {result.standing, sentence("Not calibrated over the bus, nothing was written: " + result.verdict),
+            sentence(result.cause.empty() ? "Imported from " + run.source : result.cause), report_command(run)};
   }
   if (run.dry_run) {
     return {result.standing, sentence("Dry run, nothing was written: " + result.verdict), result.cause,
@@ -152,22 +152,25 @@ Summary run_summary(const RunRecord& run, const InForce& force, RunId rolled_bac
     case State::completed: return completed_summary(run, force, rolled_back, result, document);
     case State::refused:
       return {SummaryStanding::bad, "Not written: " + (result.verdict.empty() ? sentence(run.reason) : result.verdict),
-              result.cause, next_of(result, run, document)};
+              result.cause, run.source.empty() ? next_of(result, run, document) : report_command(run)};
     case State::aborted:
-      return {SummaryStanding::open,
-              fmt::format("This {} was stopped before it wrote anything: the former set stays in force.", kind_of(run)),
-              sentence(run.reason),
-              fmt::format("selfcal {}", run.rollback      ? "rollback " + run.serial + " --reason REASON"
-                                        : run.amends != 0 ? fmt::format("amend {}", run.amends)
-                                                          : "run " + run.ins)};
+      return {
+          SummaryStanding::open,
+          fmt::format("This {} was stopped before it wrote anything: the former set stays in force.", run_kind(run)),
+          sentence(run.reason),
+          fmt::format("selfcal {}", run.rollback      ? "rollback " + run.serial + " --reason REASON"
+                                    : run.amends != 0 ? fmt::format("amend {}", run.amends)
+                                                      : "run " + run.ins)};
     case State::failed:
-      return {SummaryStanding::bad, fmt::format("This {} failed before its set was confirmed in force.", kind_of(run)),
+      return {SummaryStanding::bad,
+              run.source.empty() ? fmt::format("This {} failed before its set was confirmed in force.", run_kind(run))
+                                 : "This recording gives no result.",
               sentence(run.reason), fmt::format("selfcal show {}", run.id)};
     default:
       return {SummaryStanding::open,
               fmt::format("Run {} is under way: {}.", run.id, words(run.state)),
               {},
-              "selfcal status " + run.ins};
+              run.source.empty() ? "selfcal status " + run.ins : fmt::format("selfcal show {}", run.id)};
   }
 }
 

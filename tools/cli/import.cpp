@@ -12,6 +12,7 @@
 #include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/convert.hpp"
+#include "tools/cli/import_as_run.hpp"
 #include "tools/cli/output_file.hpp"
 
 namespace selfcal::cli {
@@ -25,6 +26,8 @@ struct ImportArguments {
   std::string map;
   bool guess = false;
   import::GuessKnowledge known;
+  bool as_run = false;
+  AsRun run;
 };
 
 // Builds, checks, writes; then says what was done.
@@ -155,7 +158,7 @@ Expected<int> guess_and_import(const ImportArguments& arguments) {
   return write_mapped(**source, *map, text, arguments);
 }
 
-Expected<int> run_import(const ImportArguments& arguments) {
+Expected<int> convert_to_recording(const ImportArguments& arguments) {
   if (arguments.to.empty() && !arguments.guess) {
     return fail(ErrorKind::usage, "--output is required, or --guess");
   }
@@ -174,11 +177,30 @@ Expected<int> run_import(const ImportArguments& arguments) {
                  [](const Recording& recording, const std::filesystem::path& to) { return write_hdf5(recording, to); });
 }
 
+bool is_recording(const std::string& file) { return file.ends_with(".h5") || file.ends_with(".hdf5"); }
+
+Expected<int> run_import(const ImportArguments& arguments) {
+  const AsRun& run = arguments.run;
+  if (!arguments.as_run) {
+    const bool of_a_run = run.json || !run.serial.empty() || !run.source.empty() || !run.ins.empty();
+    return of_a_run ? fail(ErrorKind::usage, "--serial, --source, --ins and --json belong to --as-run")
+                    : convert_to_recording(arguments);
+  }
+  if (arguments.to.empty() && is_recording(arguments.from)) {
+    return import_as_run(arguments.from, arguments.from, run);
+  }
+  if (arguments.to.empty()) {
+    return fail(ErrorKind::usage, "--output is required: the recording that becomes a run");
+  }
+  const Expected<int> converted = convert_to_recording(arguments);
+  return converted && *converted == 0 ? import_as_run(arguments.to, arguments.from, run) : converted;
+}
+
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<ImportArguments>();
   options.text("FILE", arguments->from,
                "with --map or --guess: text with any delimiter, plain or gzip, .npy, .npz, .mat; else CSV with its "
-               "attributes in a TOML file of the same stem",
+               "attributes in a TOML file of the same stem; with --as-run also a recording (.h5)",
                Needed::yes);
   options.text("-o,--output", arguments->to, "HDF5 file to write: .h5 or .hdf5");
   options.text("--map", arguments->map,
@@ -192,6 +214,16 @@ CommandRun configure(Options& options) {
   options.number("--height", arguments->known.height_m, range::height, "for --guess: height above the ellipsoid, m");
   options.number("--rate", arguments->known.sample_rate_hz, range::sample_rate,
                  "for --guess: sample rate, Hz, of a file without time");
+  options.flag(
+      "--as-run", arguments->as_run,
+      "then hand the recording to the service: it enters the history as a run, estimated and judged; nothing is "
+      "written to an INS");
+  options.text("--serial", arguments->run.serial,
+               "with --as-run: serial number of the INS, where the recording names none");
+  options.text("--source", arguments->run.source, "with --as-run: who recorded it, and with what");
+  options.text("--ins", arguments->run.ins,
+               "with --as-run: the INS of selfcald.toml whose tolerances and limits are meant");
+  options.flag("--json", arguments->run.json, "with --as-run: the run's document on standard output");
   return [arguments] { return run_import(*arguments); };
 }
 

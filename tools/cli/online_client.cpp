@@ -79,6 +79,9 @@ Expected<std::uint64_t> ManagerClient::amend(std::uint64_t run, const Entries& o
 Expected<void> ManagerClient::abort(const std::string& ins, const std::string& reason) {
   return call([&] { proxy_->Abort(ins, reason); });
 }
+Expected<std::uint64_t> ManagerClient::import_recording(int descriptor, const Entries& options) {
+  return call([&] { return proxy_->Import(sdbus::UnixFd(descriptor), options); });
+}
 Expected<std::uint64_t> ManagerClient::rollback(const std::string& serial, const std::string& reason) {
   return call([&] { return proxy_->Rollback(serial, reason); });
 }

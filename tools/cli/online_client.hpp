@@ -24,6 +24,7 @@ class ManagerClient {
   Expected<std::uint64_t> start(const std::string& ins, const Entries& options);
   Expected<std::uint64_t> amend(std::uint64_t run, const Entries& options);
   Expected<void> abort(const std::string& ins, const std::string& reason);
+  Expected<std::uint64_t> import_recording(int descriptor, const Entries& options);
   Expected<std::uint64_t> rollback(const std::string& serial, const std::string& reason);
   Expected<std::string> show(std::uint64_t run);
   Expected<std::string> history(const std::string& serial);

@@ -82,7 +82,7 @@ void add_memory(Json& ins, const Json& runs) {
       ins["in_force"] = {
           {"run", run.at("run")}, {"kind", run.at("kind")}, {"from_utc", run.at("in_force").at("from_utc")}};
     }
-    if (run.at("kind") != "rollback" && !run.at("exit_status").is_null()) {
+    if (run.at("kind") != "rollback" && run.at("kind") != "recording" && !run.at("exit_status").is_null()) {
       ins["last_calibration"] = {
           {"run", run.at("run")}, {"state", run.at("state")}, {"ended_utc", run.at("ended_utc")}};
     }

@@ -8,15 +8,13 @@
 #include "tools/cli/command.hpp"
 #include "tools/cli/online_client.hpp"
 #include "tools/cli/online_follow.hpp"
+#include "tools/cli/online_run.hpp"
 #include "tools/cli/online_text.hpp"
 #include "tools/cli/terminal.hpp"
 
 namespace selfcal::cli {
-namespace {
 
-// The last that is seen of a run: three sentences in six lines at most. What went wrong is also one line on standard
-// error, where that is not the same screen.
-Expected<int> report(ManagerClient& manager, std::uint64_t run, const Ending& ending, bool json) {
+Expected<int> report_ending(ManagerClient& manager, std::uint64_t run, const Ending& ending, bool json) {
   const auto document = manager.show(run);
   if (!document) {
     return tl::unexpected(document.error());
@@ -29,6 +27,8 @@ Expected<int> report(ManagerClient& manager, std::uint64_t run, const Ending& en
   }
   return ending.exit_status;
 }
+
+namespace {
 
 struct RunOptions {
   std::string ins, schedule, force;
@@ -72,7 +72,7 @@ Expected<int> run(const RunOptions& options) {
   if (!ending) {
     return tl::unexpected(ending.error());
   }
-  return report(**manager, *id, *ending, options.json);
+  return report_ending(**manager, *id, *ending, options.json);
 }
 
 CommandRun configure_run(Options& options) {
@@ -101,7 +101,7 @@ Expected<int> follow_begun(ManagerClient& manager, const Expected<std::uint64_t>
   if (!ending) {
     return tl::unexpected(ending.error());
   }
-  return report(manager, *id, *ending, json);
+  return report_ending(manager, *id, *ending, json);
 }
 
 struct AmendOptions {

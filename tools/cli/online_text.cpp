@@ -163,7 +163,8 @@ std::string who_and_when(const json& run) {
   if (run.value("amends", json()).is_number()) {
     text += fmt::format(", of run {}'s recording", run.at("amends").get<int>());
   }
-  return text + (run.at("dry_run").get<bool>() ? ", dry run\n" : "\n");
+  const bool imported = text_of(run, "kind") == "recording";
+  return text + (run.at("dry_run").get<bool>() && !imported ? ", dry run\n" : "\n");
 }
 
 std::string facts(const json& run) {
@@ -171,6 +172,9 @@ std::string facts(const json& run) {
   if (run.at("early_end_s").is_number()) {
     text += fmt::format("rotation ended early, after {:.0f} s: every tolerance was met\n",
                         run.at("early_end_s").get<double>());
+  }
+  if (!text_of(run, "source").empty()) {
+    text += fmt::format("source: {}; not calibrated over the bus\n", text_of(run, "source"));
   }
   if (!text_of(run, "reason").empty()) {
     text += fmt::format("ended: {}\n", text_of(run, "reason"));
@@ -210,6 +214,9 @@ std::string history_kind(const json& run) {
   }
   if (run.value("amends", json()).is_number()) {
     text += fmt::format(" of run {}", run.at("amends").get<int>());
+  }
+  if (!text_of(run, "source").empty()) {
+    text += fmt::format(" from {}", text_of(run, "source"));
   }
   if (run.contains("in_force") && run.at("in_force").value("now", false)) {
     text += ", in force";

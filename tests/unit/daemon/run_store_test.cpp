@@ -98,7 +98,9 @@ TEST_F(RunStoreTest, AnOlderDatabaseIsTakenOver) {
   change(
       "DROP TRIGGER run_ended; DROP TABLE outbox; DROP TABLE hub_past_parameters; DROP TABLE hub_past; "
       "ALTER TABLE runs DROP COLUMN stop_when_met; ALTER TABLE runs DROP COLUMN early_end_s; "
-      "ALTER TABLE runs DROP COLUMN amends; ALTER TABLE runs DROP COLUMN amends_with; PRAGMA user_version=1");
+      "ALTER TABLE runs DROP COLUMN amends; ALTER TABLE runs DROP COLUMN amends_with; ALTER TABLE runs DROP COLUMN "
+      "source; "
+      "PRAGMA user_version=1");
   auto store = open();
   const auto found = *store->run(run.id);
   ASSERT_TRUE(found);
@@ -127,8 +129,8 @@ TEST_F(RunStoreTest, ARunThatEndsStandsInTheOutboxOnce) {
   EXPECT_EQ(outbox(), "1:2 2:1 ");
   store.reset();
   change(
-      "DROP TABLE outbox; DROP TABLE hub_past; DROP TABLE hub_past_parameters; DROP TRIGGER run_ended; PRAGMA "
-      "user_version=4");
+      "DROP TABLE outbox; DROP TABLE hub_past; DROP TABLE hub_past_parameters; DROP TRIGGER run_ended; "
+      "ALTER TABLE runs DROP COLUMN source; PRAGMA user_version=4");
   store = open();
   EXPECT_EQ(outbox(), "1:1 2:2 ");
 }

@@ -72,6 +72,7 @@ function showRun(report) {
   }
   const parts = [`Run ${textOf(run.run)} of ${textOf(run.ins)}, ${textOf(run.kind) || 'calibration'} by ${textOf(run.user)}, schedule ${textOf(run.schedule) || '–'}, `
       + `${textOf(run.started_utc)} to ${textOf(run.ended_utc) || 'now'}: ${textOf(run.state)}`];
+  if (run.source) parts.push(`; not calibrated over the bus: recording of ${textOf(run.source)}`);
   if (run.reason) parts.push(`: ${textOf(run.reason)}`);
   if (run.force_reason) parts.push(`; forced: ${textOf(run.force_reason)}`);
   if (driftKnown(run)) {
