@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -37,6 +38,14 @@ struct SharedMemory {
 using Work = std::function<bool(int descriptor)>;
 using Refusal = std::function<bool(int descriptor, Error error)>;
 
+// Whoever asked is gone: nobody wants the answer, and what this process inherited (locks among it) must be free again.
+void end_with(pid_t parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) {
+    ::_exit(1);
+  }
+}
+
 [[noreturn]] void run_child(int descriptor, const std::string& name, const Work& work, const Refusal& refuse) {
   // Death by signal is an answer here: no handler of the caller's, no core file, no words of its own.
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGINT, SIGTERM}) {
@@ -60,12 +69,14 @@ using Refusal = std::function<bool(int descriptor, Error error)>;
 // Runs WORK in a child and waits for its end.
 Expected<void> run_isolated(const SharedMemory& memory, const std::string& name, const Work& work,
                             const Refusal& refuse) {
+  const pid_t parent = ::getpid();
   const pid_t child = memory.descriptor < 0 ? -1 : ::fork();
   if (child < 0) {
     return fail(ErrorKind::internal,
                 fmt::format("{}: cannot start a process to read it: {}", name, std::strerror(errno)));
   }
   if (child == 0) {
+    end_with(parent);
     run_child(memory.descriptor, name, work, refuse);
   }
   int status = 0;
