@@ -3,8 +3,7 @@
 // With z_A the whitened signature of the law as found and z_B that of a rival, the rival fitted in its place leaves a misfit
 // of |z_A|^2 - (z_A . z_B)^2 / |z_B|^2, summed over the recording and the planned one: the square of the separation in sigma.
 // A planned recording needs no data for that (diagnosis/ideal_recording.hpp). Half the square is the expected logarithm of
-// the odds. The plan is taken that tells apart most of the class's probability: members that are one function everywhere, such as two
-// names of one quantity, cost every plan alike and stop none.
+// the odds. The plan is taken that tells apart most of the class's probability, and of those the shortest (plan_search.hpp).
 #pragma once
 
 #include <optional>
@@ -27,8 +26,7 @@ struct NextExperiment {
   std::string closest;      // that rival
 };
 
-// Of a few plans the one that tells most apart, given the recordings that there are. None where the class has one member, or no
-// plan helps. The base stands as in the last recording.
+// The plan that tells most apart, given the recordings that there are. None where the class has one member, or no plan helps. The base stands as in the last recording.
 std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> recordings, const DiscoveredLaw& law,
                                               const ExperimentLimits& limits, const std::stop_token& stop = {});
 

@@ -185,16 +185,16 @@ sim::SimConfig other_installation(const sim::SimConfig& config) {
   return other;
 }
 
-Expected<Schedule> random_plan(std::uint64_t seed) {
+Expected<Schedule> random_plan(std::uint64_t seed, double length_s) {
   constexpr std::uint64_t stream = 7;
-  constexpr double length_s = 3000.0, step_deg = 45.0;
+  constexpr double step_deg = 45.0;
   Random random(seed, stream);
   Schedule plan;
   plan.rotation_s = 5.0;
   double outer = 0.0, inner = 0.0, spent_s = 0.0;
   while (spent_s < length_s) {
     plan.positions.push_back({outer, inner});
-    plan.dwell_s.push_back(random.uniform(60.0, 150.0));
+    plan.dwell_s.push_back(std::min(random.uniform(60.0, 150.0), std::max(1.0, length_s - spent_s)));
     spent_s += plan.dwell_s.back() + plan.rotation_s;
     const double before_outer = outer, before_inner = inner;
     while (outer == before_outer && inner == before_inner) {

@@ -37,8 +37,8 @@ std::vector<Recipe> recipes(int laws, int pairs, int processes, int clean, int f
 // The plan that no case is recorded on: 20 positions at 45 and 135 degrees, the base at another attitude.
 Schedule other_plan();
 sim::SimConfig other_installation(const sim::SimConfig& config);
-// A rotation that nobody designed, as long as a designed one: positions 45 degrees apart, at random.
-Expected<Schedule> random_plan(std::uint64_t seed);
+// A rotation that nobody designed: positions 45 degrees apart, at random.
+Expected<Schedule> random_plan(std::uint64_t seed, double length_s);
 // These errors (SI) whatever the seed: the same unit recorded again.
 void keep_errors(sim::SimConfig& config, const sim::SensorErrors& errors);
 

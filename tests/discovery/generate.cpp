@@ -1,7 +1,9 @@
 // Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
 //
 //   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE   one JSON line a case, as far as missing
-//   selfcal_discovery_generate record KEY NUMBER FILE [PLAN] the recording of a case; on another schedule: a file, or "random"
+//   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
+//   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
+//                                                            another schedule: a file, or "random:SECONDS"
 //   selfcal_discovery_generate left KEY NUMBER LAWS.toml     share of the misfit's power that these laws leave on a plan
 //                                                            that was never used: |true - told|^2 / |true|^2
 #include <fmt/format.h>
@@ -147,37 +149,49 @@ int print_left(const Case& c, const std::string& laws) {
   return 0;
 }
 
+// "random:SECONDS" or the name of a file.
+Expected<Schedule> schedule_called(const std::string& name, std::uint64_t seed) {
+  const std::string random = "random:";
+  if (!name.starts_with(random)) {
+    return read_schedule(name);
+  }
+  const auto length = to_number(name.c_str() + random.size());
+  return length ? discovery_trial::random_plan(seed, *length)
+                : fail(ErrorKind::usage, fmt::format("{}: no length in seconds", name));
+}
+
+// The errors stay, the noise is another.
+int write_again(Case c, const std::string& path, int time, const std::string& plan) {
+  const auto schedule = schedule_called(plan, c.seed + 1000U * static_cast<std::uint64_t>(time));
+  const auto errors = sim::true_sensor_errors(c.config, c.seed);
+  if (!schedule || !errors) {
+    return complain(schedule ? errors.error() : schedule.error());
+  }
+  discovery_trial::keep_errors(c.config, *errors);
+  c.schedule = *schedule;
+  c.seed += 1000000000000U * static_cast<std::uint64_t>(time);
+  return write_record(c, path);
+}
+
 int run(std::span<char*> arguments) {
   const std::string verb = arguments.size() > 1 ? arguments[1] : "";
   if (verb == "key" && arguments.size() == 9) {
     return write_key(arguments.subspan(2));
   }
-  const bool elsewhere = verb == "record" && arguments.size() == 6;
-  if ((elsewhere || ((verb == "record" || verb == "left") && arguments.size() == 5)) && to_number(arguments[3])) {
-    auto c = case_in(arguments[2], *to_number(arguments[3]));
+  const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
+  if ((again || ((verb == "record" || verb == "left") && arguments.size() == 5)) && to_number(arguments[3])) {
+    const auto c = case_in(arguments[2], *to_number(arguments[3]));
     if (!c) {
       return complain(c.error());
     }
-    if (elsewhere) {
-      const std::string plan = arguments[5];
-      const auto schedule = plan == "random" ? discovery_trial::random_plan(c->seed) : read_schedule(plan);
-      if (!schedule) {
-        return complain(schedule.error());
-      }
-      // The same unit on the same base, later: other noise, the same errors.
-      const auto errors = sim::true_sensor_errors(c->config, c->seed);
-      if (!errors) {
-        return complain(errors.error());
-      }
-      discovery_trial::keep_errors(c->config, *errors);
-      c->schedule = *schedule;
-      ++c->seed;
+    if (again) {
+      return write_again(*c, arguments[4], *to_number(arguments[5]), arguments[6]);
     }
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
   fmt::print(stderr,
              "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE | "
-             "record KEY NUMBER FILE [PLAN] | left KEY NUMBER LAWS.toml\n");
+             "record KEY NUMBER FILE | again KEY NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 

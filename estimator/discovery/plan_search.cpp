@@ -1,0 +1,103 @@
+#include "estimator/discovery/plan_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <utility>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr std::array<double, 3> dwells_s = {60.0, 100.0, 150.0};
+constexpr std::array<double, 5> lengths = {0.1, 0.2, 0.4, 0.7, 1.0};  // of the longest rotation
+constexpr int drawn_plans = 6;
+constexpr int changes = 30;
+constexpr double enough = 0.9;         // of what could be gained
+constexpr double worth_longer = 0.03;  // of merit
+constexpr double farthest_deg = 360.0;
+constexpr double grid_deg = 45.0;
+constexpr double least_dwell_s = 40.0, dwell_step_s = 30.0;
+
+Schedule drawn(ExperimentLimits limits, unsigned k) {
+  limits.rotation_s *= k % 2 == 0 ? 1.0 : 2.0;  // another turn rate splits what depends on it
+  Schedule plan = walk_over_positions(limits, dwells_s[k % dwells_s.size()], 20261122U + k);
+  if (k % dwells_s.size() == 1) {  // and dwells that differ what depends on time since a turn
+    for (std::size_t d = 0; d < plan.dwell_s.size(); ++d) {
+      plan.dwell_s[d] = dwells_s[d % dwells_s.size()];
+    }
+  }
+  return plan;
+}
+
+class Changes {
+ public:
+  explicit Changes(const ExperimentLimits& limits) : limits_(limits) {}
+
+  // One position elsewhere, or some time of one dwell given to another; the plan itself where that cannot be.
+  Schedule change(Schedule plan) {
+    const auto count = static_cast<int>(plan.positions.size());
+    if (below(3) > 0) {
+      const auto k = static_cast<std::size_t>(1 + below(count - 1));
+      GimbalPosition to = plan.positions[k];
+      (below(2) == 0 ? to.outer_deg : to.inner_deg) += grid_deg * (below(2) == 0 ? -1.0 : 1.0) * (1 + below(2));
+      const bool within = std::abs(to.outer_deg) <= farthest_deg && std::abs(to.inner_deg) <= farthest_deg;
+      const bool from_before = can_move(plan.positions[k - 1], to);
+      const bool to_next = k + 1 == plan.positions.size() || can_move(to, plan.positions[k + 1]);
+      if (within && from_before && to_next) {
+        plan.positions[k] = to;
+      }
+    } else {
+      const auto from = static_cast<std::size_t>(below(count)), to = static_cast<std::size_t>(below(count));
+      if (plan.dwell_s[from] - dwell_step_s >= least_dwell_s) {
+        plan.dwell_s[from] -= dwell_step_s;
+        plan.dwell_s[to] += dwell_step_s;
+      }
+    }
+    return plan;
+  }
+
+ private:
+  int below(int n) { return static_cast<int>(engine_() % static_cast<unsigned>(n)); }
+
+  bool can_move(const GimbalPosition& a, const GimbalPosition& b) const {
+    const double outer = std::abs(a.outer_deg - b.outer_deg), inner = std::abs(a.inner_deg - b.inner_deg);
+    return outer + inner > 0.0 && std::max(outer, inner) <= limits_.largest_move_deg;
+  }
+
+  const ExperimentLimits& limits_;
+  std::mt19937 engine_{20261123U};  // the standard fixes its bits
+};
+
+}  // namespace
+
+RatedPlan search_plan(const ExperimentLimits& limits, double merit_now,
+                      const std::function<double(const Schedule&)>& merit, const std::stop_token& stop) {
+  const double wanted = merit_now + enough * (1.0 - merit_now);
+  RatedPlan best{{}, merit_now};
+  for (const double length : lengths) {
+    ExperimentLimits shorter = limits;
+    shorter.duration_s *= length;
+    Changes changed(limits);
+    RatedPlan here{{}, merit_now};
+    for (unsigned k = 0; k < drawn_plans + changes && here.merit < wanted && !stop.stop_requested(); ++k) {
+      if (k >= drawn_plans && here.plan.positions.empty()) {
+        break;
+      }
+      RatedPlan next{k < drawn_plans ? drawn(shorter, k) : changed.change(here.plan), 0.0};
+      next.merit = merit(next.plan);
+      if (next.merit > here.merit) {
+        here = std::move(next);
+      }
+    }
+    if (here.merit > best.merit + worth_longer) {
+      best = std::move(here);
+    }
+    if (best.merit >= wanted || stop.stop_requested()) {
+      break;
+    }
+  }
+  return best;
+}
+
+}  // namespace selfcal::discovery
