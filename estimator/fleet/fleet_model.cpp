@@ -15,77 +15,95 @@ using Eigen::VectorXd;
 
 // Variances are found to half of the last factor, 2 %: their own uncertainty with 500 units is several times that.
 const Climb climbing{{4.0, 1.5, 1.1, 1.04}, 12, 20, 1e-3, 1e6};
-constexpr std::size_t units_for_variances = 150;  // more change them by less than their own uncertainty
-constexpr double mad_to_sd = 1.4826;              // of a normal distribution
+const Climb polishing{{1.04}, 12, 20, 1e-3, 1e6};
+// More change the variances by less than their own uncertainty; fewer measurements tell a walk from what comes back badly.
+constexpr std::size_t units_for_variances = 150, measurements_for_variances = 15'000;
+constexpr double mad_to_sd = 1.4826;  // of a normal distribution
+constexpr int figures_of_return = 4;  // v0, its spread, wander_sd, T
 
-// Standard deviations of (F1) in the order unit, ramp, walk, set-up.
-using Deviations = std::array<double, 4>;
-
-// The filter of (F1) as a sequence of gains: it depends on times and sigmas alone, so that any number of columns (values, and
-// what fixed effects and sets contribute to them) share it. Whitened innovations of all columns are handed to `take`.
-template <typename Fill, typename Take>
-void whiten(const UnitHistory& unit, const Deviations& sd, Eigen::Index columns, Fill fill, Take take) {
-  double p00 = sd[0] * sd[0], p01 = 0.0, p11 = sd[1] * sd[1];
-  Eigen::RowVectorXd level = Eigen::RowVectorXd::Zero(columns), ramp = level, row = level;
+// Whitened innovations of any number of columns (values, and what fixed effects and sets contribute to them), which share the
+// filter's gains, are handed to `take`.
+template <int Columns, typename Fill, typename Take>
+void whiten(const UnitHistory& unit, const Ageing& ageing, Eigen::Index columns, Fill fill, Take take) {
+  using Row = Eigen::Matrix<double, 1, Columns>;
+  Row level = Row::Zero(columns), ramp = level, returning = level, row = level;
+  UnitCovariance covariance(ageing);
   double year = unit.empty() ? 0.0 : unit.front().year;
   const double first = year;
   for (const Measurement& m : unit) {
-    const double dt = m.year - year;
+    level += (m.year - year) * ramp;
+    returning *= covariance.advance(m.year - year);
     year = m.year;
-    level += dt * ramp;
-    p00 += dt * (2.0 * p01 + dt * p11) + sd[2] * sd[2] * dt;
-    p01 += dt * p11;
-    const double variance = p00 + sd[3] * sd[3] + m.sigma * m.sigma;
+    const double noise = ageing.setup_sd * ageing.setup_sd + m.sigma * m.sigma;
+    const double variance = covariance.variance() + noise;
     row.setZero();
     fill(m, m.year - first, row);
-    row -= level;
-    const double k0 = p00 / variance, k1 = p01 / variance;
-    level += k0 * row;
-    ramp += k1 * row;
-    p11 -= k1 * p01;
-    p01 -= k1 * p00;
-    p00 -= k0 * p00;
+    row -= level + returning;
+    const auto gain = covariance.take(noise);
+    level += gain[0] * row;
+    ramp += gain[1] * row;
+    returning += gain[2] * row;
     take(row, variance);
   }
 }
 
-// Columns value, 1, t; but for a constant.
-double log_restricted_likelihood(std::span<const UnitHistory* const> units, const std::vector<double>& offsets,
-                                 const Deviations& sd) {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+// How v0 shows after so many years.
+double settled(const Ageing& ageing, double years) { return std::exp(-years / ageing.return_years); }
+
+struct Likelihood {
+  double profile = -HUGE_VAL;     // of the variances, at the best fixed effects; but for a constant
+  double restricted = -HUGE_VAL;  // REML
+};
+
+// Fixed effects: 1, t, and with three of them what v0 leaves.
+template <int Fixed>
+Likelihood log_likelihood(std::span<const UnitHistory* const> units, const std::vector<double>& offsets,
+                          const Ageing& ageing) {
+  using Normal = Eigen::Matrix<double, Fixed + 1, Fixed + 1>;
+  Normal normal = Normal::Zero();
   double log_variance = 0.0;
   for (const UnitHistory* unit : units) {
-    whiten(
-        *unit, sd, 3,
-        [&](const Measurement& m, double t, Eigen::RowVectorXd& row) {
-          row << m.value - offsets[static_cast<std::size_t>(m.set)], 1.0, t;
+    whiten<Fixed + 1>(
+        *unit, ageing, Fixed + 1,
+        [&](const Measurement& m, double t, auto& row) {
+          row(0) = m.value - offsets[static_cast<std::size_t>(m.set)];
+          row(1) = 1.0;
+          row(2) = t;
+          if constexpr (Fixed == 3) {
+            row(3) = settled(ageing, t);
+          }
         },
-        [&](const Eigen::RowVectorXd& row, double variance) {
+        [&](const auto& row, double variance) {
           normal += row.transpose() * row / variance;
           log_variance += std::log(variance);
         });
   }
-  const Eigen::LLT<Eigen::Matrix2d> fixed(normal.bottomRightCorner<2, 2>());
+  const Eigen::LLT<Eigen::Matrix<double, Fixed, Fixed>> fixed(normal.template bottomRightCorner<Fixed, Fixed>());
   if (fixed.info() != Eigen::Success) {
-    return -HUGE_VAL;
+    return {};
   }
-  const Eigen::Vector2d right = normal.bottomLeftCorner<2, 1>();
+  const Eigen::Matrix<double, Fixed, 1> right = normal.template bottomLeftCorner<Fixed, 1>();
   const double misfit = normal(0, 0) - right.dot(fixed.solve(right));
   const double log_determinant = 2.0 * fixed.matrixL().toDenseMatrix().diagonal().array().log().sum();
-  return -0.5 * (log_variance + misfit + log_determinant);
+  return {-0.5 * (log_variance + misfit), -0.5 * (log_variance + misfit + log_determinant)};
 }
 
-// Normal equations of 1, t and a column for each set; the last column and row are the value's.
-MatrixXd normal_equations(std::span<const UnitHistory> units, int sets, const Deviations& sd) {
-  const Eigen::Index columns = 3 + sets;
+int fixed_effects(const Ageing& ageing) { return ageing.return_years > 0.0 ? 3 : 2; }
+
+// Normal equations of the fixed effects and a column for each set; the last column and row are the value's.
+MatrixXd normal_equations(std::span<const UnitHistory> units, int sets, const Ageing& ageing) {
+  const Eigen::Index fixed = fixed_effects(ageing), columns = fixed + sets + 1;
   MatrixXd normal = MatrixXd::Zero(columns, columns);
   for (const UnitHistory& unit : units) {
-    whiten(
-        unit, sd, columns,
+    whiten<Eigen::Dynamic>(
+        unit, ageing, columns,
         [&](const Measurement& m, double t, Eigen::RowVectorXd& row) {
           row(0) = 1.0;
           row(1) = t;
-          row(2 + m.set) = 1.0;
+          if (fixed == 3) {
+            row(2) = settled(ageing, t);
+          }
+          row(fixed + m.set) = 1.0;
           row(columns - 1) = m.value;
         },
         [&](const Eigen::RowVectorXd& row, double variance) {
@@ -107,29 +125,31 @@ double median(std::vector<double> values) {
 struct Effects {
   VectorXd value;
   MatrixXd covariance;
+  Eigen::Index fixed;  // before those of the sets
 };
 
 // `set_sd`: prior of the offsets.
-Effects solve(const MatrixXd& normal, double set_sd) {
+Effects solve(const MatrixXd& normal, Eigen::Index fixed, double set_sd) {
   const Eigen::Index size = normal.rows() - 1;
   MatrixXd information = normal.topLeftCorner(size, size);
-  information.diagonal().tail(size - 2).array() += 1.0 / (set_sd * set_sd);
+  information.diagonal().tail(size - fixed).array() += 1.0 / (set_sd * set_sd);
   const Eigen::LDLT<MatrixXd> factor(information);
-  return {factor.solve(normal.col(size).head(size)), factor.solve(MatrixXd::Identity(size, size))};
+  return {factor.solve(normal.col(size).head(size)), factor.solve(MatrixXd::Identity(size, size)), fixed};
 }
 
 // Between sets, from offsets that a wide prior leaves as they are.
 double spread_of_sets(const Effects& wide) {
-  const Eigen::Index sets = wide.value.size() - 2;
+  const Eigen::Index sets = wide.value.size() - wide.fixed;
   std::vector<double> offsets, departures, variances;
   for (Eigen::Index s = 0; s < sets; ++s) {
-    offsets.push_back(wide.value(2 + s));
+    offsets.push_back(wide.value(wide.fixed + s));
   }
   const double middle = median(offsets);
   for (Eigen::Index s = 0; s < sets; ++s) {
     departures.push_back(std::abs(offsets[static_cast<std::size_t>(s)] - middle));
     // The mean of all sets cannot be told from the type's: what counts is how well one is known against the others.
-    variances.push_back(wide.covariance(2 + s, 2 + s) - wide.covariance.bottomRightCorner(sets, sets).mean());
+    variances.push_back(wide.covariance(wide.fixed + s, wide.fixed + s) -
+                        wide.covariance.bottomRightCorner(sets, sets).mean());
   }
   const double seen = mad_to_sd * median(departures);
   return std::sqrt(std::max(0.0, seen * seen - median(variances)));
@@ -173,7 +193,12 @@ std::vector<const UnitHistory*> sample_of(std::span<const UnitHistory> units) {
       all.push_back(&unit);
     }
   }
-  const std::size_t step = std::max<std::size_t>(1, all.size() / units_for_variances);
+  std::size_t measurements = 0;
+  for (const UnitHistory* unit : all) {
+    measurements += unit->size();
+  }
+  const std::size_t step =
+      std::max<std::size_t>(1, std::min(all.size() / units_for_variances, measurements / measurements_for_variances));
   std::vector<const UnitHistory*> sample;
   for (std::size_t i = 0; i < all.size(); i += step) {
     sample.push_back(all[i]);
@@ -187,6 +212,79 @@ void count_measurements(std::span<const UnitHistory> units, TypeModel& model) {
       ++model.sets[static_cast<std::size_t>(m.set)].measurements;
     }
   }
+}
+
+using Sample = std::span<const UnitHistory* const>;
+
+// Without v.
+Ageing climb_plain(Sample sample, const std::vector<double>& offsets, const Ageing& from, const Climb& how) {
+  const auto ageing = [](const std::array<double, 4>& at) {
+    return Ageing{.unit_sd = at[0], .ramp_sd = at[1], .walk_sd = at[2], .setup_sd = at[3]};
+  };
+  return ageing(climb<4>({from.unit_sd, from.ramp_sd, from.walk_sd, from.setup_sd}, how, [&](const auto& trial) {
+                  return log_likelihood<2>(sample, offsets, ageing(trial)).restricted;
+                }).at);
+}
+
+using Span = std::pair<double, double>;
+
+// With v, whose T stays within `years`.
+Ageing climb_with_return(Sample sample, const std::vector<double>& offsets, const Ageing& from, const Span& years,
+                         const Climb& how) {
+  const auto ageing = [](const std::array<double, 7>& at) {
+    return Ageing{at[0], at[1], at[2], at[3], at[4], at[5], at[6]};
+  };
+  const auto likelihood = [&](const std::array<double, 7>& trial) {
+    const bool within = trial[6] >= years.first && trial[6] <= years.second;
+    return within ? log_likelihood<3>(sample, offsets, ageing(trial)).restricted : -HUGE_VAL;
+  };
+  return ageing(climb<7>({from.unit_sd, from.ramp_sd, from.walk_sd, from.setup_sd, from.settling_sd, from.wander_sd,
+                          from.return_years},
+                         how, likelihood)
+                    .at);
+}
+
+// The span of time that a T can be told in: from the usual distance of two measurements to the longest past.
+Span tellable_years(Sample sample) {
+  std::vector<double> steps;
+  double longest = 0.0;
+  for (const UnitHistory* unit : sample) {
+    longest = std::max(longest, unit->back().year - unit->front().year);
+    for (std::size_t k = 1; k < unit->size(); ++k) {
+      steps.push_back((*unit)[k].year - (*unit)[k - 1].year);
+    }
+  }
+  return {median(std::move(steps)), longest};
+}
+
+// v where it raises the likelihood by more than its figures; the walk has to give to it what it had to stand for.
+Ageing climb_to_top(Sample sample, const std::vector<double>& offsets, const Ageing& from) {
+  const Ageing plain = climb_plain(sample, offsets, from, climbing);
+  const Span years = tellable_years(sample);
+  if (!(years.second > 2.0 * years.first) || !(years.first > 0.0)) {
+    return plain;
+  }
+  double best = log_likelihood<2>(sample, offsets, plain).profile + figures_of_return;
+  Ageing chosen = plain;
+  for (const double share : {0.1, 0.4}) {
+    Ageing start = plain;
+    start.return_years = std::clamp(share * years.second, years.first, years.second);
+    start.wander_sd = start.settling_sd = plain.walk_sd * std::sqrt(0.5 * start.return_years);
+    start.walk_sd *= 0.3;
+    const Ageing found = climb_with_return(sample, offsets, start, years, climbing);
+    const double reached = log_likelihood<3>(sample, offsets, found).profile;
+    if (reached > best) {
+      best = reached;
+      chosen = found;
+    }
+  }
+  return chosen;
+}
+
+// Again, from where it was with other offsets of the sets.
+Ageing polished(Sample sample, const std::vector<double>& offsets, const Ageing& from) {
+  return from.return_years > 0.0 ? climb_with_return(sample, offsets, from, tellable_years(sample), polishing)
+                                 : climb_plain(sample, offsets, from, polishing);
 }
 
 }  // namespace
@@ -203,92 +301,26 @@ TypeModel fit_type(std::span<const UnitHistory> units, int sets) {
     return model;
   }
   const double small = std::max(0.1 * seen.sigma, 1e-3 * seen.sd);
-  Deviations sd{seen.sd, small, small, small};
+  const Ageing start{.unit_sd = seen.sd, .ramp_sd = small, .walk_sd = small, .setup_sd = small};
   std::vector<double> offsets(model.sets.size(), 0.0);
-  double set_sd = seen.sd;
   for (int round = 0; round < 2; ++round) {
-    sd = climb<4>(sd, climbing, [&](const Deviations& trial) {
-           return log_restricted_likelihood(sample, offsets, trial);
-         }).at;
-    const MatrixXd normal = normal_equations(units, sets, sd);
-    set_sd = std::max(spread_of_sets(solve(normal, 100.0 * seen.sd)), 1e-3 * seen.sd);
-    const Effects effects = solve(normal, set_sd);
+    Ageing& ageing = model;
+    ageing = round == 0 ? climb_to_top(sample, offsets, start) : polished(sample, offsets, ageing);
+    const MatrixXd normal = normal_equations(units, sets, ageing);
+    const Eigen::Index fixed = fixed_effects(ageing);
+    model.set_sd = std::max(spread_of_sets(solve(normal, fixed, 100.0 * seen.sd)), 1e-3 * seen.sd);
+    const Effects effects = solve(normal, fixed, model.set_sd);
     model.mean = effects.value(0);
     model.ramp_per_year = effects.value(1);
+    model.settling = fixed == 3 ? effects.value(2) : 0.0;
     for (std::size_t s = 0; s < offsets.size(); ++s) {
-      const auto column = static_cast<Eigen::Index>(2 + s);
+      const auto column = fixed + static_cast<Eigen::Index>(s);
       offsets[s] = effects.value(column);
       model.sets[s].value = offsets[s];
       model.sets[s].sigma = std::sqrt(std::max(0.0, effects.covariance(column, column)));
     }
   }
-  model.unit_sd = sd[0];
-  model.ramp_sd = sd[1];
-  model.walk_sd = sd[2];
-  model.setup_sd = sd[3];
-  model.set_sd = set_sd;
   return model;
-}
-
-UnitFilter::UnitFilter(const TypeModel& model, double first_year)
-    : model_(&model),
-      state_{first_year,
-             model.mean,
-             model.ramp_per_year,
-             {model.unit_sd * model.unit_sd, 0.0, model.ramp_sd * model.ramp_sd}} {}
-
-UnitState UnitFilter::at(double year) const {
-  UnitState later = state_;
-  const double dt = std::max(0.0, year - state_.year);
-  auto& [p00, p01, p11] = later.covariance;
-  later.year = year;
-  later.level += dt * later.ramp;
-  p00 += dt * (2.0 * p01 + dt * p11) + model_->walk_sd * model_->walk_sd * dt;
-  p01 += dt * p11;
-  return later;
-}
-
-Innovation UnitFilter::add(const Measurement& measurement) {
-  state_ = at(measurement.year);
-  const SetOffset& set = model_->sets.at(static_cast<std::size_t>(measurement.set));
-  auto& [p00, p01, p11] = state_.covariance;
-  const Innovation innovation{
-      measurement.value - set.value - state_.level,
-      p00 + model_->setup_sd * model_->setup_sd + measurement.sigma * measurement.sigma + set.sigma * set.sigma};
-  const double k0 = p00 / innovation.variance, k1 = p01 / innovation.variance;
-  state_.level += k0 * innovation.value;
-  state_.ramp += k1 * innovation.value;
-  p11 -= k1 * p01;
-  p01 -= k1 * p00;
-  p00 -= k0 * p00;
-  return innovation;
-}
-
-double UnitFilter::variance_of_measurement(double year, double sigma) const {
-  return at(year).covariance[0] + model_->setup_sd * model_->setup_sd + model_->set_sd * model_->set_sd + sigma * sigma;
-}
-
-double interval_years(std::span<const Watched> parameters, double last_year, double risk, double least, double most) {
-  constexpr double step = 7.0 / 365.2425;
-  for (double years = least + step; years < most; years += step) {
-    double probability = 0.0;
-    for (const Watched& one : parameters) {
-      if (!(one.limit > 0.0)) {
-        continue;
-      }
-      const UnitState state = one.filter->at(last_year + years);
-      const double sd = std::sqrt(state.covariance[0]);
-      const double departure = state.level - one.measured;
-      // Both tails are half of erfc, and count twice: what wanders and was beyond in between is beyond at the end in half of
-      // the cases (reflection principle).
-      probability += (std::erfc((one.limit - departure) / (sd * std::sqrt(2.0))) +
-                      std::erfc((one.limit + departure) / (sd * std::sqrt(2.0))));
-    }
-    if (probability > risk) {
-      return years - step;
-    }
-  }
-  return most;
 }
 
 }  // namespace selfcal::fleet

@@ -5,7 +5,7 @@
 #include <deque>
 #include <vector>
 
-#include "estimator/fleet/fleet_model.hpp"
+#include "estimator/fleet/unit_filter.hpp"
 
 namespace selfcal::fleet {
 

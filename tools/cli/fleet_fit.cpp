@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <map>
+#include <thread>
 
+#include "estimator/fleet/fleet_model.hpp"
+#include "estimator/fleet/interval.hpp"
 #include "estimator/fleet/set_watch.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
@@ -99,9 +103,15 @@ void fit(Type& type, int sets) {
       }
     }
   }
-  for (std::size_t p = 0; p < all; ++p) {
-    type.models[p] = fleet::fit_type(type.histories[p], sets);
-  }
+  // A parameter at a time on each core; which core takes which changes no bit.
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    for (std::size_t p = next++; p < all; p = next++) {
+      type.models[p] = fleet::fit_type(type.histories[p], sets);
+    }
+  };
+  std::vector<std::jthread> cores(std::max(1U, std::thread::hardware_concurrency()));
+  std::ranges::generate(cores, [&] { return std::jthread(work); });
 }
 
 // One set's last window in one parameter.
@@ -146,10 +156,13 @@ Expected<void> store_models(hub::Connection& connection, const std::string& id, 
                             const Type& type) {
   for (std::size_t p = 0; p < all; ++p) {
     const fleet::TypeModel& m = type.models[p];
-    const auto done =
-        connection.ask("INSERT INTO type_models VALUES ($1,$2,$3,$4,$5,$6,$7,$8,$9,$10)",
-                       {id, name, std::to_string(p + 1), number(m.mean), number(m.ramp_per_year), number(m.unit_sd),
-                        number(m.ramp_sd), number(m.walk_sd), number(m.setup_sd), number(m.set_sd)});
+    const auto done = connection.ask(
+        "INSERT INTO type_models(fit, type, position, mean, ramp_per_year, unit_sd, ramp_sd, walk_sd, setup_sd, "
+        "set_sd, settling, settling_sd, wander_sd, return_years) VALUES "
+        "($1,$2,$3,$4,$5,$6,$7,$8,$9,$10,$11,$12,$13,$14)",
+        {id, name, std::to_string(p + 1), number(m.mean), number(m.ramp_per_year), number(m.unit_sd), number(m.ramp_sd),
+         number(m.walk_sd), number(m.setup_sd), number(m.set_sd), number(m.settling), number(m.settling_sd),
+         number(m.wander_sd), number(m.return_years)});
     if (!done) {
       return tl::unexpected(done.error());
     }
@@ -222,20 +235,24 @@ Due due_of(const Type& type, const Certificate& last, const std::vector<UnitFilt
   return due;
 }
 
-// When the expected value passes its size, looked for in the next twenty years; nothing where it does not.
+// When the expected value passes its size, looked for month by month in the next twenty years; nothing where it does not.
 std::optional<std::pair<double, std::size_t>> passes_of(const Type& type, double year,
                                                         const std::vector<UnitFilter>& filters) {
+  constexpr double month = 1.0 / 12.0;
   std::optional<std::pair<double, std::size_t>> first;
   for (std::size_t p = 0; p < all; ++p) {
     const fleet::UnitState now = filters[p].at(year);
     const double size = type.limits.size[p];
-    // A ramp is one beyond two of its sigmas.
-    if (!(size > 0.0) || std::abs(now.ramp) < 2.0 * std::sqrt(now.covariance[2])) {
+    // A drift is one beyond two of its sigmas.
+    if (!(size > 0.0) || std::abs(now.slope()) < 2.0 * now.slope_sigma()) {
       continue;
     }
-    const double years = std::max(0.0, ((now.ramp > 0.0 ? size : -size) - now.level) / now.ramp);
-    if (years < 20.0 && (!first || year + years < first->first)) {
-      first = {year + years, p};
+    const double until = std::min(first ? first->first : HUGE_VAL, year + 20.0);
+    for (double when = year; when < until; when += month) {
+      if (std::abs(filters[p].at(when).value()) >= size) {
+        first = {when, p};
+        break;
+      }
     }
   }
   return first;
@@ -248,12 +265,12 @@ Expected<void> store_unit(hub::Connection& connection, const std::string& id, co
   std::vector<double> level, level_sigma, next, next_sigma, ramp, ramp_sigma;
   for (std::size_t p = 0; p < all; ++p) {
     const fleet::UnitState now = filters[p].at(last.year), then = filters[p].at(last.year + due.years);
-    level.push_back(now.level);
-    level_sigma.push_back(std::sqrt(now.covariance[0]));
-    next.push_back(then.level);
+    level.push_back(now.value());
+    level_sigma.push_back(now.sigma());
+    next.push_back(then.value());
     next_sigma.push_back(std::sqrt(filters[p].variance_of_measurement(then.year, last.sigma[p])));
-    ramp.push_back(now.ramp);
-    ramp_sigma.push_back(std::sqrt(now.covariance[2]));
+    ramp.push_back(now.slope());
+    ramp_sigma.push_back(now.slope_sigma());
   }
   const auto position = [](std::size_t p) { return std::to_string(p + 1); };
   const auto done = connection.ask(
