@@ -64,6 +64,13 @@ def environment_of(process):
         return []
 
 
+def parent_of(process):
+    try:
+        return int(Path(f"/proc/{process}/stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()[1])
+    except OSError:
+        return 0
+
+
 def processes():
     return [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
 
@@ -159,10 +166,12 @@ class SlurmCluster:
     def kill_node(self, name):
         """As by a power cut: its daemon, its job steps and what they run."""
         steps = []
-        for worker in self.workers(name):
-            parent = int(Path(f"/proc/{worker}/stat").read_text().rsplit(")", 1)[1].split()[1])
-            steps += [parent, worker]
+        for worker in self.workers(name):   # up to the job's slurmstepd
+            process = worker
+            while process > 1 and process != self.daemons[name].pid and process not in steps:
+                steps.append(process)
+                process = parent_of(process)
         self.daemons[name].kill()
-        for process in steps:
+        for process in reversed(steps):
             self._kill(process)
         self.daemons.pop(name).wait()

@@ -84,11 +84,16 @@ class Cluster {
   }
 
  private:
+  // A worker that was killed (by somebody, or for want of memory) is begun again in the same job: what a task may take with it is
+  // counted by its tries.
   Expected<void> write_script() const {
-    return write_file_atomically(scratch_ / "work.sh",
-                                 fmt::format("#!/bin/sh\nexec {} batch work {} --round \"$1\" --tries {} --limit {}\n",
-                                             quoted((program_folder() / "selfcal").string()),
-                                             quoted(folder_.path().string()), bounds_.tries, bounds_.limit_s));
+    return write_file_atomically(
+        scratch_ / "work.sh",
+        fmt::format(
+            "#!/bin/sh\nstatus=137\nwhile [ $status -eq 137 ]; do\n  {} batch work {} --round \"$1\" --tries {} "
+            "--limit {}\n  status=$?\ndone\nexit $status\n",
+            quoted((program_folder() / "selfcal").string()), quoted(folder_.path().string()), bounds_.tries,
+            bounds_.limit_s));
   }
 
   // Number of the array.
