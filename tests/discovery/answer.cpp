@@ -2,7 +2,8 @@
 //
 //   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process] [--plan FILE]
 //
-// One JSON line; with --discover also where the catalogue leaves nothing; the others are rivals (rivals.hpp). Further
+// One JSON line. Without a way: as `selfcal diagnose` does it, the catalogue and what it leaves; --discover: discovery alone; the others
+// are rivals (rivals.hpp). Further
 // recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
 #include <fmt/format.h>
 
@@ -16,6 +17,7 @@
 #include <span>
 #include <string>
 
+#include "daemon/estimate/analysis.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/unit_answer.hpp"
@@ -82,6 +84,32 @@ ordered_json rival_json(const std::string& rival, const ImuData& data, const Cal
   return j;
 }
 
+// What the catalogue says, and where it leaves something what discovery says, as the program does it.
+struct DiagnosisAnswer {
+  ordered_json words;
+  std::optional<discovery::Discovery> found;
+};
+
+DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
+  DiagnosisAnswer answer;
+  std::optional<diagnosis::Diagnosis> diagnosis;
+  if (beyond) {
+    Cause cause = cause_of(data, {});
+    diagnosis = std::move(cause.diagnosis);
+    answer.found = std::move(cause.beyond);
+  } else {
+    diagnosis = diagnosis::diagnose(data, {}).diagnosis;
+  }
+  if (diagnosis) {
+    answer.words["verdict"] = verdict_name(diagnosis->verdict);
+    answer.words["names"] = ordered_json::array();
+    for (const auto& finding : diagnosis->findings) {
+      answer.words["names"].push_back(finding.effect);
+    }
+  }
+  return answer;
+}
+
 struct Request {
   std::string way, plan;  // plan: where the schedule of the next experiment goes
   std::vector<std::string> files;
@@ -119,19 +147,17 @@ int answer(const Request& request) {
   const auto begin = std::chrono::steady_clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
   ordered_json j;
-  bool wanted = request.way != "--catalogue";
-  if (request.way.empty() || !wanted) {
-    const diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(all.front()->data, {});
-    if (outcome.diagnosis) {
-      j["verdict"] = verdict_name(outcome.diagnosis->verdict);
-      j["names"] = ordered_json::array();
-      for (const auto& finding : outcome.diagnosis->findings) {
-        j["names"].push_back(finding.effect);
-      }
-      wanted = outcome.diagnosis->unexplained && request.way.empty();
+  const bool as_the_program = request.way.empty();
+  if (as_the_program || request.way == "--catalogue") {
+    const DiagnosisAnswer answer = diagnosed(all.front()->data, as_the_program);
+    j = answer.words;
+    if (answer.found) {
+      j["discovery"] = to_json(*answer.found);
     }
+    j["seconds"] = elapsed();
+    fmt::print("{}\n", j.dump());
+    return 0;
   }
-  j["diagnosis_s"] = elapsed();
   std::vector<discovery::UnitRecording> recordings;
   for (const auto& one : all) {
     CalibrationOutcome outcome = diagnosis::calibrate_still(one->data, {});
@@ -140,12 +166,14 @@ int answer(const Request& request) {
       recordings.push_back({one->data, one->calibration});
     }
   }
-  if (wanted && recordings.size() == all.size()) {
+  if (recordings.size() == all.size()) {
     if (request.way == "--stepwise" || request.way == "--process") {
       j["discovery"] = rival_json(request.way, all.front()->data, all.front()->calibration);
     } else {
       const discovery::Discovery found = discovery::discover(recordings, {});
       j["discovery"] = to_json(found);
+      const ParameterVector& before = recordings.front().calibration.value;
+      j["discovery"]["parameters_before"] = std::vector<double>(before.begin(), before.end());
       if (!request.plan.empty()) {
         discovery::ExperimentLimits limits;
         limits.duration_s = experiment_s;

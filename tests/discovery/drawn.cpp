@@ -8,12 +8,16 @@
 
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
+#include "tests/blind/kinds.hpp"
+#include "tests/blind/plan.hpp"
 #include "tests/blind/response.hpp"
 
 namespace selfcal::discovery_trial {
 namespace {
 
 using sim::Random;
+
+constexpr double moored_share = 0.2;
 
 template <std::size_t n>
 std::string one_of(const std::array<const char*, n>& words, Random& random) {
@@ -105,29 +109,70 @@ sim::SimConfig draw_installation(Random& random) {
   config.gyro_arw_deg_per_sqrt_h = 0.001;
   config.accel_vrw_ug_per_sqrt_hz = 5.0;
   config.temperature.recorded = random.uniform(0.0, 1.0) < 0.5;
+  if (random.uniform(0.0, 1.0) < moored_share) {
+    config.base_motion = sim::moored_base_motion();
+  }
   return config;
+}
+
+// The effects of the catalogue as the blind trial draws them.
+Expected<Case> draw_effect_case(const Recipe& recipe, int number, std::uint64_t seed) {
+  const auto drawn = blind::draw_case({"single", {recipe.effect}, recipe.strength}, number, seed);
+  if (!drawn) {
+    return tl::unexpected(drawn.error());
+  }
+  Case c{number, recipe.kind, recipe.strength, drawn->seed, drawn->config, drawn->schedule, {}};
+  for (const blind::ConcealedEffect& effect : drawn->effects) {
+    c.physics.effects.push_back(effect.physics);
+  }
+  return c;
+}
+
+Expected<ParameterVector> bound_of(const blind::Filtered& filtered, const std::vector<sim::Law>& laws) {
+  std::vector<blind::Column> columns;
+  for (const sim::Law& law : laws) {
+    blind::Column column;
+    column.plus.laws = {law};
+    column.prior = 1e6;  // times its size: nothing is known beforehand
+    columns.push_back(std::move(column));
+  }
+  return filtered.augmented_sigma(columns);
 }
 
 }  // namespace
 
-std::vector<Recipe> recipes(int laws, int pairs, int processes, int clean, int foreign) {
+std::vector<Recipe> recipes(const Counts& counts) {
   std::vector<Recipe> all;
   const auto add = [&all](const char* kind, double strength, int count) {
     for (int k = 0; k < count; ++k) {
-      all.push_back({kind, strength});
+      all.push_back({kind, strength, {}});
     }
   };
-  for (const double strength : {10.0, 30.0, 100.0}) {
-    add("law", strength, laws);
+  constexpr std::array<double, 3> strengths = {10.0, 30.0, 100.0};
+  for (const double strength : strengths) {
+    add("law", strength, counts.laws);
   }
-  add("pair", 30.0, pairs);
-  add("process", 30.0, processes);
-  add("clean", 0.0, clean);
-  add("foreign", 30.0, foreign);
+  add("pair", 30.0, counts.pairs);
+  add("process", 30.0, counts.processes);
+  add("clean", 0.0, counts.clean);
+  add("foreign", 30.0, counts.foreign);
+  std::vector<std::string> catalogue;
+  for (const blind::Kind& kind : blind::kinds()) {
+    if (kind.group == blind::KindGroup::catalogue) {
+      catalogue.emplace_back(kind.id);
+    }
+  }
+  for (int k = 0; k < counts.effects; ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    all.push_back({"effect", strengths[n / catalogue.size() % strengths.size()], catalogue[n % catalogue.size()]});
+  }
   return all;
 }
 
 Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
+  if (!recipe.effect.empty()) {
+    return draw_effect_case(recipe, number, seed);
+  }
   constexpr std::uint64_t streams_per_seed = 100000;
   Random random(seed, streams_per_seed + static_cast<std::uint64_t>(number));
   Case c;
@@ -137,7 +182,9 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
   c.seed = seed * streams_per_seed + static_cast<std::uint64_t>(number);
   c.config = draw_installation(random);
   c.schedule = *named_schedule("horizontal");
-  const auto filtered = blind::Filtered::make(c.config, c.schedule, c.seed);
+  sim::SimConfig still = c.config;  // what the strength is that of
+  still.base_motion = {};
+  const auto filtered = blind::Filtered::make(still, c.schedule, c.seed);
   if (!filtered) {
     return tl::unexpected(filtered.error());
   }
@@ -160,6 +207,13 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
       c.physics.laws.push_back(law);
     }
   }
+  if (c.kind == "law" || c.kind == "pair") {
+    const auto bound = bound_of(*filtered, c.physics.laws);
+    if (!bound) {
+      return tl::unexpected(bound.error());
+    }
+    c.bound = *bound;
+  }
   return c;
 }
 
@@ -181,6 +235,7 @@ sim::SimConfig other_installation(const sim::SimConfig& config) {
   sim::SimConfig other = config;
   other.roll_deg = -9.0;
   other.pitch_deg = 14.0;
+  other.base_motion = {};
   other.heading_deg = std::fmod(config.heading_deg + 77.0, 360.0);
   return other;
 }

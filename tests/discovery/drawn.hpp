@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/geometry/schedule.hpp"
+#include "estimator/models/sensor_model.hpp"
 #include "protocol/error.hpp"
 #include "sim_ins/config.hpp"
 #include "sim_ins/physics.hpp"
@@ -17,20 +18,29 @@ namespace selfcal::discovery_trial {
 
 struct Case {
   int number = 0;
-  std::string kind;       // clean, law, pair, process, foreign (a law of forms that the search has not)
+  // clean, law, pair, process, foreign (a law of forms that the search has not), effect (of the catalogue)
+  std::string kind;
   double strength = 0.0;  // sigma, of each law
   std::uint64_t seed = 0;
   sim::SimConfig config;
   Schedule schedule;
   sim::ConcealedPhysics physics;
+  // SI: bound of the 24 of a filter that also estimates the coefficients of the laws, the base still. Zero but for laws and pairs.
+  ParameterVector bound = ParameterVector::Zero();
+};
+
+struct Counts {
+  int laws = 40;  // of each strength
+  int pairs = 40, processes = 40, clean = 400, foreign = 40, effects = 120;
 };
 
 // Kinds in the order of the trial, with strength; `repeats` of each.
 struct Recipe {
   std::string kind;
   double strength = 0.0;
+  std::string effect;
 };
-std::vector<Recipe> recipes(int laws, int pairs, int processes, int clean, int foreign);
+std::vector<Recipe> recipes(const Counts& counts);
 
 [[nodiscard]] Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed);
 

@@ -1,6 +1,6 @@
 // Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
 //
-//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE   one JSON line a case, as far as missing
+//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS FILE   one JSON line a case, as far as missing
 //   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
 //   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
 //                                                            another schedule: a file, or "random:SECONDS"
@@ -48,10 +48,18 @@ ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
                     {"kind", c.kind},
                     {"strength", c.strength},
                     {"attitude_deg", {c.config.roll_deg, c.config.pitch_deg, c.config.heading_deg}},
-                    {"temperature", c.config.temperature.recorded}};
+                    {"temperature", c.config.temperature.recorded},
+                    {"moored", !c.config.base_motion.still()}};
   const auto truth = sim::true_sensor_errors(c.config, c.seed);
   if (truth) {
     j["truth"] = *truth;
+  }
+  if (c.bound.sum() > 0.0) {
+    j["bound"] = std::vector<double>(c.bound.begin(), c.bound.end());
+  }
+  j["effects"] = ordered_json::array();
+  for (const sim::PhysicsEffect& effect : c.physics.effects) {
+    j["effects"].push_back(effect.id);
   }
   j["laws"] = ordered_json::array();
   for (const sim::Law& law : c.physics.laws) {
@@ -65,12 +73,12 @@ ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
 }
 
 std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts) {
-  return discovery_trial::recipes(counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4));
+  return discovery_trial::recipes({counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5)});
 }
 
 int write_key(std::span<char*> arguments) {
   ordered_json counts = ordered_json::array();
-  for (std::size_t k = 1; k < 6; ++k) {
+  for (std::size_t k = 1; k < 7; ++k) {
     const auto count = to_number(arguments[k]);
     if (!count) {
       return complain({ErrorKind::usage, fmt::format("{}: no count", arguments[k])});
@@ -83,13 +91,13 @@ int write_key(std::span<char*> arguments) {
   }
   int done = 0;
   {
-    std::ifstream file(arguments[6]);
+    std::ifstream file(arguments[7]);
     for (std::string line; std::getline(file, line);) {
       ++done;
     }
   }
   const auto recipes = recipes_of(counts);
-  std::ofstream file(arguments[6], std::ios::app);
+  std::ofstream file(arguments[7], std::ios::app);
   for (int n = done; n < static_cast<int>(recipes.size()); ++n) {
     const auto drawn =
         discovery_trial::draw_case(recipes[static_cast<std::size_t>(n)], n, static_cast<std::uint64_t>(*seed));
@@ -100,7 +108,7 @@ int write_key(std::span<char*> arguments) {
     line["counts"] = counts;
     file << line.dump() << '\n' << std::flush;
   }
-  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[6])});
+  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[7])});
 }
 
 Expected<Case> case_in(const std::string& key, int number) {
@@ -175,7 +183,7 @@ int write_again(Case c, const std::string& path, int time, const std::string& pl
 
 int run(std::span<char*> arguments) {
   const std::string verb = arguments.size() > 1 ? arguments[1] : "";
-  if (verb == "key" && arguments.size() == 9) {
+  if (verb == "key" && arguments.size() == 10) {
     return write_key(arguments.subspan(2));
   }
   const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
@@ -190,7 +198,7 @@ int run(std::span<char*> arguments) {
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
   fmt::print(stderr,
-             "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN FILE | "
+             "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS FILE | "
              "record KEY NUMBER FILE | again KEY NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
