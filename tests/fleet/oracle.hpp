@@ -1,4 +1,4 @@
-// Who knows the law by which drawn_fleet.hpp ages, and who knows the truth as well: what no rule from measurements can do better.
+// Who knows the law by which drawn_fleet.hpp ages, and who knows the truth as well: a yardstick for rules that know less.
 #pragma once
 
 #include <Eigen/Core>
