@@ -52,8 +52,11 @@ ordered_json law_json(const DiscoveredLaw& law) {
   }
   ordered_json members = ordered_json::array();
   for (const discovery::ClassMember& m : law.ambiguous) {
-    members.push_back(
-        {{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}, {"also", m.also}});
+    ordered_json also = ordered_json::array();
+    for (const discovery::OtherWords& other : m.also) {
+      also.push_back(other.expression);
+    }
+    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}, {"also", also}});
   }
   return {{"axis", name_of_axis(law.term.axis)},
           {"expression", law.expression},

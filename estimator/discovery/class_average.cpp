@@ -12,18 +12,39 @@ struct Rival {
   double odds = 0.0;
 };
 
-// The most probable members of a law's class but for itself.
+// The most probable expressions of a law's class but for its own: each has 24 of its own.
 std::vector<Rival> rivals_of(const DiscoveredLaw& law, std::size_t most) {
   std::vector<Rival> rivals;
-  for (const ClassMember& m : law.ambiguous) {
-    auto expression = laws::Expression::parse(m.expression);
-    if (expression && !(m.axis == law.term.axis && m.expression == law.expression)) {
-      rivals.push_back({{m.axis, std::move(*expression), {}}, m.odds});
+  const auto add = [&](int axis, const std::string& text, double odds) {
+    auto expression = laws::Expression::parse(text);
+    if (expression && !(axis == law.term.axis && text == law.expression)) {
+      rivals.push_back({{axis, std::move(*expression), {}}, odds});
     }
+  };
+  for (const ClassMember& m : law.ambiguous) {
+    double odds = m.odds;  // of its own words
+    for (const OtherWords& other : m.also) {
+      add(m.axis, other.expression, other.odds);
+      odds -= other.odds;
+    }
+    add(m.axis, m.expression, odds);
   }
   std::stable_sort(rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.odds > b.odds; });
   rivals.resize(std::min(rivals.size(), most), Rival{});
   return rivals;
+}
+
+// Of the law in the words in which it is told.
+double own_odds(const DiscoveredLaw& law) {
+  double odds = 1.0;
+  for (const ClassMember& m : law.ambiguous) {
+    if (m.axis == law.term.axis && m.expression == law.expression) {
+      for (const OtherWords& other : m.also) {
+        odds -= other.odds;
+      }
+    }
+  }
+  return odds;
 }
 
 std::size_t place_of(const DiscoveredLaw& law, const std::vector<LawTerm>& terms) {
@@ -46,7 +67,7 @@ ClassAverage average_over_classes(std::span<const UnitRecording> recordings, con
   for (const DiscoveredLaw& law : found.laws) {
     const std::size_t place = place_of(law, found.fit.terms);
     const std::vector<Rival> rivals = rivals_of(law, members);
-    double total = 1.0;
+    double total = own_odds(law);
     for (const Rival& rival : rivals) {
       total += rival.odds;
     }

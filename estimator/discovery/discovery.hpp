@@ -24,11 +24,17 @@ struct DiscoveryOptions {
   std::stop_token stop;
 };
 
+// Another expression of a function. The 24 beside it may differ: fy*cos(inner)**2 is fy less fy*sin(inner)**2, and fy is a misalignment.
+struct OtherWords {
+  std::string expression;
+  double odds = 0.0;  // as in ClassMember
+};
+
 struct ClassMember {
   std::string expression;
   int axis = 0;
-  double odds = 0.0;              // of this function against the one that is reported, 1 for that
-  std::vector<std::string> also;  // the same function in other words: no rotation tells them apart (carry_over.hpp)
+  double odds = 0.0;             // of this function against the one that is reported, 1 for that
+  std::vector<OtherWords> also;  // no rotation tells them apart (carry_over.hpp); `odds` holds theirs
 };
 
 struct Constant {

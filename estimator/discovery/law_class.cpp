@@ -91,7 +91,7 @@ std::vector<ClassMember> LawClass::functions() const {
       all.push_back({c, {c.text(), c.term.axis, odds(c), {}}});
     } else {
       same->second.odds += odds(c);
-      same->second.also.push_back(c.text());
+      same->second.also.push_back({c.text(), odds(c)});
     }
   }
   const double own_odds = all.front().second.odds;
@@ -100,6 +100,9 @@ std::vector<ClassMember> LawClass::functions() const {
   result.reserve(all.size());
   for (auto& [candidate, member] : all) {
     member.odds /= own_odds;
+    for (OtherWords& other : member.also) {
+      other.odds /= own_odds;
+    }
     result.push_back(std::move(member));
   }
   return result;

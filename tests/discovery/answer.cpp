@@ -45,7 +45,11 @@ ordered_json to_json(const discovery::Discovery& d) {
   for (const discovery::DiscoveredLaw& law : d.laws) {
     ordered_json members = ordered_json::array();
     for (const discovery::ClassMember& m : law.ambiguous) {
-      members.push_back({{"expression", m.expression}, {"axis", m.axis}, {"odds", m.odds}, {"also", m.also}});
+      ordered_json also = ordered_json::array();
+      for (const discovery::OtherWords& other : m.also) {
+        also.push_back(other.expression);
+      }
+      members.push_back({{"expression", m.expression}, {"axis", m.axis}, {"odds", m.odds}, {"also", also}});
     }
     j["laws"].push_back({{"axis", law.term.axis},
                          {"expression", law.expression},

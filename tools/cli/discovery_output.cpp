@@ -39,7 +39,10 @@ std::string also_text(const ClassMember& m, const char* indent) {
   if (m.also.empty()) {
     return {};
   }
-  const std::vector<std::string> some(m.also.begin(), m.also.begin() + std::min(most, m.also.size()));
+  std::vector<std::string> some;
+  for (std::size_t k = 0; k < std::min(most, m.also.size()); ++k) {
+    some.push_back(m.also[k].expression);
+  }
   return fmt::format("{}the same as {}{}\n", indent, fmt::join(some, ", "), m.also.size() > most ? ", ..." : "");
 }
 
