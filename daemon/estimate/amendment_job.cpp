@@ -76,8 +76,8 @@ std::string story(const diagnosis::Finding& finding) {
 CalibrationResult result_with_laws(const diagnosis::Diagnosis& diagnosis, const BeyondAnswer& beyond,
                                    const CalibrationOptions& options) {
   CalibrationResult result = diagnosis.calibration;
-  result.value = beyond.average.parameters.front();
-  result.covariance = beyond.average.covariance.front();
+  result.value = beyond.found.average.parameters.front();
+  result.covariance = beyond.found.average.covariance.front();
   result.sigma = result.covariance.diagonal().cwiseSqrt();
   judge_parameters(result, options.tolerance);
   Consistency& consistency = result.consistency;
@@ -156,9 +156,6 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
   if (files.size() > 1) {
     answer.together = put_together(files, *rest, answer.found);
-  }
-  if (confirmed(&answer.found)) {
-    answer.average = discovery::average_over_classes(rest->recordings(), answer.found, 8, stop);
   }
   progress();
   discovery::ExperimentLimits limits;

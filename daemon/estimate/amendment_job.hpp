@@ -10,7 +10,6 @@
 #include "daemon/estimate/unit_answer.hpp"
 #include "daemon/store/run_store.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
-#include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/discovery.hpp"
 
 namespace selfcal {
@@ -32,7 +31,6 @@ struct AmendmentRequest {
 struct BeyondAnswer {
   discovery::Discovery found;
   std::optional<Together> together;  // several
-  discovery::ClassAverage average;   // where laws are `confirmed`: the 24 over all that the recordings leave open
   std::optional<discovery::NextExperiment> next;
 };
 

@@ -101,10 +101,9 @@ bool confirmed(const Discovery* found) {
 
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
   if (diagnosis.unexplained && explains(found) && !found->laws.empty() && found->processes.empty()) {
-    const discovery::FittedRecording& fitted = found->fit.recordings.front();
-    diagnosis.value = diagnosis.value_as_named = fitted.parameters;
-    diagnosis.covariance = fitted.covariance;
-    diagnosis.sigma = fitted.covariance.diagonal().cwiseSqrt();
+    diagnosis.value = diagnosis.value_as_named = found->average.parameters.front();
+    diagnosis.covariance = found->average.covariance.front();
+    diagnosis.sigma = diagnosis.covariance.diagonal().cwiseSqrt();
   }
   return diagnosis;
 }

@@ -13,11 +13,6 @@
 
 namespace selfcal::discovery {
 
-struct ClassAverage {
-  std::vector<ParameterVector> parameters;  // [recordings] SI, what is shared imposed
-  std::vector<ParameterMatrix> covariance;  // [recordings], with the spread between the members
-};
-
 // `found` of these recordings. `members` of a class at most, the most probable ones: one pass over each recording for each.
 ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
                                   std::size_t members = 8, const std::stop_token& stop = {});

@@ -6,6 +6,7 @@
 #include <memory>
 #include <type_traits>
 
+#include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
@@ -18,6 +19,7 @@ namespace {
 constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
 constexpr std::size_t class_size = 40;      // looked at exactly for the class
 constexpr int constant_rounds = 4;
+constexpr std::size_t members_averaged = 8;
 // Time and memory go with the square of the number of pieces: 5,040 columns, 200 MB a matrix.
 constexpr std::size_t most_pieces_of_all = 840;
 // A true law of z sigma gains (z^2 - 1)/2 on what was left out, for each of some forty parts is predicted from the rest; what
@@ -434,7 +436,11 @@ class Search {
 
 Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
                    const Progress& progress) {
-  return Search(recordings, options, progress).run();
+  Discovery found = Search(recordings, options, progress).run();
+  if (!found.laws.empty() && found.processes.empty()) {
+    found.average = average_over_classes(recordings, found, members_averaged, options.stop);
+  }
+  return found;
 }
 
 }  // namespace selfcal::discovery

@@ -64,6 +64,12 @@ struct DiscoveredProcess {
   double log_likelihood_gain = 0.0;
 };
 
+// The 24 over all equations that the recordings leave open (class_average.hpp).
+struct ClassAverage {
+  std::vector<ParameterVector> parameters;  // [recordings] SI, what is shared imposed
+  std::vector<ParameterMatrix> covariance;  // [recordings], with the spread between the members
+};
+
 struct Discovery {
   std::vector<DiscoveredLaw> laws;  // best first
   // Equations that only together make up what an axis does: its form is none of them, and on another plan they may be far off.
@@ -76,6 +82,7 @@ struct Discovery {
   std::string refused;              // the best function that did not predict what was left out; empty: none
   std::size_t functions_tried = 0;  // functions times axes
   LawFit fit;                       // of the laws in the order in which they were found, with the 24 of each recording
+  ClassAverage average;             // empty where no law is told, and where a process is
 };
 
 // One recording of the unit that is looked at. Both must outlive it.

@@ -67,9 +67,11 @@ ordered_json to_json(const discovery::Discovery& d) {
     j["processes"].push_back(
         {{"axis", p.axis}, {"process", discovery::name_of(p.kind)}, {"size", p.size}, {"sigma", p.sigma}});
   }
-  const discovery::FittedRecording& fitted = d.fit.recordings.front();
-  j["parameters"] = std::vector<double>(fitted.parameters.begin(), fitted.parameters.end());
-  const ParameterVector sigma = fitted.covariance.diagonal().cwiseSqrt();
+  const bool averaged = !d.average.parameters.empty();
+  const ParameterVector& parameters = averaged ? d.average.parameters.front() : d.fit.recordings.front().parameters;
+  j["parameters"] = std::vector<double>(parameters.begin(), parameters.end());
+  const ParameterMatrix& covariance = averaged ? d.average.covariance.front() : d.fit.recordings.front().covariance;
+  const ParameterVector sigma = covariance.diagonal().cwiseSqrt();
   j["parameter_sigma"] = std::vector<double>(sigma.data(), sigma.data() + sigma.size());
   return j;
 }

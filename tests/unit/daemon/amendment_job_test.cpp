@@ -61,8 +61,8 @@ class AmendmentJobTest : public testing::Test {
       r.parameters = diagnosis_.value;
       r.covariance = diagnosis_.covariance;
     }
-    beyond.average.parameters.assign(recordings, 3.0 * diagnosis_.value);
-    beyond.average.covariance.assign(recordings, 4.0 * diagnosis_.covariance);
+    beyond.found.average.parameters.assign(recordings, 3.0 * diagnosis_.value);
+    beyond.found.average.covariance.assign(recordings, 4.0 * diagnosis_.covariance);
     return amended_estimate(diagnosis_, {{7, "seven.h5"}, {{3, "three.h5"}}, "folder", {}}, recording_, beyond);
   }
 
