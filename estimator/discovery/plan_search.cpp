@@ -38,9 +38,11 @@ class Changes {
   Schedule change(Schedule plan) {
     const auto count = static_cast<int>(plan.positions.size());
     if (below(3) > 0) {
-      const auto k = static_cast<std::size_t>(1 + below(count - 1));
+      const std::size_t k = 1U + static_cast<std::size_t>(below(count - 1));
       GimbalPosition to = plan.positions[k];
-      (below(2) == 0 ? to.outer_deg : to.inner_deg) += grid_deg * (below(2) == 0 ? -1.0 : 1.0) * (1 + below(2));
+      double& angle = below(2) == 0 ? to.outer_deg : to.inner_deg;
+      const double sense = below(2) == 0 ? -1.0 : 1.0;
+      angle += sense * grid_deg * (1 + below(2));
       const bool within = std::abs(to.outer_deg) <= farthest_deg && std::abs(to.inner_deg) <= farthest_deg;
       const bool from_before = can_move(plan.positions[k - 1], to);
       const bool to_next = k + 1 == plan.positions.size() || can_move(to, plan.positions[k + 1]);
