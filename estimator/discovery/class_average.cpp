@@ -12,13 +12,19 @@ struct Rival {
   double odds = 0.0;
 };
 
-// The most probable expressions of a law's class but for its own: each has 24 of its own.
-std::vector<Rival> rivals_of(const DiscoveredLaw& law, std::size_t most) {
+// A law in the words in which it is told, and the most probable other expressions of its class: each has 24 of its own.
+struct Words {
+  double own_odds = 1.0;
   std::vector<Rival> rivals;
+};
+
+Words words_of(const DiscoveredLaw& law, std::size_t most) {
+  Words words;
   const auto add = [&](int axis, const std::string& text, double odds) {
-    auto expression = laws::Expression::parse(text);
-    if (expression && !(axis == law.term.axis && text == law.expression)) {
-      rivals.push_back({{axis, std::move(*expression), {}}, odds});
+    if (axis == law.term.axis && text == law.expression) {
+      words.own_odds = odds;
+    } else if (auto expression = laws::Expression::parse(text)) {
+      words.rivals.push_back({{axis, std::move(*expression), {}}, odds});
     }
   };
   for (const ClassMember& m : law.ambiguous) {
@@ -29,22 +35,10 @@ std::vector<Rival> rivals_of(const DiscoveredLaw& law, std::size_t most) {
     }
     add(m.axis, m.expression, odds);
   }
-  std::stable_sort(rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.odds > b.odds; });
-  rivals.resize(std::min(rivals.size(), most), Rival{});
-  return rivals;
-}
-
-// Of the law in the words in which it is told.
-double own_odds(const DiscoveredLaw& law) {
-  double odds = 1.0;
-  for (const ClassMember& m : law.ambiguous) {
-    if (m.axis == law.term.axis && m.expression == law.expression) {
-      for (const OtherWords& other : m.also) {
-        odds -= other.odds;
-      }
-    }
-  }
-  return odds;
+  std::stable_sort(words.rivals.begin(), words.rivals.end(),
+                   [](const Rival& a, const Rival& b) { return a.odds > b.odds; });
+  words.rivals.resize(std::min(words.rivals.size(), most), Rival{});
+  return words;
 }
 
 std::size_t place_of(const DiscoveredLaw& law, const std::vector<LawTerm>& terms) {
@@ -66,8 +60,8 @@ ClassAverage average_over_classes(std::span<const UnitRecording> recordings, con
   }
   for (const DiscoveredLaw& law : found.laws) {
     const std::size_t place = place_of(law, found.fit.terms);
-    const std::vector<Rival> rivals = rivals_of(law, members);
-    double total = own_odds(law);
+    const auto [own_odds, rivals] = words_of(law, members);
+    double total = own_odds;
     for (const Rival& rival : rivals) {
       total += rival.odds;
     }

@@ -337,8 +337,8 @@ class Search {
 
   LawClass class_of(std::size_t k) {
     Candidate own;
-    std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
-    return {recordings_.back(), std::move(own), std::move(others), options_.least_odds, options_.stop};
+    const std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
+    return {recordings_.back(), std::move(own), others, options_.least_odds, options_.stop};
   }
 
   // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the

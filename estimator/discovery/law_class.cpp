@@ -22,10 +22,10 @@ bool same_value(const LawTerm& a, const LawTerm& b) { return same_law(a, b) && n
 
 }  // namespace
 
-LawClass::LawClass(const UnitRecording& like, Candidate own, std::vector<std::vector<Candidate>> others,
+LawClass::LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
                    double least_odds, const std::stop_token& stop)
-    : own_(std::move(own)), others_(std::move(others)), least_odds_(least_odds), possible_{own_} {
-  for (const std::vector<Candidate>& alternatives : others_) {
+    : own_(std::move(own)), tried_(best_of(others)), least_odds_(least_odds), possible_{own_} {
+  for (const std::vector<Candidate>& alternatives : others) {
     for (Candidate c : alternatives) {
       if (is_member(c) && !same_value(c.term, own_.term)) {
         c.cost += std::log(static_cast<double>(alternatives.size()));
@@ -62,7 +62,7 @@ std::vector<Candidate> LawClass::split(bool members) const {
   if (members) {
     some.push_back(own_);
   }
-  for (const Candidate& c : best_of(others_)) {
+  for (const Candidate& c : tried_) {
     if (!same_law(c.term, own_.term) && is_member(c) == members) {
       some.push_back(c);
     }

@@ -14,8 +14,8 @@ class LawClass {
  public:
   // `others`: every function that was tried in the place of `own`, each with several values of its constant. `like`: the unit,
   // its noise and its site. Members have at least `least_odds` against `own`.
-  LawClass(const UnitRecording& like, Candidate own, std::vector<std::vector<Candidate>> others, double least_odds,
-           const std::stop_token& stop);
+  LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
+           double least_odds, const std::stop_token& stop);
 
   // Members with each value of a constant by itself, `own` first, and what holds of them elsewhere.
   const std::vector<Candidate>& possible() const { return possible_; }
@@ -38,7 +38,7 @@ class LawClass {
   bool written_otherwise(const Candidate& a, const Candidate& b) const;
 
   Candidate own_;
-  std::vector<std::vector<Candidate>> others_;
+  std::vector<Candidate> tried_;  // the others, each with its best constant, most probable first
   double least_odds_;
   std::vector<Candidate> possible_;
   std::vector<PossibleLaw> laws_;  // the same, with odds against `own`
