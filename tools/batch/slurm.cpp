@@ -85,15 +85,16 @@ class Cluster {
 
  private:
   // A worker that was killed (by somebody, or for want of memory) is begun again in the same job: what a task may take with it is
-  // counted by its tries.
+  // counted by its tries, and what is killed before it takes one by the workers of the job.
   Expected<void> write_script() const {
+    constexpr int most_workers = 20;  // one behind the other
     return write_file_atomically(
         scratch_ / "work.sh",
-        fmt::format(
-            "#!/bin/sh\nstatus=137\nwhile [ $status -eq 137 ]; do\n  {} batch work {} --round \"$1\" --tries {} "
-            "--limit {}\n  status=$?\ndone\nexit $status\n",
-            quoted((program_folder() / "selfcal").string()), quoted(folder_.path().string()), bounds_.tries,
-            bounds_.limit_s));
+        fmt::format("#!/bin/sh\nstatus=137 left={}\nwhile [ $status -eq 137 ] && [ $left -gt 0 ]; do\n  {} batch work "
+                    "{} --round \"$1\" "
+                    "--tries {} --limit {}\n  status=$?\n  left=$((left - 1))\ndone\nexit $status\n",
+                    most_workers, quoted((program_folder() / "selfcal").string()), quoted(folder_.path().string()),
+                    bounds_.tries, bounds_.limit_s));
   }
 
   // Number of the array.
