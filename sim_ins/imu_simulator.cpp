@@ -55,6 +55,11 @@ void add_base_effect(BaseMotion& base, const PhysicsEffect& effect) {
   }
 }
 
+bool of_base(const NoiseSpectrum& spectrum) {
+  return spectrum.channel == NoiseSpectrum::Channel::base_roll ||
+         spectrum.channel == NoiseSpectrum::Channel::base_pitch;
+}
+
 Expected<void> check_effect(const PhysicsEffect& effect) {
   for (const EffectDescription& known : physics_effects()) {
     if (known.id == effect.id) {
@@ -97,6 +102,11 @@ Expected<ImuSimulator> ImuSimulator::create(const SimConfig& config, GimbalMotio
     }
     add_base_effect(base, effect);
   }
+  for (const NoiseSpectrum& spectrum : physics.spectra) {
+    if (of_base(spectrum)) {
+      add_tilt(spectrum, seed, base);
+    }
+  }
   const earth::Position site{config.latitude_deg * units::degree, config.longitude_deg * units::degree,
                              config.height_m};
   const Attitude mean{config.roll_deg * units::degree, config.pitch_deg * units::degree,
@@ -104,6 +114,11 @@ Expected<ImuSimulator> ImuSimulator::create(const SimConfig& config, GimbalMotio
   ImuSimulator imu(config, TrueMotion(site, mean, std::move(base), std::move(gimbal)), *errors, seed);
   for (const PhysicsEffect& effect : physics.effects) {
     imu.take(effect);
+  }
+  for (const NoiseSpectrum& spectrum : physics.spectra) {
+    if (!of_base(spectrum)) {
+      imu.spectra_.emplace_back(spectrum, config.sample_rate_hz, seed);
+    }
   }
   imu.prepare_turns();
   imu.prepare_laws();
@@ -128,8 +143,13 @@ ImuSimulator::ImuSimulator(const SimConfig& config, TrueMotion motion, const Sen
   accel_vrw_.setConstant(config.accel_vrw_ug_per_sqrt_hz * units::micro_g_per_sqrt_hz);
   gyro_quantiser_.lsb = config.gyro_lsb_arcsec * units::arcsecond;
   accel_quantiser_.lsb = config.accel_lsb_m_per_s;
-  gyro_markov_ = config.gyro_bias_instability_deg_per_h * units::degree_per_hour * normal3(instability_);
-  accel_markov_ = config.accel_bias_instability_ug * units::micro_g * normal3(instability_);
+  const double of_gyros = config.gyro_bias_instability_deg_per_h * units::degree_per_hour;
+  const double of_accelerometers = config.accel_bias_instability_ug * units::micro_g;
+  wanders_ = {wander(true, Vector3::Constant(of_gyros), config.bias_instability_tau_s),
+              wander(false, Vector3::Constant(of_accelerometers), config.bias_instability_tau_s)};
+  if (of_gyros == 0.0 && of_accelerometers == 0.0) {
+    wanders_.clear();
+  }
 }
 
 void ImuSimulator::take(const PhysicsEffect& effect) {
@@ -149,6 +169,8 @@ void ImuSimulator::take(const PhysicsEffect& effect) {
     more(gyro_walk_asd_);
   } else if (effect.id == "accel_random_walk") {
     more(accel_walk_asd_);
+  } else if (effect.id == "gyro_bias_instability" || effect.id == "accel_bias_instability") {
+    wanders_.push_back(wander(effect.id.starts_with("gyro"), axes(0), v[3]));
   } else if (effect.id == "quantisation") {
     gyro_hidden_.lsb = std::max(gyro_hidden_.lsb, v[0]);  // one entry may be the gyros', another the accelerometers'
     accel_hidden_.lsb = std::max(accel_hidden_.lsb, v[1]);
@@ -162,6 +184,11 @@ void ImuSimulator::take(const PhysicsEffect& effect) {
   } else if (effect.id == "time_base") {
     clock_scale_ += v[0];
   }  // what is left acts on the base, which has it already
+}
+
+// Stationary from the start.
+ImuSimulator::Wander ImuSimulator::wander(bool gyro, const Vector3& sigma, double tau_s) {
+  return {gyro, sigma, tau_s, sigma.cwiseProduct(normal3(instability_))};
 }
 
 void ImuSimulator::prepare_turns() {
@@ -274,11 +301,19 @@ void ImuSimulator::add_noise(IdealIncrement& increment, double begin, double end
     increment.delta_theta += line.domega * integral;
     increment.delta_v += line.df * integral;
   }
-  increment.delta_theta += h * (gyro_markov_ + gyro_wander_) + root_h * gyro_arw_.cwiseProduct(normal3(gyro_noise_));
-  increment.delta_v += h * (accel_markov_ + accel_wander_) + root_h * accel_vrw_.cwiseProduct(normal3(accel_noise_));
+  Vector3 gyro = gyro_walk_, accel = accel_walk_;
+  for (const Wander& w : wanders_) {
+    (w.gyro ? gyro : accel) += w.value;
+  }
+  increment.delta_theta += h * gyro + root_h * gyro_arw_.cwiseProduct(normal3(gyro_noise_));
+  increment.delta_v += h * accel + root_h * accel_vrw_.cwiseProduct(normal3(accel_noise_));
   if (!gyro_walk_asd_.isZero(0.0) || !accel_walk_asd_.isZero(0.0)) {
-    gyro_wander_ += root_h * gyro_walk_asd_.cwiseProduct(normal3(instability_));
-    accel_wander_ += root_h * accel_walk_asd_.cwiseProduct(normal3(instability_));
+    gyro_walk_ += root_h * gyro_walk_asd_.cwiseProduct(normal3(instability_));
+    accel_walk_ += root_h * accel_walk_asd_.cwiseProduct(normal3(instability_));
+  }
+  for (Wander& w : wanders_) {
+    const double keep = std::exp(-h / w.tau_s);
+    w.value = keep * w.value + std::sqrt(1.0 - keep * keep) * w.sigma.cwiseProduct(normal3(instability_));
   }
   if (!angle_sigma_.isZero(0.0) || !velocity_sigma_.isZero(0.0)) {
     const Vector3 angle = angle_sigma_.cwiseProduct(normal3(integral_));
@@ -288,15 +323,11 @@ void ImuSimulator::add_noise(IdealIncrement& increment, double begin, double end
     angle_before_ = angle;
     velocity_before_ = velocity;
   }
-  add_law_noise(increment, h);
-  if (config_.gyro_bias_instability_deg_per_h > 0.0 || config_.accel_bias_instability_ug > 0.0) {
-    const double keep = std::exp(-h / config_.bias_instability_tau_s);
-    const double drive = std::sqrt(1.0 - keep * keep);
-    gyro_markov_ = keep * gyro_markov_ +
-                   drive * config_.gyro_bias_instability_deg_per_h * units::degree_per_hour * normal3(instability_);
-    accel_markov_ =
-        keep * accel_markov_ + drive * config_.accel_bias_instability_ug * units::micro_g * normal3(instability_);
+  for (SpectrumNoise& noise : spectra_) {
+    const int axis = noise.axis();
+    (axis < 3 ? increment.delta_theta : increment.delta_v)[axis % 3] += h * noise.next();
   }
+  add_law_noise(increment, h);
 }
 
 bool ImuSimulator::lose(ImuSample& sample, double begin) {

@@ -8,6 +8,7 @@
 #include "protocol/error.hpp"
 #include "sim_ins/config.hpp"
 #include "sim_ins/law.hpp"
+#include "sim_ins/noise_spectrum.hpp"
 #include "sim_ins/physics.hpp"
 #include "sim_ins/random.hpp"
 #include "sim_ins/sensor_physics.hpp"
@@ -95,7 +96,17 @@ class ImuSimulator {
   std::vector<ActiveLaw> laws_;
   std::vector<std::array<double, 2>> senses_;  // of the axes after k turns have begun
   double mean_temperature_c_ = 0.0;
+  // A bias that wanders and comes back: Gauss-Markov, first order.
+  struct Wander {
+    bool gyro = false;
+    Vector3 sigma;  // rad/s or m/s^2
+    double tau_s = 0.0;
+    Vector3 value;
+  };
+  Wander wander(bool gyro, const Vector3& sigma, double tau_s);
+  std::vector<Wander> wanders_;
   std::vector<Line> lines_;
+  std::vector<SpectrumNoise> spectra_;
   std::vector<Loss> losses_;
   std::vector<Vector3> turn_df_;  // per move
   bool needs_angular_acceleration_ = false;
@@ -105,8 +116,8 @@ class ImuSimulator {
   Vector3 accel_vrw_ = Vector3::Zero();      // m/s/sqrt(s)
   Vector3 gyro_walk_asd_ = Vector3::Zero();  // rad/s/sqrt(s)
   Vector3 accel_walk_asd_ = Vector3::Zero();
-  Vector3 gyro_wander_ = Vector3::Zero(), gyro_markov_ = Vector3::Zero();    // rad/s
-  Vector3 accel_wander_ = Vector3::Zero(), accel_markov_ = Vector3::Zero();  // m/s^2
+  Vector3 gyro_walk_ = Vector3::Zero();   // rad/s
+  Vector3 accel_walk_ = Vector3::Zero();  // m/s^2
   // White noise of the integrals: what dither leaves.
   Vector3 angle_sigma_ = Vector3::Zero(), velocity_sigma_ = Vector3::Zero();    // rad, m/s
   Vector3 angle_before_ = Vector3::Zero(), velocity_before_ = Vector3::Zero();  // at the end of the sample before

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <map>
 
@@ -15,6 +16,7 @@
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/profile/records.hpp"
 #include "sim_ins/device/bus_node.hpp"
+#include "sim_ins/device/frame_node.hpp"
 #include "sim_ins/simulate.hpp"
 
 namespace selfcal::sim {
@@ -122,10 +124,6 @@ Expected<void> take_profile(const std::string& file, NodeOptions& node) {
     if (!profile) {
       return tl::unexpected(profile.error());
     }
-    if ((*profile)->frames) {
-      return fail(ErrorKind::bad_input,
-                  fmt::format("{}: bus.addressing: none: the virtual INS speaks UDS, and nothing else", file));
-    }
     node.diagnostics.profile = std::move(*profile);
   }
   const profile::Bus& bus = node.diagnostics.profile->bus;
@@ -192,6 +190,21 @@ void configure(Options& options, Arguments& a) {
       "T s; drop=P, duplicate=P, corrupt=P: probability per frame sent");
 }
 
+// What it does from then on, until it is told to stop.
+Expected<std::function<void()>> open_node(const Arguments& a, const SimConfig& config, const ConcealedPhysics& physics,
+                                          Instrument& instrument) {
+  const auto serving = [](auto opened) -> Expected<std::function<void()>> {
+    if (!opened) {
+      return tl::unexpected(opened.error());
+    }
+    return [node = std::shared_ptr(std::move(*opened))] { node->run(stop_requested); };
+  };
+  if (a.node.diagnostics.profile->frames) {
+    return serving(FrameNode::open(a.node, instrument, CommandedGimbal(config, a.seed, physics, a.node.scenario)));
+  }
+  return serving(BusNode::open(a.node, instrument));
+}
+
 Expected<int> run(Arguments& a) {
   Expected<SimConfig> config{SimConfig{}};
   if (!a.config.empty()) {
@@ -242,16 +255,16 @@ Expected<int> run(Arguments& a) {
   a.node.rates = {static_cast<std::uint32_t>(a.arbitration_rate), static_cast<std::uint32_t>(a.data_rate)};
   a.node.diagnostics.key = *key;
   a.node.diagnostics.longest_response = a.node.fd ? 65535 : 4095;
-  auto node = BusNode::open(a.node, **instrument);
-  if (!node) {
-    return tl::unexpected(node.error());
+  const auto serve = open_node(a, *config, *physics, **instrument);
+  if (!serve) {
+    return tl::unexpected(serve.error());
   }
   if (!a.truth.empty()) {
     if (const auto written = write_truth(a.truth, *config, a.seed, *physics); !written) {
       return tl::unexpected(written.error());
     }
   }
-  (*node)->run(stop_requested);
+  (*serve)();
   return 0;
 }
 

@@ -87,6 +87,8 @@ constexpr auto gyro_noise = axes("deg/sqrt(h)", units::degree_per_sqrt_hour);
 constexpr auto accel_noise = axes("ug/sqrt(Hz)", units::micro_g_per_sqrt_hz);
 constexpr auto gyro_walk = axes("deg/h/sqrt(h)", dph / 60.0);  // 60 = sqrt(3600 s)
 constexpr auto accel_walk = axes("ug/sqrt(h)", ug / 60.0);
+constexpr auto gyro_instability = join(axes("deg/h", dph), std::array{tau(300.0)});
+constexpr auto accel_instability = join(axes("ug", ug), std::array{tau(300.0)});
 constexpr std::array quantum{P{"gyro_lsb", "arcsec", arcsec}, P{"accel_lsb", "m/s", 1.0}};
 constexpr std::array integral_noise{P{"gyro_x", "arcsec", arcsec}, P{"gyro_y", "arcsec", arcsec},
                                     P{"gyro_z", "arcsec", arcsec}, P{"accel_x", "m/s", 1.0},
@@ -117,7 +119,7 @@ constexpr auto hysteresis = axes("ug", ug);
 constexpr std::array gimbal_field{P{"outer_x", "deg/h", dph}, P{"outer_y", "deg/h", dph}, P{"outer_z", "deg/h", dph},
                                   P{"inner_x", "deg/h", dph}, P{"inner_y", "deg/h", dph}, P{"inner_z", "deg/h", dph}};
 
-constexpr std::array<EffectDescription, 35> effects{{
+constexpr std::array<EffectDescription, 37> effects{{
     {"gyro_g_sensitivity", true, gyro_g},
     {"gyro_magnetic_sensitivity", true, gyro_magnetic},
     {"gyro_scale_asymmetry", true, gyro_asymmetry},
@@ -147,6 +149,8 @@ constexpr std::array<EffectDescription, 35> effects{{
     {"vibration_line", true, vibration},
     {"lost_samples", true, lost},
     {"time_base", true, clock_scale},
+    {"gyro_bias_instability", false, gyro_instability},
+    {"accel_bias_instability", false, accel_instability},
     {"integral_noise", false, integral_noise},
     {"bearing_stick_slip", false, stick_slip},
     {"gyro_g_rate_sensitivity", false, g_rate},

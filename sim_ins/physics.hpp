@@ -9,6 +9,7 @@
 
 #include "protocol/error.hpp"
 #include "sim_ins/law.hpp"
+#include "sim_ins/noise_spectrum.hpp"
 
 namespace selfcal::sim {
 
@@ -42,6 +43,7 @@ double value_of(const PhysicsEffect& effect, std::string_view parameter);
 struct ConcealedPhysics {
   std::vector<PhysicsEffect> effects;
   std::vector<Law> laws = {};
+  std::vector<NoiseSpectrum> spectra = {};
 };
 
 // Reads a physics file:
@@ -54,6 +56,11 @@ struct ConcealedPhysics {
 //   expression = "exp(-since/45.2)*so"   # or process = "jump per turn", "random walk", "white", "line"
 //   coefficient = 13.7
 //   unit = "ug"                          # ug for accel_*, deg/h for gyro_*
+//   [[spectrum]]
+//   channel = "gyro_x"                   # base_roll, base_pitch: tilt of the base
+//   unit = "deg/h/sqrt(Hz)"              # ug/sqrt(Hz) for accel_*, arcsec/sqrt(Hz) for base_*
+//   edges_hz = [0.0, 0.1, 50.0]
+//   density = [2.0, 1.5]
 // Unknown id or key, wrong type, non-finite value: bad_input naming file, line and key.
 [[nodiscard]] Expected<ConcealedPhysics> read_physics(const std::string& path);
 [[nodiscard]] Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name);

@@ -119,6 +119,63 @@ void read_law(TomlTable& table, ConcealedPhysics& physics) {
   physics.laws.push_back(std::move(law));
 }
 
+struct ChannelName {
+  std::string_view name, unit;
+  double si_per_unit;
+};
+// In the order of NoiseSpectrum::Channel.
+constexpr std::array<ChannelName, 8> channels = {{{"gyro_x", "deg/h/sqrt(Hz)", units::degree_per_hour},
+                                                  {"gyro_y", "deg/h/sqrt(Hz)", units::degree_per_hour},
+                                                  {"gyro_z", "deg/h/sqrt(Hz)", units::degree_per_hour},
+                                                  {"accel_x", "ug/sqrt(Hz)", units::micro_g},
+                                                  {"accel_y", "ug/sqrt(Hz)", units::micro_g},
+                                                  {"accel_z", "ug/sqrt(Hz)", units::micro_g},
+                                                  {"base_roll", "arcsec/sqrt(Hz)", units::arcsecond},
+                                                  {"base_pitch", "arcsec/sqrt(Hz)", units::arcsecond}}};
+
+void read_spectrum(TomlTable& table, ConcealedPhysics& physics) {
+  NoiseSpectrum spectrum;
+  std::string channel, unit;
+  table.text("channel", channel);
+  table.text("unit", unit);
+  constexpr double fastest_hz = 1e6, most = 1e12;
+  table.numbers("edges_hz", spectrum.edges_hz, 0.0, fastest_hz);
+  table.numbers("density", spectrum.density, 0.0, most);
+  const auto found =
+      std::find_if(channels.begin(), channels.end(), [&](const ChannelName& c) { return c.name == channel; });
+  if (found == channels.end()) {
+    return table.refuse("channel", channel.empty() ? "missing" : fmt::format("no channel is called {}", channel));
+  }
+  if (unit != found->unit) {
+    return table.refuse("unit", fmt::format("\"{}\" where {} is in {}", unit, channel, found->unit));
+  }
+  if (found - channels.begin() >= static_cast<std::ptrdiff_t>(NoiseSpectrum::Channel::base_roll)) {
+    constexpr double farthest_m = 1000.0;
+    table.number("above_m", spectrum.above_m, -farthest_m, farthest_m);
+  }
+  if (spectrum.density.empty() || spectrum.edges_hz.size() != spectrum.density.size() + 1) {
+    return table.refuse("edges_hz", fmt::format("{} edges where {} densities need one more", spectrum.edges_hz.size(),
+                                                spectrum.density.size()));
+  }
+  constexpr double narrowest_hz = 1e-6;
+  for (std::size_t k = 0; k + 1 < spectrum.edges_hz.size(); ++k) {
+    if (!(spectrum.edges_hz[k + 1] - spectrum.edges_hz[k] >= narrowest_hz)) {
+      return table.refuse("edges_hz", fmt::format("{} after {} Hz does not rise by {} Hz", spectrum.edges_hz[k + 1],
+                                                  spectrum.edges_hz[k], narrowest_hz));
+    }
+  }
+  for (double& density : spectrum.density) {
+    density *= found->si_per_unit;
+  }
+  spectrum.channel = static_cast<NoiseSpectrum::Channel>(found - channels.begin());
+  for (const NoiseSpectrum& other : physics.spectra) {
+    if (other.channel == spectrum.channel) {
+      return table.refuse("channel", fmt::format("{} has a spectrum already", channel));
+    }
+  }
+  physics.spectra.push_back(std::move(spectrum));
+}
+
 }  // namespace
 
 Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name) {
@@ -126,6 +183,7 @@ Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::str
   const auto read = read_toml(text, name, [&](TomlTable& root) {
     root.tables("effect", [&](TomlTable& table) { read_effect(table, physics); });
     root.tables("law", [&](TomlTable& table) { read_law(table, physics); });
+    root.tables("spectrum", [&](TomlTable& table) { read_spectrum(table, physics); });
   });
   if (!read) {
     return tl::unexpected(read.error());

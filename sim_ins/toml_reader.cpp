@@ -59,6 +59,29 @@ void TomlTable::number(std::string_view key, double& value, double low, double h
   }
 }
 
+void TomlTable::numbers(std::string_view key, std::vector<double>& values, double low, double high) {
+  const toml::node* node = asked(key);
+  if (node == nullptr) {
+    return;
+  }
+  if (!node->is_array()) {
+    refuse(key, "not an array of numbers");
+    return;
+  }
+  std::vector<double> read;
+  for (const toml::node& element : *node->as_array()) {
+    const auto value = element.value<double>();
+    if (!element.is_number() || !value) {
+      return refuse(key, "not an array of numbers");
+    }
+    if (!std::isfinite(*value) || *value < low || *value > high) {
+      return refuse(key, fmt::format("{} is outside [{}, {}]", *value, low, high));
+    }
+    read.push_back(*value);
+  }
+  values = std::move(read);
+}
+
 void TomlTable::integer(std::string_view key, std::uint64_t& value, std::uint64_t low, std::uint64_t high) {
   const toml::node* node = asked(key);
   if (node == nullptr) {

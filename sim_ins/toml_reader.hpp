@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/error.hpp"
 #include "protocol/toml_file/toml_text.hpp"
@@ -26,6 +27,7 @@ class TomlTable {
   void number(std::string_view key, double& value, double low, double high);
   void integer(std::string_view key, std::uint64_t& value, std::uint64_t low, std::uint64_t high);
   void text(std::string_view key, std::string& value);
+  void numbers(std::string_view key, std::vector<double>& values, double low, double high);
   void boolean(std::string_view key, bool& value);
   // Calls `read` with the sub-table, or with each table of the array of tables, where the key is present.
   void table(std::string_view key, const std::function<void(TomlTable&)>& read);

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "daemon/host/journal.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/profile/status_frames.hpp"
 #include "protocol/uds/services.hpp"
 
 namespace selfcal {
@@ -209,18 +209,9 @@ bool CanPort::receive_batch() {
 }
 
 void CanPort::take_status(const can::CanFrame& frame, bool& news) {
-  if (frame.extended != config_.extended_ids || !config_.status_id) {
-    return;
+  if (config_.status_id) {
+    news = profile::apply_status(*config_.profile, frame, *config_.status_id, config_.extended_ids, status_) || news;
   }
-  can::CanFrame named = frame;
-  named.extended = false;
-  if (frame.id == *config_.status_id) {
-    named.id = ins::can_id::status;
-  }
-  if (frame.id == *config_.status_id + 1) {
-    named.id = ins::can_id::gimbal;
-  }
-  news = ins::apply_status_frame(named, status_) || news;
 }
 
 void CanPort::pump() {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "daemon/ins/can_port.hpp"
-#include "daemon/ins/frame_values.hpp"
+#include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "daemon/ins/frame_port.hpp"
-#include "daemon/ins/frame_values.hpp"
+#include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
 

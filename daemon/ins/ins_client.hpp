@@ -21,7 +21,7 @@ namespace selfcal {
 class InsClient {
  public:
   InsClient(Timers& timers, InsPort& port, profile::ProfilePtr profile = profile::built_in())
-      : timers_(timers), port_(port), profile_(std::move(profile)) {}
+      : timers_(timers), port_(port), profile_(std::move(profile)), tally_(profile_) {}
 
   // Whether a session other than the default one was asked for: it is to be ended (session_end.hpp).
   bool session_asked_for() const { return session_asked_for_; }
@@ -73,6 +73,9 @@ class InsClient {
   Task<Answer<Bytes>> told_set(SetOf which);
   Task<Answer<Done>> read_memory(std::uint32_t first, std::uint32_t count, OnPage on_page);
   Task<Answer<Done>> upload_pages(std::uint32_t first, std::uint32_t count, OnPage on_page);
+  Task<Answer<Done>> read_files(std::uint32_t first, std::uint32_t count, OnPage on_page);
+  Task<Answer<Done>> take_blocks(std::uint32_t first, std::uint32_t count, std::uint32_t longest,
+                                 const OnPage& on_page);
   Task<Answer<Bytes>> next_block(std::uint8_t block, std::uint32_t longest);
   Task<Answer<Done>> command(uds::RoutineAction action, std::uint16_t id, Expected<Bytes> option);
 
@@ -81,6 +84,10 @@ class InsClient {
   profile::ProfilePtr profile_;
   RequestTally tally_;
   bool session_asked_for_ = false;
+  std::uint32_t run_held_ = 0;  // of the directory that was read last
 };
+
+// An answer that came, but makes no sense.
+tl::unexpected<PortError> protocol_error(const InsPort& port, const Error& error);
 
 }  // namespace selfcal

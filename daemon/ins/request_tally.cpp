@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
+#include "protocol/profile/names.hpp"
 #include "protocol/uds/services.hpp"
 
 namespace selfcal {
@@ -19,27 +19,29 @@ std::string_view action_name(std::uint8_t action) {
 
 }  // namespace
 
-std::string request_name(std::span<const std::uint8_t> request) {
+std::string request_name(const profile::Profile& profile, std::span<const std::uint8_t> request) {
   std::string service(uds::service_name(request.front()));
   ByteReader in(request.subspan(1));
   switch (request.front()) {
     case uds::service::read_data:
-    case uds::service::write_data: return fmt::format("{} {}", service, ins::did_name(in.get<std::uint16_t>()));
+    case uds::service::write_data:
+      return fmt::format("{} {}", service, profile::did_name(profile, in.get<std::uint16_t>()));
     case uds::service::routine_control: {
       const auto action = in.get<std::uint8_t>();
-      return fmt::format("{} {} {}", service, action_name(action), ins::routine_name(in.get<std::uint16_t>()));
+      return fmt::format("{} {} {}", service, action_name(action),
+                         profile::routine_name(profile, in.get<std::uint16_t>()));
     }
     default: return service;
   }
 }
 
 void RequestTally::asked(std::span<const std::uint8_t> request) {
-  last_ = request_name(request);
+  last_ = request_name(*profile_, request);
   ++requests_[last_].asked;
 }
 
 void RequestTally::failed(std::span<const std::uint8_t> request, const std::string& why) {
-  Entry& entry = requests_[request_name(request)];
+  Entry& entry = requests_[request_name(*profile_, request)];
   ++entry.failed;
   entry.why = why;
 }

@@ -5,11 +5,15 @@
 #include <map>
 #include <span>
 #include <string>
+#include <utility>
+
+#include "protocol/profile/profile.hpp"
 
 namespace selfcal {
 
 class RequestTally {
  public:
+  explicit RequestTally(profile::ProfilePtr profile) : profile_(std::move(profile)) {}
   void asked(std::span<const std::uint8_t> request);
   void failed(std::span<const std::uint8_t> request, const std::string& why);
   void forget();  // there was progress
@@ -24,11 +28,12 @@ class RequestTally {
     int failed = 0;
     std::string why;  // it failed last
   };
+  profile::ProfilePtr profile_;
   std::map<std::string, Entry> requests_;  // by name
   std::string last_;
 };
 
-// "ReadDataByIdentifier state", "RoutineControl start eraseInactiveSlot": the block counter and data left out.
-std::string request_name(std::span<const std::uint8_t> request);
+// "ReadDataByIdentifier state", "RoutineControl start erase", as the profile calls them: the block counter and data left out.
+std::string request_name(const profile::Profile& profile, std::span<const std::uint8_t> request);
 
 }  // namespace selfcal

@@ -105,10 +105,18 @@ Complaint check_coefficients(const std::array<double, sensor_parameter_count>& v
   return std::nullopt;
 }
 
+// Free-inertial navigation with an error of so many millionths of g in a level accelerometer: g / omega^2 (1 - cos(omega t)), omega
+// Schuler's.
+double drift_m(double lost_ug, double seconds) {
+  constexpr double earth_radius_m = 6.371e6;
+  const double omega = std::sqrt(gravity_mps2 / earth_radius_m);
+  return lost_ug * 1e-6 * earth_radius_m * (1.0 - std::cos(omega * seconds));
+}
+
 std::string words_of_loss(const std::array<double, sensor_parameter_count>& wanted,
                           const std::array<double, sensor_parameter_count>& held,
                           const std::array<double, sensor_parameter_count>& tolerance) {
-  constexpr double worth_saying = 1e-3;
+  constexpr double worth_saying = 1e-3, ten_minutes_s = 600.0;
   const std::size_t worst = most_lost(wanted, held, tolerance);
   const double lost = lost_of(wanted, held, worst);
   if (!(lost > worth_saying * tolerance[worst])) {
@@ -119,7 +127,10 @@ std::string words_of_loss(const std::array<double, sensor_parameter_count>& want
   const bool of_accel_scale = parameter.name.starts_with("accel_scale");
   return fmt::format("{}: {:.6g} {} were found, the INS holds {:.6g}{}", parameter.name,
                      wanted[worst] / parameter.si_per_unit, parameter.unit, held[worst] / parameter.si_per_unit,
-                     of_accel_scale ? fmt::format(": {:.3g} ug are lost at 1 g", lost) : std::string());
+                     of_accel_scale
+                         ? fmt::format(": {:.3g} ug are lost at 1 g, {:.3g} m after 10 minutes of navigation", lost,
+                                       drift_m(lost, ten_minutes_s))
+                         : std::string());
 }
 
 Complaint check_held(const std::array<double, sensor_parameter_count>& wanted,

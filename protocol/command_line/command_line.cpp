@@ -240,6 +240,12 @@ void Options::can_identifier(const char* names, std::uint32_t& value, const char
       fmt::format("{:X}", value));
 }
 
+void Options::can_identifier(const char* names, std::optional<std::uint32_t>& value, const char* help) {
+  add_value(
+      *app_->app, names, help, "HEX",
+      [&value](const std::string& text, const std::string& name) { value = to_can_identifier(name, text); }, "");
+}
+
 void Options::exclude(const char* name, const char* other) {
   app_->app->get_option(name)->excludes(app_->app->get_option(other));
 }

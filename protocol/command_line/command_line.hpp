@@ -36,6 +36,7 @@ class Options {
   void whole(const char* names, std::optional<std::uint64_t>& value, const WholeRange& range, const char* help);
   // CAN identifier: hexadecimal, with or without 0x, as can-utils read and write it.
   void can_identifier(const char* names, std::uint32_t& value, const char* help);
+  void can_identifier(const char* names, std::optional<std::uint32_t>& value, const char* help);
   // Both together are refused; NAMES of options that were added before.
   void exclude(const char* name, const char* other);
   // Whatever else is given is taken and ignored.

@@ -4,7 +4,7 @@
 //   4  u16 format, 1        12  u32 sequence, from 0   24  i16 temperature, 0.01 degC        32  u32 CRC-32C of all 4096
 //   6  u16 sample count                                26  u16 flags                             bytes, this field as 0
 // Sample: 3 x i32 delta theta, 3 x i32 delta v, u16 outer, u16 inner, in counts; sample i of the run ends at
-// (i+1)/rate. What a count is worth stands in DID sampleFormat, as exact doubles. Unused room is 0xFF. Big-endian.
+// (i+1)/rate. What a count is worth the sample format says, as exact doubles. Unused room is 0xFF. Big-endian.
 #pragma once
 
 #include <array>

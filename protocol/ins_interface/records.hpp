@@ -1,5 +1,5 @@
-// The records behind the data identifiers and routines, and their bytes (big-endian). Every decoder checks length,
-// ranges and finiteness, and fails with kind bad_input, naming the field and its value.
+// What an INS is told and tells, as this software knows it. The bytes are its profile's matter (profile/records); site and sample
+// format have bytes here too, big-endian, in which the service keeps them beside the pages of a run.
 //
 // check(): the ranges of its values, whatever bytes they came from; bad_input, naming the field and its value.
 #pragma once
@@ -28,8 +28,6 @@ struct StateRecord {
   std::uint32_t run_id = 0;                // latest self-calibration, 0: none
   std::uint32_t power_cycles = 0;
 };
-Bytes encode(const StateRecord& record);
-[[nodiscard]] Expected<StateRecord> decode_state(ByteView bytes);
 
 inline constexpr std::size_t max_positions = 255;
 struct ScheduleRecord {
@@ -43,8 +41,6 @@ struct ScheduleRecord {
   std::uint32_t rotation_ms = 0;    // from one position to the next
   bool operator==(const ScheduleRecord&) const = default;
 };
-Bytes encode(const ScheduleRecord& record);
-[[nodiscard]] Expected<ScheduleRecord> decode_schedule(ByteView bytes);
 [[nodiscard]] Expected<void> check(const ScheduleRecord& record);
 
 struct SiteRecord {
@@ -67,8 +63,6 @@ struct DirectoryRecord {
 
   bool operator==(const DirectoryRecord&) const = default;
 };
-Bytes encode(const DirectoryRecord& record);
-[[nodiscard]] Expected<DirectoryRecord> decode_directory(ByteView bytes);
 [[nodiscard]] Expected<void> check(const DirectoryRecord& record);
 
 struct SampleFormatRecord {
@@ -91,16 +85,12 @@ struct RunRecord {
   std::uint32_t run_id = 0;
   std::uint32_t pages_written = 0;
 };
-Bytes encode(const RunRecord& record);
-[[nodiscard]] Expected<RunRecord> decode_run(ByteView bytes);
 
 // Free-inertial navigation at rest from a known start: how far it drifts.
 struct NavigationCheckRequest {
   std::uint32_t duration_s = 3600;    // of the INS's own time
   Slot compensation = Slot::factory;  // factory, or any other: what is in force
 };
-Bytes encode(const NavigationCheckRequest& request);
-[[nodiscard]] Expected<NavigationCheckRequest> decode_navigation_request(ByteView bytes);
 
 struct NavigationCheckRecord {
   bool done = false;
@@ -109,8 +99,6 @@ struct NavigationCheckRecord {
   double east_m = 0.0;
   double max_horizontal_m = 0.0;
 };
-Bytes encode(const NavigationCheckRecord& record);
-[[nodiscard]] Expected<NavigationCheckRecord> decode_navigation_result(ByteView bytes);
 [[nodiscard]] Expected<void> check(const NavigationCheckRecord& record);
 
 }  // namespace selfcal::ins

@@ -25,4 +25,7 @@ using Dbc = std::map<std::string, DbcMessage, std::less<>>;
 // The frames of an INS that speaks no UDS. Commands that share an identifier are one message, told apart by a multiplexor.
 std::string frames_dbc(const Profile& profile);
 
+// The identifiers of an INS and its status frames; of one without UDS, all its frames.
+std::string dbc_text(const Profile& profile);
+
 }  // namespace selfcal::profile

@@ -9,6 +9,7 @@
 #include "protocol/profile/coefficient_fields.hpp"
 #include "protocol/profile/describe_frames.hpp"
 #include "protocol/profile/document_writer.hpp"
+#include "protocol/profile/raw_file.hpp"
 
 namespace selfcal::profile {
 namespace {
@@ -126,6 +127,7 @@ class Document {
       write_set();
     } else {
       write_bus();
+      describe_status(out_, p_);
       write_services();
       write_identifiers();
       write_records();
@@ -318,7 +320,10 @@ class Document {
                       raw.size_bytes, raw.address_bytes, raw.address_bytes, raw.size_bytes, raw.longest_read,
                       raw.first_address, raw.page.bytes));
     } else {
-      write_upload_services();
+      raw.way == Raw::Way::file ? write_file_service() : write_upload_service();
+      out_.say(
+          "Then 36 BLOCK, BLOCK from 1 on, after FF comes 00: the response is 76 BLOCK DATA; the same BLOCK again: the "
+          "same data. 37 ends it: 77. Pages are told while the gimbal still turns.");
     }
     out_.heading("Record page: samples of the IMU");
     out_.say(
@@ -326,19 +331,25 @@ class Document {
     write_record(out_, raw.page, record_role("page"));
   }
 
-  void write_upload_services() {
+  void write_upload_service() {
     const Raw& raw = p_.raw;
     out_.say(
         fmt::format("35 00 {:X}{:X} ADDRESS SIZE, big-endian, {} and {} bytes. ADDRESS is {}, SIZE a multiple of {} in "
-                    "bytes. The response is 75 40 "
-                    "and four bytes, big-endian: the longest response to TransferData. Then 36 BLOCK, BLOCK from 1 on, "
-                    "after FF comes 00: the "
-                    "response is 76 BLOCK DATA; the same BLOCK again: the same data. 37 ends it: 77. Pages are told "
-                    "while the gimbal still turns.",
+                    "bytes. The response is 75 40 and four bytes, big-endian: the longest response to TransferData.",
                     raw.size_bytes, raw.address_bytes, raw.address_bytes, raw.size_bytes,
                     raw.by_page ? "the number of a page of the run"
                                 : fmt::format("{} times the number of a page of the run", raw.page.bytes),
                     raw.page.bytes));
+  }
+
+  void write_file_service() {
+    const Raw& raw = p_.raw;
+    out_.say(fmt::format(
+        "Each page is a file. 38 04 LENGTH NAME 00: RequestFileTransfer, ReadFile, LENGTH of NAME in two bytes, "
+        "big-endian, NAME in ASCII, no compression. NAME of page 7 in run 3 is {}; pages count from 0. The response is "
+        "78 04 04 BLOCK 00 00 04 SIZE SIZE, four bytes each, big-endian: the longest response to TransferData, and "
+        "twice the size of the file, {}. A file that is not there is refused (0x31).",
+        file_name(raw.file, 3, 7), raw.page.bytes));
   }
 
   void write_axes() {

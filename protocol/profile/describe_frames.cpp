@@ -104,6 +104,18 @@ void say_how(Writer& out, const Profile& profile) {
 
 }  // namespace
 
+void describe_status(Writer& out, const Profile& profile) {
+  if (!profile.bus.status) {
+    return;
+  }
+  Frame state = profile.status.state, gimbal = profile.status.gimbal;
+  state.id = *profile.bus.status;
+  gimbal.id = *profile.bus.status + 1;
+  for (const Frame* frame : {&state, &gimbal}) {
+    write_frame(out, *frame, frame_role(frame->name), profile.bus.extended_ids);
+  }
+}
+
 void describe_frames(Writer& out, const Profile& profile) {
   const Frames& frames = *profile.frames;
   const bool extended = profile.bus.extended_ids;

@@ -30,6 +30,22 @@ constexpr std::array sample{F{"counter", "", true, "counts the samples; the same
                             F{"inner", "rad", false, "gimbal read-out"},
                             F{"temperature", "degC", false, "of the IMU"}};
 
+constexpr std::array<std::string_view, 7> run_states{"starting", "idle",   "rotating", "complete",
+                                                     "aborted",  "failed", "checking"};
+constexpr std::array<std::string_view, 4> sessions{"unknown", "default", "programming", "extended"};
+constexpr std::array status_state{F{"state", "", true, "what the INS is doing", run_states},
+                                  F{"gimbal_moving", "", false, "1: the gimbal turns"},
+                                  F{"unlocked", "", false, "1: the lock is open"},
+                                  F{"session", "", false, "that it is in", sessions},
+                                  F{"faults", "", false, "bits: 1 gimbal, 2 sensor, 4 FLASH, 8 coefficients"},
+                                  F{"position", "", false, "1 is the first; 0: not in a schedule"},
+                                  F{"pages_written", "", false, "of this run"},
+                                  F{"state_alive", "", false, "counts the frames"}};
+constexpr std::array status_gimbal{F{"outer_angle", "deg", false, "gimbal read-out"},
+                                   F{"inner_angle", "deg", false, "gimbal read-out"},
+                                   F{"time_left", "s", false, "of the rotation, on the INS's clock"},
+                                   F{"gimbal_alive", "", false, "counts the frames"}};
+
 const std::array roles{
     FrameRole{"identity", true, true, "who it is; again and again", identity},
     FrameRole{"state", true, true, "what it is doing; again and again", state},
@@ -40,6 +56,8 @@ const std::array roles{
     FrameRole{"read", false, true, "tell a coefficient", read},
     FrameRole{"write", false, true, "hold a coefficient; used from the next power-on on", told},
     FrameRole{"reset", false, true, "restart, as by power", {}},
+    FrameRole{"status.state", true, false, "what it is doing; periodic", status_state},
+    FrameRole{"status.gimbal", true, false, "where the gimbal is; periodic", status_gimbal},
     FrameRole{"sample", true, true, "a sample of the IMU, or a part of it", sample},
 };
 

@@ -39,6 +39,11 @@ struct Frames {
   double longest_move_s = 60.0;      // of the INS's clock
 };
 
+// What an INS tells again and again beside UDS. Its identifiers are those of the bus; the ones here are not used.
+struct StatusFrames {
+  Frame state, gimbal;
+};
+
 // What the frames must and may tell: THE table, for the reader and for the reference.
 struct FrameRole {
   std::string_view name;

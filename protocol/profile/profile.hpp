@@ -56,12 +56,13 @@ struct Routine {
 // The raw data: how their pages are asked for, and what they hold.
 struct Raw {
   Layout page;
-  enum class Way : std::uint8_t { upload, memory };
-  Way way = Way::upload;            // RequestUpload, or ReadMemoryByAddress
+  enum class Way : std::uint8_t { upload, memory, file };
+  Way way = Way::upload;            // RequestUpload, ReadMemoryByAddress, or RequestFileTransfer
   bool by_page = true;              // RequestUpload's address counts pages; else bytes
   std::uint32_t first_address = 0;  // of ReadMemoryByAddress: where page 0 of the run begins
   std::uint32_t longest_read = 0;   // bytes that it tells at once
   std::size_t address_bytes = 4, size_bytes = 4;
+  std::string file;  // of RequestFileTransfer: the name of a page's file (raw_file.hpp)
   // Our axis k is the INS's axis index[k], times sign[k].
   std::array<std::size_t, 3> axis{0, 1, 2};
   std::array<int, 3> sign{1, 1, 1};
@@ -85,6 +86,7 @@ struct Profile {
   Layout set;
   Routine rotate, erase, commit, navigation_check;
   Raw raw;
+  StatusFrames status;  // where `bus` has their identifier
   // An INS that speaks no UDS. All the rest is then what the service asks itself in its place (daemon/ins/frame_port).
   std::optional<Frames> frames;
 };

@@ -23,8 +23,26 @@ constexpr std::array<std::string_view, 8> of_a_sample{"delta_theta_x", "delta_th
 
 class FramesReader {
  public:
-  FramesReader(Section& root, const Profile& profile, ByteOrder order)
-      : profile_(profile), order_(order), section_(root.table("frames", true)) {}
+  FramesReader(Section section, const Profile& profile, ByteOrder order)
+      : profile_(profile), order_(order), section_(std::move(section)) {}
+
+  StatusFrames read_status() {
+    StatusFrames frames;
+    for (const auto& [name, frame] : {std::pair("state", &frames.state), std::pair("gimbal", &frames.gimbal)}) {
+      Section table = section_.table(name, true);
+      const FrameRole& role = frame_role(fmt::format("status.{}", name));
+      frame->name = role.name;
+      frame->line = table.line();
+      if (table.there()) {
+        read_bytes(table, *frame);
+        read_signals(table, role, nullptr, *frame);
+        std::ranges::stable_sort(frame->signals, {}, &Signal::start);  // a TOML table knows no order
+        table.only_these();
+      }
+    }
+    section_.only_these();
+    return frames;
+  }
 
   Frames read() {
     Frames frames;
@@ -84,6 +102,17 @@ class FramesReader {
     return &found->second;
   }
 
+  void read_bytes(Section& section, Frame& frame) const {
+    frame.bytes = section.whole("bytes", 1, profile_.bus.fd ? 64 : 8, true).value_or(8);
+    check_bytes(section, frame);
+  }
+
+  static void check_bytes(Section& section, const Frame& frame) {
+    if (can::frame_size_for(frame.bytes) != frame.bytes) {
+      section.fault("bytes", fmt::format("no CAN frame has {}", frame.bytes));
+    }
+  }
+
   Frame read_frame(Section& section, const FrameRole& role) {
     Frame frame;
     if (!section.there()) {
@@ -96,13 +125,11 @@ class FramesReader {
     if (message != nullptr) {
       frame.id = message->id;
       frame.bytes = message->bytes;
+      check_bytes(section, frame);
     } else if (!by_name) {
       frame.id = static_cast<std::uint32_t>(
           section.whole("id", 0, profile_.bus.extended_ids ? 0x1FFFFFFF : 0x7FF, true).value_or(0));
-      frame.bytes = section.whole("bytes", 1, profile_.bus.fd ? 64 : 8, true).value_or(8);
-    }
-    if (can::frame_size_for(frame.bytes) != frame.bytes) {
-      section.fault("bytes", fmt::format("no CAN frame has {}", frame.bytes));
+      read_bytes(section, frame);
     }
     read_signals(section, role, message, frame);
     check_id(section, role, frame);
@@ -373,7 +400,11 @@ class FramesReader {
 }  // namespace
 
 Frames read_frames(Section& root, const Profile& profile, ByteOrder order) {
-  return FramesReader(root, profile, order).read();
+  return FramesReader(root.table("frames", true), profile, order).read();
+}
+
+StatusFrames read_status_frames(Section& status, const Profile& profile, ByteOrder order) {
+  return FramesReader(status, profile, order).read_status();
 }
 
 }  // namespace selfcal::profile

@@ -9,4 +9,7 @@ namespace selfcal::profile {
 // `profile` has bus and set already.
 Frames read_frames(Section& root, const Profile& profile, ByteOrder order);
 
+// The table `status`: what the state frame and the gimbal frame hold.
+StatusFrames read_status_frames(Section& status, const Profile& profile, ByteOrder order);
+
 }  // namespace selfcal::profile

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/raw_file.hpp"
 #include "protocol/profile/read_bus.hpp"
 #include "protocol/profile/read_frames.hpp"
 #include "protocol/profile/read_layout.hpp"
@@ -60,7 +61,18 @@ class ProfileReader {
   }
 
  private:
+  // Where a profile says nothing of them, they are as our own INS's.
+  void read_status() {
+    Section status = root_.table("status");
+    if (status.there()) {
+      profile_.status = read_status_frames(status, profile_, order_);
+    } else if (profile_.bus.status) {
+      profile_.status = built_in()->status;
+    }
+  }
+
   void read_uds() {
+    read_status();
     read_timing();
     read_identity();
     read_records();
@@ -256,14 +268,29 @@ class ProfileReader {
     memory.only_these();
   }
 
+  // RequestFileTransfer: each page is a file.
+  void read_file(Section& file) {
+    profile_.raw.way = Raw::Way::file;
+    profile_.raw.by_page = false;
+    profile_.raw.file = file.text("name", true).value_or("");
+    if (const std::string fault = fault_of_file_pattern(profile_.raw.file); file.has("name") && !fault.empty()) {
+      file.fault("name", fault);
+    }
+    file.only_these();
+  }
+
   void read_raw() {
     Section memory = root_.table("memory");
     if (memory.there()) {
       read_memory(memory);
     }
-    Section upload = root_.table("upload", !memory.there());
-    if (upload.there() && memory.there()) {
-      upload.fault("", "and memory: the raw data are asked for in one way");
+    Section file = root_.table("file");
+    if (file.there()) {
+      read_file(file);
+    }
+    Section upload = root_.table("upload", !memory.there() && !file.there());
+    if (int{upload.there()} + int{memory.there()} + int{file.there()} > 1) {
+      (upload.there() ? upload : file).fault("", "and another: the raw data are asked for in one way");
     }
     if (upload.there()) {
       profile_.raw.by_page = upload.word("address", address_units, true).value_or("page") == "page";

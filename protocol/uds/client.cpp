@@ -14,6 +14,7 @@ std::size_t identifier_size(std::uint8_t service) {
     case service::ecu_reset:
     case service::security_access:
     case service::transfer_data:
+    case service::file_transfer:
     case service::tester_present: return 1;
     case service::read_data:
     case service::write_data: return 2;

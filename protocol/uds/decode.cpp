@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "protocol/ins_interface/identifiers.hpp"
-#include "protocol/ins_interface/status.hpp"
 #include "protocol/isotp/codec.hpp"
 
 namespace selfcal::uds {
@@ -16,30 +14,18 @@ std::string stamp(Time time) {
   return fmt::format("({}.{:06})", micros / 1'000'000, micros % 1'000'000);
 }
 
-// "idle" out of "0=starting 1=idle" where the value has a name, else the number with its unit; a count needs none.
-std::string signal_text(const ins::Signal& signal, std::uint32_t raw) {
-  const std::string key = fmt::format(" {}=", raw);
-  const std::string values = fmt::format(" {} ", signal.values);
-  if (const auto at = values.find(key); at != std::string::npos) {
-    const auto from = at + key.size();
-    return values.substr(from, values.find(' ', from) - from);
+std::optional<LogEntry> status_entry(std::vector<LogEntry::Signal> signals, Time time) {
+  if (signals.empty()) {
+    return std::nullopt;
   }
-  const bool count = signal.unit.empty() || signal.unit == "page";
-  return fmt::format("{:g}{}{}", raw * signal.factor, count ? "" : " ", count ? "" : signal.unit);
-}
-
-LogEntry status_entry(const can::CanFrame& frame, Time time) {
   LogEntry entry;
   entry.time = time;
   entry.kind = LogEntry::Kind::status;
   entry.sender = LogEntry::Sender::ins;
-  for (const ins::Signal& signal : ins::status_signals) {
-    if (signal.frame_id == frame.id) {
-      const std::uint32_t raw = ins::raw_signal(signal, frame.payload());
-      entry.signals.push_back({signal.name, raw * signal.factor, signal_text(signal, raw)});
-      entry.words += fmt::format("{}{}={}", entry.words.empty() ? "" : " ", signal.name, entry.signals.back().text);
-    }
+  for (const LogEntry::Signal& signal : signals) {
+    entry.words += fmt::format("{}{}={}", entry.words.empty() ? "" : " ", signal.name, signal.text);
   }
+  entry.signals = std::move(signals);
   return entry;
 }
 
@@ -63,28 +49,25 @@ std::string line(const LogEntry& entry) {
 
 LogDecoder::LogDecoder(const DecoderOptions& options)
     : options_(options),
-      streams_{Stream{options.request_id, LogEntry::Sender::tester, {}, 0, 0},
-               Stream{options.response_id, LogEntry::Sender::ins, {}, 0, 0},
-               Stream{options.functional_id, LogEntry::Sender::tester_to_all, {}, 0, 0}} {}
+      streams_{Stream{options.request_id, options.request_byte, LogEntry::Sender::tester, {}, 0, 0},
+               Stream{options.response_id, options.response_byte, LogEntry::Sender::ins, {}, 0, 0},
+               Stream{options.functional_id, options.functional_byte, LogEntry::Sender::tester_to_all, {}, 0, 0}} {}
 
 std::optional<LogEntry> LogDecoder::on_frame(const can::CanFrame& frame, Time time) {
   if (frame.remote) {
     return std::nullopt;
   }
   for (Stream& stream : streams_) {
-    if (frame.id == stream.id && frame.extended == options_.extended) {
-      return on_stream(stream, frame, time);
+    const bool meant = !stream.address || (frame.size > 0 && frame.data[0] == *stream.address);
+    if (frame.id == stream.id && frame.extended == options_.extended && meant) {
+      return on_stream(stream, frame.payload().subspan(stream.address ? 1 : 0), time);
     }
   }
-  const bool is_status = frame.id == ins::can_id::status || frame.id == ins::can_id::gimbal;
-  if (is_status && !frame.extended && frame.size == 8) {
-    return status_entry(frame, time);
-  }
-  return std::nullopt;
+  return options_.status ? status_entry(options_.status(frame), time) : std::nullopt;
 }
 
-std::optional<LogEntry> LogDecoder::on_stream(Stream& stream, const can::CanFrame& frame, Time time) {
-  const auto pdu = isotp::decode(frame.payload());
+std::optional<LogEntry> LogDecoder::on_stream(Stream& stream, std::span<const std::uint8_t> data, Time time) {
+  const auto pdu = isotp::decode(data);
   if (!pdu) {
     return broken(stream, "malformed frame", time);
   }
@@ -125,8 +108,12 @@ std::optional<LogEntry> LogDecoder::on_stream(Stream& stream, const can::CanFram
 
 LogEntry LogDecoder::whole(const Stream& stream, std::span<const std::uint8_t> message, Time time) {
   ++messages_;
-  return {time, LogEntry::Kind::message,  stream.sender, {message.begin(), message.end()},
-          {},   describe_message(message)};
+  return {time,
+          LogEntry::Kind::message,
+          stream.sender,
+          {message.begin(), message.end()},
+          {},
+          describe_message(message, options_.names)};
 }
 
 LogEntry LogDecoder::broken(const Stream& stream, std::string_view why, Time time) {

@@ -3,7 +3,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,15 +17,15 @@
 
 namespace selfcal::uds {
 
-// One line: service, DID or routine, NRC by name, the first bytes of data; of seeds and keys only their length.
-std::string describe_message(std::span<const std::uint8_t> message);
-
-struct DecoderOptions {
-  std::uint32_t request_id = 0x640;
-  std::uint32_t response_id = 0x648;
-  std::uint32_t functional_id = 0x7DF;
-  bool extended = false;
+// What an INS calls its numbers; one that is not among them is "unknown".
+struct Names {
+  std::map<std::uint16_t, std::string> dids, routines;
+  std::set<std::uint16_t> texts;  // data identifiers whose record is text
+  bool upload_by_page = false;    // RequestUpload counts pages
 };
+
+// One line: service, DID or routine, NRC by name, the first bytes of data; of seeds and keys only their length.
+std::string describe_message(std::span<const std::uint8_t> message, const Names& names = {});
 
 // What the frames of a log come to.
 struct LogEntry {
@@ -33,9 +36,9 @@ struct LogEntry {
   };
   enum class Sender : std::uint8_t { tester, tester_to_all, ins };
   struct Signal {
-    std::string_view name;
+    std::string name;
     double value = 0.0;
-    std::string text;  // with its unit, or its name: "90 deg", "idle"
+    std::string text;  // with its unit, or its word: "90 deg", "idle"
   };
 
   Time time{0};  // of the last frame
@@ -46,7 +49,17 @@ struct LogEntry {
   std::string words;  // as describe_message; of a status frame each signal
 };
 
-// "(1436509052.249713) tester  ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)"
+struct DecoderOptions {
+  std::uint32_t request_id = 0, response_id = 0, functional_id = 0;
+  bool extended = false;
+  // Extended and mixed addressing: the first byte of each frame.
+  std::optional<std::uint8_t> request_byte, response_byte, functional_byte;
+  Names names;
+  // The signals of a status frame of the INS; none of any other frame.
+  std::function<std::vector<LogEntry::Signal>(const can::CanFrame&)> status;
+};
+
+// "(1436509052.249713) tester  ReadDataByIdentifier (0x22) identity.serial (0x4001)"
 std::string line(const LogEntry& entry);
 
 // Puts ISO-TP messages together by listening only (it sends no flow control).
@@ -64,12 +77,13 @@ class LogDecoder {
  private:
   struct Stream {
     std::uint32_t id = 0;
+    std::optional<std::uint8_t> address;
     LogEntry::Sender sender = LogEntry::Sender::tester;
     std::vector<std::uint8_t> bytes;
     std::size_t length = 0;  // 0: no message under way
     std::uint8_t sequence = 0;
   };
-  std::optional<LogEntry> on_stream(Stream& stream, const can::CanFrame& frame, Time time);
+  std::optional<LogEntry> on_stream(Stream& stream, std::span<const std::uint8_t> data, Time time);
   LogEntry whole(const Stream& stream, std::span<const std::uint8_t> message, Time time);
   LogEntry broken(const Stream& stream, std::string_view why, Time time);
 

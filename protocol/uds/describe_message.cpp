@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/decode.hpp"
 #include "protocol/uds/services.hpp"
 
@@ -25,9 +24,8 @@ std::string data_text(ByteView data) {
 }
 
 // Records that are text are shown as text; what a terminal would obey is escaped.
-std::string record_text(std::uint16_t did, ByteView record) {
-  const auto known = std::ranges::find(ins::data_identifiers, did, &ins::DataIdentifier::id);
-  if (record.empty() || known == ins::data_identifiers.end() || known->content != "ASCII") {
+std::string record_text(std::uint16_t did, ByteView record, const Names& names) {
+  if (record.empty() || !names.texts.contains(did)) {
     return data_text(record);
   }
   std::string text;
@@ -37,6 +35,34 @@ std::string record_text(std::uint16_t did, ByteView record) {
   }
   return fmt::format(": \"{}\"{}", text,
                      record.size() > shown_characters ? fmt::format(" … {} bytes", record.size()) : "");
+}
+
+std::string_view name_of(const std::map<std::uint16_t, std::string>& names, std::uint16_t id) {
+  const auto found = names.find(id);
+  return found == names.end() ? std::string_view("unknown") : found->second;
+}
+
+// Its data format and the lengths of address and size, one hexadecimal digit each, stand before them.
+std::string upload_text(ByteView body, const Names& names) {
+  if (body.size() < 2) {
+    return data_text(body);
+  }
+  const std::size_t address_bytes = body[1] & 0x0FU, size_bytes = body[1] >> 4U;
+  if (address_bytes == 0 || size_bytes == 0 || address_bytes > 8 || size_bytes > 8 ||
+      body.size() != 2 + address_bytes + size_bytes) {
+    return data_text(body);
+  }
+  const auto number = [](ByteView bytes) {
+    std::uint64_t value = 0;
+    for (const std::uint8_t byte : bytes) {
+      value = value << 8U | byte;
+    }
+    return value;
+  };
+  const std::uint64_t from = number(body.subspan(2, address_bytes));
+  return fmt::format(" from {}, {} bytes",
+                     names.upload_by_page ? fmt::format("page {}", from) : fmt::format("0x{:X}", from),
+                     number(body.subspan(2 + address_bytes)));
 }
 
 std::string_view action_name(std::uint8_t action) {
@@ -63,7 +89,7 @@ std::string security_text(std::uint8_t level, ByteView rest) {
 }
 
 // What follows the service, which is the same in requests and responses for most services.
-std::string body_text(std::uint8_t service, ByteView body, bool response) {
+std::string body_text(std::uint8_t service, ByteView body, bool response, const Names& names) {
   ByteReader in(body);
   switch (service) {
     case service::session_control:
@@ -72,25 +98,20 @@ std::string body_text(std::uint8_t service, ByteView body, bool response) {
     case service::read_data:
     case service::write_data:
       if (const auto did = in.get<std::uint16_t>(); in.ok()) {
-        return fmt::format(" {} (0x{:04X})", ins::did_name(did), did) + record_text(did, body.subspan(2));
+        return fmt::format(" {} (0x{:04X})", name_of(names.dids, did), did) + record_text(did, body.subspan(2), names);
       }
       break;
     case service::routine_control: {
       const auto action = in.get<std::uint8_t>();
       const auto routine = in.get<std::uint16_t>();
       if (in.ok()) {
-        return fmt::format(" {} {} (0x{:04X})", action_name(action & 0x7FU), ins::routine_name(routine), routine) +
+        return fmt::format(" {} {} (0x{:04X})", action_name(action & 0x7FU), name_of(names.routines, routine),
+                           routine) +
                data_text(body.subspan(3));
       }
       break;
     }
-    case service::request_upload:
-      if (!response && body.size() == 10) {
-        in.get<std::uint16_t>();
-        const auto page = in.get<std::uint32_t>();
-        return fmt::format(" from page {}, {} bytes", page, in.get<std::uint32_t>());
-      }
-      break;
+    case service::request_upload: return response ? data_text(body) : upload_text(body, names);
     case service::transfer_data:
       return body.empty() ? "" : fmt::format(" block {}, {} bytes", body[0], body.size() - 1);
     default: break;
@@ -100,7 +121,7 @@ std::string body_text(std::uint8_t service, ByteView body, bool response) {
 
 }  // namespace
 
-std::string describe_message(ByteView message) {
+std::string describe_message(ByteView message, const Names& names) {
   if (message.empty()) {
     return "empty message";
   }
@@ -113,7 +134,7 @@ std::string describe_message(ByteView message) {
   const bool response = (message[0] & positive_offset) != 0;
   const auto service = static_cast<std::uint8_t>(message[0] & ~positive_offset);
   return fmt::format("{}{} (0x{:02X}){}", response ? "positive " : "", service_name(service), message[0],
-                     body_text(service, message.subspan(1), response));
+                     body_text(service, message.subspan(1), response, names));
 }
 
 }  // namespace selfcal::uds

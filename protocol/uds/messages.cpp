@@ -10,6 +10,7 @@ namespace selfcal::uds {
 namespace {
 
 constexpr std::uint8_t no_compression = 0x00;
+constexpr std::uint8_t read_file_mode = 0x04;
 
 template <typename... Fields>
 Bytes message(std::uint8_t service, const Fields&... fields) {
@@ -70,20 +71,21 @@ Bytes with_range(Bytes request, std::uint32_t address, std::uint32_t bytes, Uplo
   return request;
 }
 
+std::uint64_t number_of(ByteView bytes) {
+  std::uint64_t value = 0;
+  for (const std::uint8_t byte : bytes) {
+    value = value << 8U | byte;
+  }
+  return value;
+}
+
 // Address and size behind `head` bytes, in a request of just that length.
 tl::expected<UploadRange, Nrc> parse_range(ByteView request, std::size_t head, UploadFormat format) {
   if (request.size() != head + format.address_bytes + format.size_bytes) {
     return tl::unexpected(Nrc::incorrect_message_length);
   }
-  const auto number = [](ByteView bytes) {
-    std::uint32_t value = 0;
-    for (const std::uint8_t byte : bytes) {
-      value = value << 8U | byte;
-    }
-    return value;
-  };
-  return UploadRange{number(request.subspan(head, format.address_bytes)),
-                     number(request.subspan(head + format.address_bytes))};
+  return UploadRange{static_cast<std::uint32_t>(number_of(request.subspan(head, format.address_bytes))),
+                     static_cast<std::uint32_t>(number_of(request.subspan(head + format.address_bytes)))};
 }
 
 }  // namespace
@@ -107,6 +109,11 @@ Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat fo
 }
 Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
   return with_range(message(service::read_memory, format_code(format)), address, bytes, format);
+}
+Bytes file_request(std::string_view name) {
+  Bytes tail(name.begin(), name.end());
+  tail.push_back(no_compression);
+  return with_tail(message(service::file_transfer, read_file_mode, static_cast<std::uint16_t>(name.size())), tail);
 }
 Bytes transfer_request(std::uint8_t block) { return message(service::transfer_data, block); }
 Bytes transfer_exit_request() { return message(service::transfer_exit); }
@@ -156,10 +163,7 @@ Expected<std::uint32_t> read_upload_response(ByteView response) {
     return fail(ErrorKind::device, fmt::format("RequestUpload: length format 0x{:02X} in a response of {} bytes",
                                                response[1], response.size()));
   }
-  std::uint32_t longest = 0;
-  for (const std::uint8_t byte : response.subspan(2, width)) {
-    longest = longest << 8U | byte;
-  }
+  const auto longest = static_cast<std::uint32_t>(number_of(response.subspan(2, width)));
   if (longest <= transfer_overhead) {
     return fail(ErrorKind::device, fmt::format("RequestUpload: blocks of {} bytes carry no data", longest));
   }
@@ -192,6 +196,51 @@ tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadForm
   }
   return request[1] == format_code(format) ? parse_range(request, 2, format)
                                            : tl::unexpected(Nrc::request_out_of_range);
+}
+
+// ISO 14229-1, 14.6: mode, bytes of the longest block and the block, data format, bytes of a size, size, size compressed.
+Expected<FileAnswer> read_file_response(ByteView response) {
+  if (const auto checked = check_code(response, service::file_transfer, read_file_mode, 3); !checked) {
+    return tl::unexpected(checked.error());
+  }
+  const auto malformed = [&](std::string_view what) {
+    return fail(ErrorKind::device,
+                fmt::format("RequestFileTransfer: {} in a response of {} bytes", what, response.size()));
+  };
+  const std::size_t width = response[2];
+  constexpr std::size_t size_width_bytes = 2;
+  const std::size_t format_at = 3 + width, sizes_at = format_at + 1 + size_width_bytes;
+  if (width < 1 || width > 4 || response.size() < sizes_at) {
+    return malformed(fmt::format("a block's length of {} bytes", width));
+  }
+  const std::uint64_t size_width = number_of(response.subspan(format_at + 1, size_width_bytes));
+  if (size_width < 1 || size_width > 8 || response.size() != sizes_at + 2 * size_width) {
+    return malformed(fmt::format("a file's size of {} bytes", size_width));
+  }
+  const FileAnswer answer{static_cast<std::uint32_t>(number_of(response.subspan(3, width))),
+                          number_of(response.subspan(sizes_at, size_width))};
+  if (response[format_at] != no_compression || number_of(response.subspan(sizes_at + size_width)) != answer.bytes) {
+    return malformed("compressed or encrypted data");
+  }
+  return answer.longest > transfer_overhead ? Expected<FileAnswer>(answer) : malformed("blocks without data");
+}
+
+tl::expected<std::string, Nrc> parse_file_request(ByteView request) {
+  constexpr std::size_t head = 4, shortest = 6;  // service, mode, two bytes of length; a name and the data format
+  if (request.size() < shortest) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  if (request[1] != read_file_mode) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  const std::uint64_t length = number_of(request.subspan(2, 2));
+  if (request.size() != head + length + 1) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  if (request.back() != no_compression) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  return std::string(request.begin() + head, request.end() - 1);
 }
 
 tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format) {
@@ -243,6 +292,11 @@ Bytes routine_response(const RoutineCall& call, ByteView status) {
 }
 Bytes upload_response(std::uint32_t max_block) {
   return message(positive(service::request_upload), std::uint8_t{0x40}, max_block);
+}
+Bytes file_response(std::uint32_t max_block, std::uint32_t file_bytes) {
+  constexpr std::uint16_t size_width = sizeof file_bytes;
+  return message(positive(service::file_transfer), read_file_mode, static_cast<std::uint8_t>(sizeof max_block),
+                 max_block, no_compression, size_width, file_bytes, file_bytes);
 }
 void transfer_response(std::uint8_t block, ByteView data, Bytes& out) {
   out.assign({positive(service::transfer_data), block});

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/error.hpp"
@@ -35,6 +37,8 @@ struct UploadFormat {
 };
 Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
 Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
+// ReadFile, uncompressed.
+Bytes file_request(std::string_view name);
 Bytes transfer_request(std::uint8_t block);  // 1 first; after 0xFF comes 0x00
 Bytes transfer_exit_request();
 
@@ -54,6 +58,11 @@ struct SessionTimings {
 [[nodiscard]] Expected<ByteView> read_routine_response(ByteView response, RoutineAction action,
                                                        std::uint16_t routine);  // the status record
 [[nodiscard]] Expected<std::uint32_t> read_upload_response(ByteView response);  // longest TransferData response, bytes
+struct FileAnswer {
+  std::uint32_t longest = 0;  // TransferData response, bytes
+  std::uint64_t bytes = 0;    // of the file
+};
+[[nodiscard]] Expected<FileAnswer> read_file_response(ByteView response);
 [[nodiscard]] Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes);   // the data, so many
 [[nodiscard]] Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block);  // the data
 [[nodiscard]] Expected<ByteView> read_transfer_exit_response(ByteView response);                 // the parameter record
@@ -73,6 +82,7 @@ struct RoutineCall {
 };
 [[nodiscard]] tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format = {});
 [[nodiscard]] tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadFormat format = {});
+[[nodiscard]] tl::expected<std::string, Nrc> parse_file_request(ByteView request);  // the file's name
 [[nodiscard]] tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request);
 
 // Responses, as the server writes them
@@ -83,6 +93,7 @@ Bytes read_response(std::uint16_t did, ByteView record);
 Bytes write_response(std::uint16_t did);
 Bytes routine_response(const RoutineCall& call, ByteView status = {});
 Bytes upload_response(std::uint32_t max_block);
+Bytes file_response(std::uint32_t max_block, std::uint32_t file_bytes);
 Bytes memory_response(ByteView data);
 // Service, counter, data, into a buffer that is kept: 16 MB go this way.
 void transfer_response(std::uint8_t block, ByteView data, Bytes& out);

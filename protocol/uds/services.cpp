@@ -14,6 +14,7 @@ std::string_view service_name(std::uint8_t service) {
     case service::write_data: return "WriteDataByIdentifier";
     case service::routine_control: return "RoutineControl";
     case service::request_upload: return "RequestUpload";
+    case service::file_transfer: return "RequestFileTransfer";
     case service::transfer_data: return "TransferData";
     case service::transfer_exit: return "RequestTransferExit";
     case service::tester_present: return "TesterPresent";

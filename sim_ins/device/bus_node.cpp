@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/ins_interface/status.hpp"
+#include "protocol/profile/status_frames.hpp"
 
 namespace selfcal::sim {
 namespace {
@@ -202,11 +202,9 @@ void BusNode::queue_status() {
     faulty_.count(FaultKind::wrong_status);
     status.state = ins::State::idle;
   }
-  status_frames_ = {ins::encode_state_frame(status, alive_, options_.status_id),
-                    ins::encode_gimbal_frame(status, alive_, options_.status_id + 1)};
-  for (can::CanFrame& frame : status_frames_) {
-    frame.extended = options_.extended_ids;
-  }
+  const auto frames =
+      profile::encode_status(*options_.diagnostics.profile, status, alive_, options_.status_id, options_.extended_ids);
+  status_frames_.assign(frames.begin(), frames.end());
   ++alive_;
 }
 

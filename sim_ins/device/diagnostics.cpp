@@ -31,7 +31,7 @@ constexpr std::uint16_t values(std::initializer_list<unsigned> list) {
   }
   return static_cast<std::uint16_t>(bits);
 }
-constexpr std::array<ServiceRule, 11> service_rules = {{
+constexpr std::array<ServiceRule, 12> service_rules = {{
     {service::session_control, true, 2, values({1, 2, 3})},
     {service::ecu_reset, false, 2, values({1, 2})},
     {service::read_data, true, 3, 0},
@@ -42,6 +42,7 @@ constexpr std::array<ServiceRule, 11> service_rules = {{
     {service::request_upload, false, 5, 0},
     {service::transfer_data, false, 2, 0},
     {service::transfer_exit, false, 1, 0},
+    {service::file_transfer, false, 6, 0},
     {service::tester_present, true, 2, values({0})},
 }};
 
@@ -110,13 +111,24 @@ std::optional<uds::Bytes> Diagnostics::take_answer() {
   return std::exchange(answer_, std::nullopt)->response;
 }
 
+// There is one way to the raw data, and what belongs to the others is no service of this INS.
+bool Diagnostics::profile_has(std::uint8_t id) const {
+  using Way = profile::Raw::Way;
+  const Way way = profile_->raw.way;
+  switch (id) {
+    case service::read_memory: return way == Way::memory;
+    case service::request_upload: return way == Way::upload;
+    case service::file_transfer: return way == Way::file;
+    case service::transfer_data:
+    case service::transfer_exit: return way != Way::memory;
+    default: return true;
+  }
+}
+
 // Figures 5 and 6, without security, which here belongs to sub-functions, identifiers and routines.
 Nrc Diagnostics::general_objection(View request) const {
   const auto rule = std::ranges::find(service_rules, request[0], &ServiceRule::id);
-  const bool by_memory = profile_->raw.way == profile::Raw::Way::memory;
-  const bool uploads = request[0] == service::request_upload || request[0] == service::transfer_data ||
-                       request[0] == service::transfer_exit;
-  if (rule == service_rules.end() || (by_memory ? uploads : request[0] == service::read_memory)) {
+  if (rule == service_rules.end() || !profile_has(request[0])) {
     return Nrc::service_not_supported;
   }
   if (session_ == uds::Session::standard && !rule->in_default_session) {
@@ -154,6 +166,7 @@ Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& res
     case service::routine_control: return routine(request);
     case service::read_memory: return upload_.memory(request);
     case service::request_upload: return upload_.request(request);
+    case service::file_transfer: return upload_.file(request);
     case service::transfer_data: return upload_.transfer(request, response);
     case service::transfer_exit: return upload_.exit(request);
     default:

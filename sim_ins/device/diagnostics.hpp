@@ -51,6 +51,7 @@ class Diagnostics : public uds::RequestHandler {
   using Reply = uds::Reply;
 
   Reply dispatch(View request, Time now, uds::Bytes& response);
+  bool profile_has(std::uint8_t id) const;
   uds::Nrc general_objection(View request) const;
   Reply session_control(View request);
   Reply ecu_reset(View request);

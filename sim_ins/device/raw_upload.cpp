@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "protocol/profile/raw_file.hpp"
 #include "protocol/profile/records.hpp"
 
 namespace selfcal::sim {
@@ -31,6 +32,21 @@ Reply RawUpload::request(std::span<const std::uint8_t> request) {
   upload_ = Upload{first_page, range->bytes, 0, 1, 0};
   told_.reset();
   return uds::upload_response(longest_response_);
+}
+
+Reply RawUpload::file(std::span<const std::uint8_t> request) {
+  const auto name = uds::parse_file_request(request);
+  if (!name) {
+    return tl::unexpected(name.error());
+  }
+  const ins::DirectoryRecord directory = raw_.directory();
+  const auto page = profile::page_of_file(profile_->raw.file, directory.run_id, *name);
+  if (!page || *page < directory.first_page || *page >= directory.pages_written) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  upload_ = Upload{*page, page_bytes(), 0, 1, 0};
+  told_.reset();
+  return uds::file_response(longest_response_, page_bytes());
 }
 
 // A request that is refused changes nothing: the last block can still be asked for again.

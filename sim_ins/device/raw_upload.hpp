@@ -28,6 +28,8 @@ class RawUpload {
   [[nodiscard]] uds::Reply transfer(std::span<const std::uint8_t> request, uds::Bytes& response);
   // ReadMemoryByAddress (ISO 14229-1, 10.3), where the profile's raw data are asked for so.
   [[nodiscard]] uds::Reply memory(std::span<const std::uint8_t> request);
+  // RequestFileTransfer (ISO 14229-1, 14.6), where each page is a file.
+  [[nodiscard]] uds::Reply file(std::span<const std::uint8_t> request);
   [[nodiscard]] uds::Reply exit(std::span<const std::uint8_t> request);
 
  private:

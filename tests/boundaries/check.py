@@ -2,7 +2,8 @@
 """Holds the source tree to its module boundaries: python3 check.py ROOT
 
 Reads every #include of our own code and prints one line, "file:line: what", for each that points against the
-arrows below; then checks that no file is too long and that each folder of the top level explains itself.
+arrows below; then checks that no file is too long, that each folder of the top level explains itself, and that no identifier
+of our own INS's profile stands in C++ outside of tests.
 Exit status 1 if anything was found.
 """
 import re
@@ -27,7 +28,7 @@ MAY_INCLUDE = {
     "protocol/flash": [*BYTES],
     "protocol/ins_interface": [*BYTES, "protocol/flash"],
     "protocol/isotp": [*BYTES],
-    "protocol/uds": [*BYTES, "protocol/isotp", "protocol/ins_interface"],
+    "protocol/uds": [*BYTES, "protocol/isotp"],
     # A fault of the estimator must not be repeated in the truth that it is measured against.
     "sim_ins": ["protocol", "estimator/geometry"],
     # The rooms of the daemon: host <- ins, store <- estimate <- run <- what stands in daemon/ itself.
@@ -61,6 +62,13 @@ STANDARD = re.compile(r"^[a-z_0-9]+$")
 # toml++ does not survive every text; what stands before it does.
 TOML = re.compile(r"^toml\+\+/.*$")
 TOML_GUARD = "protocol/toml_file/"
+
+# Our own INS is known by its profile alone. A number below this is too common to be one of an INS: a hexadecimal 0x10 is none.
+OWN_PROFILE = "config/profiles/selfcal.toml"
+LEAST_OWN = 0x100
+TOML_NUMBER = re.compile(r"^\s*(?:did|routine|serial|software|in_force|inactive|factory|request|response|functional|status)"
+                         r"\s*=\s*(0x[0-9A-Fa-f]+)")
+HEX_NUMBER = re.compile(r"\b0[xX][0-9A-Fa-f']+")
 
 # Paths generated at build time; written <like/this>, so never mistaken for files of ours.
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -112,7 +120,27 @@ def include_complaints(root, path):
             yield f"{where}: a codec depends on the standard library only, not on <{name}>"
 
 
+def own_numbers(root):
+    """What our own INS's profile says as a number: identifiers of frames and data, and routines."""
+    profile = root / OWN_PROFILE
+    lines = profile.read_text(encoding="utf-8").splitlines() if profile.is_file() else []
+    found = (TOML_NUMBER.match(line) for line in lines)
+    numbers = {int(match[1], 16) for match in found if match}
+    return {number for number in numbers if number >= LEAST_OWN}
+
+
+def number_complaints(root, path, own):
+    source = path.relative_to(root).as_posix()
+    if source.startswith("tests/"):
+        return
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        for match in HEX_NUMBER.finditer(line):
+            if int(match[0].replace("'", ""), 16) in own:
+                yield f"{source}:{number}: {match[0]} is our own INS's: it stands in {OWN_PROFILE} alone"
+
+
 def complaints(root):
+    own = own_numbers(root)
     for folder in TOP_LEVEL:
         if not (root / folder / "README.md").is_file():
             yield f"{folder}/: has no README.md"
@@ -124,6 +152,7 @@ def complaints(root):
                 yield f"{path.relative_to(root)}: {length} lines, more than {LINE_LIMIT}"
             if path.suffix in CODE:
                 yield from include_complaints(root, path)
+                yield from number_complaints(root, path, own)
 
 
 def main():

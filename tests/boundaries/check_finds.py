@@ -29,8 +29,10 @@ KEPT = {
     "daemon/store/run_store.hpp": '#include "daemon/host/config.hpp"\n',
     "daemon/estimate/estimate_job.hpp": '#include "daemon/store/run_store.hpp"\n',
     "daemon/run/calibration_run.hpp": '#include "daemon/ins/ins_client.hpp"\n#include "daemon/estimate/estimate_job.hpp"\n',
-    "sim_ins/config.hpp": "",
-    "tests/helper.hpp": "",
+    "sim_ins/config.hpp": "constexpr int other = 0x0201, fill = 0xCC, decimal = 512;\n",
+    "config/profiles/selfcal.toml": "[state]\ndid = 0x0200  # not 0x0201\n"
+                                    "[rotate]\nroutine = 0x0301\n[bus]\nrequest = 0x640\npadding = 0xCC\n",
+    "tests/helper.hpp": "constexpr int state = 0x0200;\n",
 } | {f"{folder}/README.md": "" for folder in check.TOP_LEVEL}
 
 BREACHES = {
@@ -64,6 +66,9 @@ BREACHES = {
     "estimate below run": ("daemon/estimate/estimate_job.hpp", '#include "daemon/run/calibration_run.hpp"\n'),
     "run below the service": ("daemon/run/calibration_run.hpp", '#include "daemon/main.cpp"\n'),
     "toml++ behind its guard": ("daemon/main.cpp", "#include <toml++/toml.h>\n"),
+    "no data identifier of ours": ("daemon/main.cpp", "constexpr int state = 0x200;\n"),
+    "no routine of ours": ("sim_ins/config.hpp", "constexpr auto rotate = 0x0301U;\n"),
+    "no frame of ours": ("tools/cli/main.cpp", "constexpr int request = 0X640;\n"),
     "nobody includes tests": ("tools/cli/main.cpp", '#include "tests/helper.hpp"\n'),
     "paths from the root": ("daemon/main.cpp", '#include "config.hpp"\n'),
     "long file": ("daemon/main.cpp", "\n" * (check.LINE_LIMIT + 1)),

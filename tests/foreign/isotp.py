@@ -1,4 +1,4 @@
-"""ISO 15765-2 of one server on a classic CAN socket, normal addressing: messages in, messages out. Shares no line with our C++."""
+"""ISO 15765-2 of one end on a classic CAN socket, normal addressing: messages in, messages out. Shares no line with our C++."""
 import socket
 import struct
 
@@ -6,16 +6,17 @@ EXTENDED = 0x80000000
 
 
 class Transport:
-    def __init__(self, interface, receive_id, transmit_id, functional_id):
+    def __init__(self, interface, receive_id, transmit_id, functional_id, flag=EXTENDED):
+        self.flag = flag
         self.can = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self.can.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
         self.receive_id, self.transmit_id, self.functional_id = receive_id, transmit_id, functional_id
-        filters = [(receive_id | EXTENDED, 0xDFFFFFFF), (functional_id | EXTENDED, 0xDFFFFFFF)]
+        filters = [(i | flag, 0xDFFFFFFF) for i in (receive_id, functional_id)]
         self.can.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"".join(struct.pack("=II", *f) for f in filters))
         self.can.bind((interface,))
 
     def _put(self, data):
-        frame = struct.pack("=IB3x8s", self.transmit_id | EXTENDED, 8, bytes(data).ljust(8, b"\x55"))
+        frame = struct.pack("=IB3x8s", self.transmit_id | self.flag, 8, bytes(data).ljust(8, b"\x55"))
         while True:
             try:
                 self.can.send(frame)

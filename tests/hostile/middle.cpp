@@ -7,7 +7,7 @@
 #include "protocol/flash/crc32c.hpp"
 #include "protocol/flash/page.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
-#include "protocol/ins_interface/status.hpp"
+#include "tests/own_ins/status_frames.hpp"
 
 namespace selfcal::hostile {
 namespace {

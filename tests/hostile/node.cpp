@@ -11,8 +11,8 @@
 #include <cstdio>
 
 #include "protocol/can/socket.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "tests/hostile/middle.hpp"
+#include "tests/own_ins/identifiers.hpp"
 
 namespace selfcal::hostile {
 namespace {

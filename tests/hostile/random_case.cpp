@@ -4,8 +4,8 @@
 #include <array>
 #include <random>
 
-#include "protocol/ins_interface/status.hpp"
 #include "tests/hostile/rule.hpp"
+#include "tests/own_ins/status_frames.hpp"
 
 namespace selfcal::hostile {
 namespace {

@@ -9,9 +9,10 @@
 
 #include "daemon/run/calibration_run.hpp"
 #include "daemon/run/state_budget.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/client.hpp"
 #include "tests/hostile/middle.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/status_frames.hpp"
 #include "tests/unit/daemon/simulated_timers.hpp"
 #include "tests/unit/sim_ins/virtual_unit.hpp"
 

@@ -10,6 +10,34 @@ FOREIGN = case.ROOT / "tests" / "foreign"
 SPEED, DWELL_S = 60.0, 20.0
 SLOW = 25.0  # what Python streams in frames beside everything else on one processor
 SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml and frames.toml do not tell
+# The addressing of selfcal.toml, and others in its place.
+NORMAL = """addressing = "normal"      # identifiers of 11 bits
+request = 0x640
+response = 0x648
+functional = 0x7DF
+"""
+# As it is usual with extended addressing: requests to one and to all have one identifier.
+EXTENDED = """addressing = "extended"
+request = 0x6F1
+response = 0x612
+functional = 0x6F1
+ins_address = 0x12
+tester_address = 0xF1
+functional_address = 0xDF
+"""
+MIXED = """addressing = "mixed-29"
+ins_address = 0x2A
+tester_address = 0xF1
+address_extension = 0x5C
+"""
+
+
+def addressed(bus):
+    """selfcal.toml with another addressing."""
+    text = (PROFILES / "selfcal.toml").read_text(encoding="utf-8")
+    if text.count(NORMAL) != 1:
+        raise AssertionError("the addressing of selfcal.toml is another one")
+    return text.replace(NORMAL, bus)
 
 
 class UnderProfile(case.OnBench):
@@ -18,10 +46,10 @@ class UnderProfile(case.OnBench):
         self.assertEqual((run["state"], run["exit_status"]), ("completed", case.DONE), run["reason"])
         return run
 
-    def bench_of(self, profile, speed=SPEED, **ins):
+    def bench_of(self, profile, speed=SPEED, interface="vcan0", sim=None, **ins):
         site = SITE if profile in ("memory.toml", "frames.toml") else {}
-        return self.bench(speed=speed, ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins,
-                          sim_options=["--profile", PROFILES / profile])
+        return self.bench(speed=speed, interface=interface, sim=sim or {}, sim_options=["--profile", PROFILES / profile],
+                          ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins)
 
     def assert_same(self, run, own, what):
         """To a tenth of sigma: the same sensor data through other bytes. What differs is the gimbal's read-out, rounded to

@@ -16,25 +16,6 @@ import profile_case  # noqa: E402
 
 EXTENDED_ID = 0x80000000
 RECEIVE_BUFFER_FORCE = 33  # SO_RCVBUFFORCE, which Python does not name
-NORMAL = """addressing = "normal"      # identifiers of 11 bits
-request = 0x640
-response = 0x648
-functional = 0x7DF
-"""
-# As it is usual with extended addressing: requests to one and to all have one identifier.
-EXTENDED = """addressing = "extended"
-request = 0x6F1
-response = 0x612
-functional = 0x6F1
-ins_address = 0x12
-tester_address = 0xF1
-functional_address = 0xDF
-"""
-MIXED = """addressing = "mixed-29"
-ins_address = 0x2A
-tester_address = 0xF1
-address_extension = 0x5C
-"""
 
 
 class Listener(threading.Thread):
@@ -66,11 +47,9 @@ class Listener(threading.Thread):
 
 class Addressing(profile_case.UnderProfile):
     def under(self, bus):
-        text = (profile_case.PROFILES / "selfcal.toml").read_text(encoding="utf-8")
-        self.assertEqual(text.count(NORMAL), 1)
         unit = self.bench_of("selfcal.toml")
         profile = unit.folder / "addressed.toml"
-        profile.write_text(text.replace(NORMAL, bus), encoding="utf-8")
+        profile.write_text(profile_case.addressed(bus), encoding="utf-8")
         unit.ins_keys["profile"] = str(profile)
         unit.sim_options = ["--profile", profile]
         unit.write_daemon_config([unit], {})
@@ -95,13 +74,13 @@ class Addressing(profile_case.UnderProfile):
         ours.stop()
 
         requests, responses, to_all = (0x6F1, 0x12), (0x612, 0xF1), (0x6F1, 0xDF)
-        unit, run = self.calibrated(EXTENDED, 0x650, {requests, responses, to_all}, {requests, responses, to_all})
+        unit, run = self.calibrated(profile_case.EXTENDED, 0x650, {requests, responses, to_all}, {requests, responses, to_all})
         self.assert_same(run, own, "extended addressing")
         self.scapy_reads(unit)
         unit.stop()
 
         of_mixed = {(i | EXTENDED_ID, 0x5C) for i in (0x18CE2AF1, 0x18CEF12A, 0x18CD33F1)}
-        unit, run = self.calibrated(MIXED, 0x650, of_mixed, of_mixed)
+        unit, run = self.calibrated(profile_case.MIXED, 0x650, of_mixed, of_mixed)
         self.assert_same(run, own, "mixed addressing of 29 bits")
         unit.stop()
 

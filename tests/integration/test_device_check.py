@@ -1,8 +1,9 @@
 """`selfcal device check`: each deviation of a server is named by the requirement that it breaks, and nothing is named of a sound one."""
 import concurrent.futures
 import json
-import queue
+import os
 import secrets
+import signal
 import subprocess
 import sys
 import tempfile
@@ -11,8 +12,11 @@ import unittest
 from pathlib import Path
 
 import case
+import profile_case
 
-PROFILES = case.ROOT / "config" / "profiles"
+VIRTUAL = ("selfcal.toml", "example.toml", "memory.toml", "extended.toml", "mixed.toml")
+NOBODYS = "vcan0"  # where no INS is
+PROFILES = profile_case.PROFILES
 SERVER = case.ROOT / "tests" / "foreign" / "deviating_ins.py"
 sys.path.insert(0, str(SERVER.parent))
 
@@ -27,46 +31,68 @@ class DeviceCheck(unittest.TestCase):
         cls.key = Path(cls.folder.name) / "ins.key"
         cls.key.touch(mode=0o600)
         cls.key.write_text(secrets.token_hex(16) + "\n", encoding="ascii")
-        cls.interfaces = sorted(p.name for p in Path("/sys/class/net").iterdir() if p.name.startswith("vcan"))
+        for name, bus in (("extended", profile_case.EXTENDED), ("mixed", profile_case.MIXED)):
+            (Path(cls.folder.name) / f"{name}.toml").write_text(profile_case.addressed(bus), encoding="utf-8")
+        # All at once: each waits most of the time for what an INS must not do. One interpreter is all of them, by fork.
+        names = sorted(p.name for p in Path("/sys/class/net").iterdir() if p.name.startswith("vcan") and p.name != NOBODYS)
+        interfaces = iter(names)
+        deviating_ins.Ins(cls.key.read_text(encoding="ascii").strip(), None).key_to(bytes(16))  # loads a library, once for all
+        checks = [(name, next(interfaces), "example.toml") for name in [None, *deviating_ins.DEVIATIONS]]
+        for name, interface, _ in checks:
+            cls.fork_server(interface, name)
+        for profile in VIRTUAL:
+            checks.append((profile, next(interfaces), profile))
+            cls.start_virtual_ins(checks[-1][1], profile)
+        time.sleep(2.0)
+        pool = concurrent.futures.ThreadPoolExecutor(len(checks))
+        cls.addClassCleanup(pool.shutdown)
+        cls.found = {name: pool.submit(cls.check, interface, profile) for name, interface, profile in checks}
 
-    def check(self, interface, profile, *options):
-        done = subprocess.run([case.bench.BIN / "selfcal", "device", "check", interface, "--profile", PROFILES / profile,
-                               "--key-file", self.key, "--write", "--json", *options],
+    @classmethod
+    def path_of(cls, profile):
+        return PROFILES / profile if (PROFILES / profile).exists() else Path(cls.folder.name) / profile
+
+    @classmethod
+    def fork_server(cls, interface, deviation):
+        reader, writer = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.dup2(writer, 1)
+            sys.argv = [str(SERVER), interface, str(cls.key)] + ([deviation] if deviation else [])
+            try:
+                deviating_ins.main()
+            finally:
+                os._exit(1)
+        cls.addClassCleanup(os.waitpid, child, 0)
+        cls.addClassCleanup(os.kill, child, signal.SIGKILL)
+        os.close(writer)
+        with os.fdopen(reader, encoding="ascii") as lines:
+            if lines.readline() != "ready\n":
+                raise AssertionError(f"{deviation}: no server")
+
+    @classmethod
+    def start_virtual_ins(cls, interface, profile):
+        server = subprocess.Popen([case.bench.BIN / "sim_ins", "--interface", interface, "--key", cls.key, "--profile", cls.path_of(profile),
+                                   "--flash", Path(cls.folder.name) / f"{profile}.flash"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        cls.addClassCleanup(server.wait)
+        cls.addClassCleanup(server.terminate)
+
+    @classmethod
+    def check(cls, interface, profile, *options):
+        done = subprocess.run([case.bench.BIN / "selfcal", "device", "check", interface, "--profile", cls.path_of(profile),
+                               "--key-file", cls.key, "--write", "--json", *options],
                               capture_output=True, text=True, timeout=150, check=False)
         if not done.stdout:
             raise AssertionError(done.stderr)
         faults = case.schema_validator.text_faults(done.stdout)
-        self.assertFalse(faults, faults)
         document = json.loads(done.stdout)
-        self.assertEqual(done.returncode, 1 if document["fails"] else 0)
+        if faults or done.returncode != (1 if document["fails"] else 0):
+            raise AssertionError(f"status {done.returncode}: {faults}")
         return document
 
-    def start(self, command):
-        server = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.addCleanup(server.stdout.close)
-        self.addCleanup(server.wait)
-        self.addCleanup(server.terminate)
-        return server
-
-    def failing(self, deviation, free):
-        interface = free.get()
-        try:
-            server = self.start([sys.executable, "-B", SERVER, interface, self.key] + ([deviation] if deviation else []))
-            self.assertEqual(server.stdout.readline(), "ready\n")
-            document = self.check(interface, "example.toml")
-            server.terminate()
-            server.wait()
-            return document
-        finally:
-            free.put(interface)
-
     def test_deviations(self):
-        free = queue.Queue()
-        for interface in self.interfaces:
-            free.put(interface)
-        with concurrent.futures.ThreadPoolExecutor(len(self.interfaces)) as pool:
-            found = {name: pool.submit(self.failing, name, free) for name in [None, *deviating_ins.DEVIATIONS]}
-        sound = found.pop(None).result()
+        found = {name: self.found[name] for name in deviating_ins.DEVIATIONS}
+        sound = self.found[None].result()
         self.assertEqual([r for r in sound["requirements"] if r["verdict"] != "holds"], [])
         named = 0
         for name, future in found.items():
@@ -83,23 +109,18 @@ class DeviceCheck(unittest.TestCase):
 
     def test_the_virtual_ins_is_sound(self):
         """It shares no line with the server in Python; without a run it has no raw data to upload."""
-        profiles = ("selfcal.toml", "example.toml", "memory.toml")
-        for interface, profile in zip(self.interfaces, profiles):
-            self.start([case.bench.BIN / "sim_ins", "--interface", interface, "--key", self.key, "--profile", PROFILES / profile,
-                        "--flash", Path(self.folder.name) / f"{interface}.flash"])
-        time.sleep(2.0)
-        with concurrent.futures.ThreadPoolExecutor(len(profiles)) as pool:
-            documents = list(pool.map(self.check, self.interfaces, profiles))
-        for document, profile in zip(documents, profiles):
+        for profile in VIRTUAL:
+            document = self.found[profile].result()
             rest = [r for r in document["requirements"] if r["verdict"] != "holds"]
             self.assertEqual([(r["id"], r["verdict"]) for r in rest], [("memory.page" if profile == "memory.toml" else "upload.begin", "not tried")], rest)
+            self.assertEqual("isotp.address" in {r["id"] for r in document["requirements"]}, profile in VIRTUAL[3:])
             print(f"sim_ins under {profile}: {document['holds']} requirements hold, 0 fail", flush=True)
 
     def test_no_answer_is_an_error(self):
-        done = subprocess.run([case.bench.BIN / "selfcal", "device", "check", self.interfaces[-1]], capture_output=True,
+        done = subprocess.run([case.bench.BIN / "selfcal", "device", "check", NOBODYS], capture_output=True,
                               text=True, timeout=60, check=False)
         self.assertEqual((done.returncode, done.stdout), (case.DEVICE_TROUBLE, ""))
-        self.assertRegex(done.stderr, f"{self.interfaces[-1]}: no answer")
+        self.assertRegex(done.stderr, f"{NOBODYS}: no answer")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import unittest
 from pathlib import Path
 
 import case
+import profile_case
 
 PROFILES = case.ROOT / "config" / "profiles"
 
@@ -72,7 +73,7 @@ class DeviceProbe(unittest.TestCase):
 
     def start_ins(self, profile):
         server = subprocess.Popen([case.bench.BIN / "sim_ins", "--interface", "vcan0", "--key", self.key, "--profile",
-                                   PROFILES / profile, "--flash", self.folder / f"{profile}.flash"],
+                                   PROFILES / profile, "--flash", self.folder / f"{Path(profile).name}.flash"],
                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(server.wait)
         self.addCleanup(server.terminate)
@@ -116,6 +117,18 @@ class DeviceProbe(unittest.TestCase):
         self.assertEqual(status, 0)
         told = {d["did"] for d in document["found"][0]["dids"]}
         self.assertEqual(told, {0xFD00, 0xFD01, 0xFD10, 0xFD11, 0xFD12, 0xFD20, 0xFD21, 0xFD30, 0xFD31, 0xFD32})
+
+    def test_behind_an_address_byte(self):
+        profile = self.folder / "extended.toml"
+        profile.write_text(profile_case.addressed(profile_case.EXTENDED), encoding="utf-8")
+        self.start_ins(profile)
+        time.sleep(2.0)
+        status, document = self.probe("--profile", profile, "--only", "--listen", "0.1")
+        self.assertEqual(status, 0)
+        found, = document["found"]
+        self.assertEqual((found["request_id"], found["request_address"], found["response_id"], found["response_address"]),
+                         (0x6F1, 0x12, 0x612, 0xF1))
+        self.assertEqual({d["did"] for d in found["dids"]}, {0xF18C, 0xF195})
 
     def test_an_empty_bus(self):
         status, document = self.probe("--only", "--listen", "0.1")

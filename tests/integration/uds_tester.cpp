@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "protocol/can/socket.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/client.hpp"
+#include "tests/own_ins/identifiers.hpp"
 
 namespace selfcal {
 namespace {

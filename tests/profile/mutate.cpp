@@ -123,6 +123,10 @@ const std::vector<Way>& ways() {
       {"field by field, and not", R"(^field_by_field = true)", {"field_by_field = false"}, true},
       {"memory in no or too many bytes", R"(^longest = \d+)", {"longest = 0", "longest = 70000"}},
       {"memory beyond its address", R"(^address = 0x\w+)", {"address = 0x180000000"}},
+      {"file without a page, or with a brace that is none",
+       R"(^name = "(/raw/\{run\}/)\{page:6\}\.bin")",
+       {"name = \"$1.bin\"", "name = \"$1{page}{page}\"", "name = \"$1{page:0}\"", "name = \"$1{number}\"",
+        "name = \"$1{page\"", "name = \"$1{page}}\"", "name = \"\"", "name = \"{page} \"", "name = 6"}},
       {"signal outside its frame", R"(^(signals\.\w+ = \{ start = )\d+)", {"$01600", "$01512", "$01511"}},
       {"signals on each other",
        R"(^(signals\.(?:index|inner|value|power_cycles|version|software) = \{ start = )\d+)",
@@ -259,11 +263,21 @@ Lines read(const std::string& path) {
   return lines;
 }
 
+// example.toml with its raw data as files.
+Lines with_files(Lines lines) {
+  const auto upload = std::ranges::find(lines, "[upload]");
+  const auto end = std::ranges::find(upload, lines.end(), "");
+  const auto at = lines.erase(upload, end);
+  lines.insert(at, {"[file]", "name = \"/raw/{run}/{page:6}.bin\""});
+  return lines;
+}
+
 int trial(std::size_t count, std::uint64_t seed) {
   const std::vector<Lines> profiles{read(SELFCAL_SOURCE_DIR "/config/profiles/selfcal.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml"),
-                                    read(SELFCAL_SOURCE_DIR "/config/profiles/frames.toml")};
+                                    read(SELFCAL_SOURCE_DIR "/config/profiles/frames.toml"),
+                                    with_files(read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"))};
   Random random(seed);
   std::set<std::string> seen;
   std::map<std::string, int> by_way;

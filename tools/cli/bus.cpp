@@ -15,9 +15,11 @@
 
 #include "protocol/can/bus_log.hpp"
 #include "protocol/can/socket.hpp"
+#include "protocol/profile/names.hpp"
 #include "protocol/uds/decode.hpp"
 #include "tools/cli/bus_document.hpp"
 #include "tools/cli/command.hpp"
+#include "tools/cli/device/bus_commands.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -29,9 +31,9 @@ struct LogArguments {
 };
 
 struct DecodeArguments {
-  std::string file;
-  bool json = false;
-  uds::DecoderOptions decoder;
+  std::string file, profile;
+  bool json = false, extended = false;
+  std::optional<std::uint32_t> request_id, response_id, functional_id;  // before what the profile says
 };
 
 volatile std::sig_atomic_t stop_asked = 0;
@@ -122,7 +124,27 @@ Expected<int> log_bus(const LogArguments& arguments) {
 
 double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
 
+Expected<uds::DecoderOptions> decoder_of(const DecodeArguments& arguments) {
+  const auto profile = device::chosen_profile(arguments.profile);
+  if (!profile) {
+    return tl::unexpected(profile.error());
+  }
+  if (const std::string why = device::cannot_try(**profile); !why.empty()) {
+    return fail(ErrorKind::bad_input, why);
+  }
+  uds::DecoderOptions options = profile::decoder_options(*profile);
+  options.request_id = arguments.request_id.value_or(options.request_id);
+  options.response_id = arguments.response_id.value_or(options.response_id);
+  options.functional_id = arguments.functional_id.value_or(options.functional_id);
+  options.extended = options.extended || arguments.extended;
+  return options;
+}
+
 Expected<int> decode_log(const DecodeArguments& arguments) {
+  const auto options = decoder_of(arguments);
+  if (!options) {
+    return tl::unexpected(options.error());
+  }
   std::ifstream file;
   if (arguments.file != "-") {
     file.open(arguments.file);
@@ -138,7 +160,7 @@ Expected<int> decode_log(const DecodeArguments& arguments) {
     }
   }
   can::LogReader reader(arguments.file == "-" ? std::cin : file);
-  uds::LogDecoder decoder(arguments.decoder);
+  uds::LogDecoder decoder(*options);
   BusDocument answer;
   for (;;) {
     const auto entry = reader.next();
@@ -177,11 +199,13 @@ CommandRun configure(Options& options) {
   auto decode = std::make_shared<DecodeArguments>();
   Options decoding = options.command("decode", "UDS messages and status frames of a log, by name");
   decoding.text("LOG", decode->file, "`candump -L` log; - for standard input", Needed::yes);
-  decoding.can_identifier("--request-id", decode->decoder.request_id, "CAN identifier, tester to INS, hexadecimal");
-  decoding.can_identifier("--response-id", decode->decoder.response_id, "INS to tester, hexadecimal");
-  decoding.can_identifier("--functional-id", decode->decoder.functional_id, "tester to all, hexadecimal");
+  decoding.text("--profile", decode->profile, "what the INS speaks, TOML; without it selfcal's own");
+  decoding.can_identifier("--request-id", decode->request_id,
+                          "CAN identifier, tester to INS, hexadecimal; without it the profile's");
+  decoding.can_identifier("--response-id", decode->response_id, "INS to tester, hexadecimal");
+  decoding.can_identifier("--functional-id", decode->functional_id, "tester to all, hexadecimal");
   decoding.flag("--json", decode->json, "as JSON");
-  decoding.flag("--extended", decode->decoder.extended, "these identifiers have 29 bits");
+  decoding.flag("--extended", decode->extended, "these identifiers have 29 bits");
   return [log_options, log, decode] { return log_options->chosen() ? log_bus(*log) : decode_log(*decode); };
 }
 

@@ -1,23 +1,23 @@
-// selfcal device new | lint | describe | dbc | check | probe: what an INS speaks, by its profile.
+// selfcal device new | lint | describe | dbc | odx | check | probe: what an INS speaks, by its profile.
 #include <fmt/format.h>
 
 #include <unistd.h>
 
 #include <memory>
 
-#include "protocol/ins_interface/dbc.hpp"
 #include "protocol/profile/dbc_file.hpp"
 #include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/device/bus_commands.hpp"
 #include "tools/cli/device/new_profile.hpp"
+#include "tools/cli/device/odx_command.hpp"
 
 namespace selfcal::cli {
 namespace {
 
 struct Arguments {
-  std::string file;
+  std::string file, output;
   bool html = false;
 };
 
@@ -63,12 +63,7 @@ Expected<int> write_dbc(const Arguments& arguments) {
   if (!profile) {
     return tl::unexpected(profile.error());
   }
-  if ((*profile)->frames) {
-    fmt::print("{}", profile::frames_dbc(**profile));
-    return 0;
-  }
-  const profile::Bus& bus = (*profile)->bus;
-  fmt::print("{}", ins::dbc_text({bus.request, bus.response, bus.functional, bus.status, bus.extended_ids}));
+  fmt::print("{}", profile::dbc_text(**profile));
   return 0;
 }
 
@@ -119,6 +114,10 @@ CommandRun configure(Options& options) {
   describe_options->flag("--html", arguments->html, "as one HTML page; without it Markdown");
   auto dbc_options = std::make_shared<Options>(options.command("dbc", "identifiers and status frames as a DBC"));
   dbc_options->text("FILE", arguments->file, "profile, TOML", Needed::yes);
+  auto odx_options = std::make_shared<Options>(
+      options.command("odx", "services and records as ODX 2.2 for other diagnostic tools; says what ODX cannot hold"));
+  odx_options->text("FILE", arguments->file, "profile, TOML", Needed::yes);
+  odx_options->text("-o,--output", arguments->output, "archive, .pdx", Needed::yes);
   auto checking = std::make_shared<device::CheckArguments>();
   auto check_options = std::make_shared<Options>(options.command(
       "check", "whether an INS does what its profile, ISO 14229-1 and ISO 15765-2 ask; status 1 if not"));
@@ -139,6 +138,9 @@ CommandRun configure(Options& options) {
     }
     if (dbc_options->chosen()) {
       return write_dbc(*arguments);
+    }
+    if (odx_options->chosen()) {
+      return device::write_odx(arguments->file, arguments->output);
     }
     return lint_options->chosen() ? lint(*arguments) : describe(*arguments);
   };

@@ -43,8 +43,14 @@ void ProgressLine::show(const std::string& text) {
   if (!visible_) {
     return;
   }
+  const int width = room();
+  if (shown_ > 0 && text == text_ && width == width_) {
+    return;
+  }
   clear();
-  const std::string cut = text.substr(0, static_cast<std::size_t>(std::max(0, room())));
+  text_ = text;
+  width_ = width;
+  const std::string cut = text.substr(0, static_cast<std::size_t>(std::max(0, width)));
   fmt::print(stderr, "{}", cut);
   std::fflush(stderr);
   shown_ = static_cast<int>(cut.size());

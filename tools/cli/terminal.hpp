@@ -24,6 +24,7 @@ class ProgressLine {
   bool visible() const { return visible_; }
   // Characters that a line may have now.
   int room() const;
+  // Draws it unless it stands there already.
   void show(const std::string& text);
   // Wipes it, so that a line of another kind may follow; the next show() draws it again.
   void clear();
@@ -31,6 +32,8 @@ class ProgressLine {
  private:
   bool visible_;
   int shown_ = 0;  // characters on the screen
+  std::string text_;
+  int width_ = 0;  // room() when it was drawn
 };
 
 }  // namespace selfcal::cli

@@ -8,14 +8,18 @@
 #include "protocol/can/bus_log.hpp"
 #include "protocol/flash/page.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/ins_interface/records.hpp"
 #include "protocol/ins_interface/status.hpp"
 #include "protocol/isotp/codec.hpp"
 #include "protocol/lcm/decode.hpp"
+#include "protocol/profile/names.hpp"
+#include "protocol/profile/status_frames.hpp"
 #include "protocol/uds/client.hpp"
 #include "protocol/uds/decode.hpp"
 #include "protocol/uds/messages.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
+#include "tests/own_ins/status_frames.hpp"
 
 using namespace selfcal;
 
@@ -86,6 +90,12 @@ void read_responses(Bytes bytes) {
   static_cast<void>(uds::read_transfer_exit_response(bytes));
   static_cast<void>(uds::parse_upload_request(bytes));
   static_cast<void>(uds::parse_routine_request(bytes));
+  if (const auto file = uds::read_file_response(bytes)) {
+    must(file->longest > uds::transfer_overhead);
+  }
+  if (const auto name = uds::parse_file_request(bytes)) {
+    must(std::ranges::equal(uds::file_request(*name), bytes));
+  }
 }
 
 // What a line says is what it says when it is written and read again.
@@ -103,8 +113,8 @@ void read_log(Bytes bytes) {
 }
 
 void listen(Bytes bytes) {
-  uds::LogDecoder decoder({});
-  ins::Status status;
+  uds::LogDecoder decoder(profile::decoder_options(profile::built_in()));
+  ins::Status status, by_profile;
   can::CanFrame frame;
   Time now{0};
   while (next_frame(bytes, frame, now)) {
@@ -119,6 +129,15 @@ void listen(Bytes bytes) {
       const can::CanFrame written = encode(status, 7, frame.id);
       must(ins::apply_status_frame(written, again) && encode(again, 7, frame.id) == written);
     }
+    // By our own profile the same is taken of the same frames.
+    ins::Status before = by_profile;
+    const bool ours = profile::apply_status(*profile::built_in(), frame, ins::can_id::status, false, by_profile);
+    ins::Status by_table = before;
+    must(ours == ins::apply_status_frame(frame, by_table));
+    const auto told = [](const ins::Status& taken) {
+      return std::array{ins::encode_state_frame(taken, 0, 1), ins::encode_gimbal_frame(taken, 0, 2)};
+    };
+    must(told(by_profile) == told(by_table));
   }
 }
 

@@ -12,7 +12,7 @@
 #include <cstdlib>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
+#include "tests/own_ins/identifiers.hpp"
 #include "tests/unit/sim_ins/virtual_unit.hpp"
 
 using namespace selfcal;

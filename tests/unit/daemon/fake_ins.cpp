@@ -4,9 +4,10 @@
 
 #include "protocol/byte_order.hpp"
 #include "protocol/flash/page.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/messages.hpp"
 #include "protocol/uds/security.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
 
 namespace selfcal::testing_support {
 

@@ -38,13 +38,14 @@ class OneFactor : public testing::Test {
 TEST_F(OneFactor, IsToldWithWhatIsLost) {
   EXPECT_FALSE(check_held(wanted_, held_, in_every_unit(10.0)));
   EXPECT_EQ(words_of_loss(wanted_, held_, in_every_unit(10.0)),
-            "accel_scale_pos_x: 162 ppm were found, the INS holds 156.5: 5.5 ug are lost at 1 g");
+            "accel_scale_pos_x: 162 ppm were found, the INS holds 156.5: 5.5 ug are lost at 1 g, "
+            "9.27 m after 10 minutes of navigation");  // 5.5e-6 R (1 - cos(0.7444)), R = 6371 km
 }
 
 TEST_F(OneFactor, IsRefusedBeyondTheTolerance) {
   const Complaint complaint = check_held(wanted_, held_, in_every_unit(5.0));
   ASSERT_TRUE(complaint);
-  EXPECT_THAT(*complaint, HasSubstr("5.5 ug are lost at 1 g, and 5 ppm are tolerated: nothing is written"));
+  EXPECT_THAT(*complaint, HasSubstr("10 minutes of navigation, and 5 ppm are tolerated: nothing is written"));
 }
 
 TEST_F(OneFactor, IsHeldAgainstEachParametersOwnTolerance) {

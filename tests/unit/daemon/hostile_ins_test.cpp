@@ -5,8 +5,9 @@
 #include "daemon/run/ins_checks.hpp"
 #include "daemon/run/state_budget.hpp"
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/messages.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
 #include "tests/unit/daemon/calibration_run_fixture.hpp"
 
 namespace selfcal {

@@ -113,11 +113,14 @@ TEST_F(RunSurroundingsTest, NoSecretInJournalOrStory) {
 }
 
 TEST(Journal, FieldsAreStructured) {
-  const auto lines = journal::entry(journal::Level::warning, "text", {7, "bench", "S1", "rotating", 0x35});
+  const auto lines = journal::entry(journal::Level::warning, "text",
+                                    {7, "bench", "S1", "rotating", 0x35, "b1", "estimate", "a.h5", "77ab"});
   for (const char* line : {"MESSAGE=text", "PRIORITY=4", "SELFCAL_RUN=7", "SELFCAL_INS=bench", "SELFCAL_SERIAL=S1",
-                           "SELFCAL_STATE=rotating", "SELFCAL_NRC=0x35"}) {
+                           "SELFCAL_STATE=rotating", "SELFCAL_NRC=0x35", "SELFCAL_BATCH=b1", "SELFCAL_STEP=estimate",
+                           "SELFCAL_TASK=a.h5", "SELFCAL_KEY=77ab"}) {
     EXPECT_THAT(lines, Contains(line));
   }
+  EXPECT_THAT(lines, Contains(std::string("SYSLOG_IDENTIFIER=") + program_invocation_short_name));
   EXPECT_THAT(journal::entry(journal::Level::info, "text", {}), Not(Contains(HasSubstr("SELFCAL_"))));
 }
 

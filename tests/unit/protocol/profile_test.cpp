@@ -9,10 +9,11 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/profile/records.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
 
 namespace selfcal::profile {
 namespace {

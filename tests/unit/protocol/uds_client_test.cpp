@@ -273,6 +273,52 @@ TEST(UdsMessages, ReadMemoryByAddress) {
             "ReadMemoryByAddress: 2 bytes in answer to a request for 3");
 }
 
+// ISO 14229-1, 14.6: mode 4 reads a file; its name's length in two bytes, the name, the format of the data.
+TEST(UdsMessages, RequestFileTransfer) {
+  const Bytes request{0x38, 4, 0, 6, '/', 'r', '/', '7', '.', 'b', 0};
+  EXPECT_EQ(file_request("/r/7.b"), request);
+  EXPECT_EQ(parse_file_request(request).value(), "/r/7.b");
+  const auto refused = [&request](std::size_t at, std::uint8_t byte) {
+    Bytes other = request;
+    other[at] = byte;
+    return parse_file_request(other).error();
+  };
+  EXPECT_EQ(refused(1, 3), Nrc::request_out_of_range);      // ReplaceFile
+  EXPECT_EQ(refused(3, 5), Nrc::incorrect_message_length);  // a name shorter than it is
+  EXPECT_EQ(refused(3, 7), Nrc::incorrect_message_length);  // longer
+  EXPECT_EQ(refused(2, 1), Nrc::incorrect_message_length);  // of 262 bytes
+  EXPECT_EQ(refused(10, 0x10), Nrc::request_out_of_range);  // compressed
+  EXPECT_EQ(parse_file_request(Bytes{0x38, 4, 0, 0, 0}).error(), Nrc::incorrect_message_length);
+}
+
+// Its answer: bytes of a block's length, that length, the format, bytes of a size in two bytes, the size, the size compressed.
+TEST(UdsMessages, TheAnswerToRequestFileTransfer) {
+  const Bytes response{0x78, 4, 2, 0x0F, 0xFF, 0, 0, 3, 0, 4, 0, 0, 4, 0};
+  const auto answer = read_file_response(response);
+  ASSERT_TRUE(answer) << answer.error().message;
+  EXPECT_EQ(answer->longest, 4095U);
+  EXPECT_EQ(answer->bytes, 1024U);
+  EXPECT_EQ(file_response(4095, 1024), (Bytes{0x78, 4, 4, 0, 0, 0x0F, 0xFF, 0, 0, 4, 0, 0, 4, 0, 0, 0, 4, 0}));
+  EXPECT_EQ(read_file_response(file_response(302, 2048))->bytes, 2048U);
+  for (std::size_t bytes = 0; bytes < response.size(); ++bytes) {
+    EXPECT_FALSE(read_file_response(ByteView(response).first(bytes))) << bytes;
+  }
+  const auto wrong = [&response](std::size_t at, std::uint8_t byte) {
+    Bytes other = response;
+    other[at] = byte;
+    const auto read = read_file_response(other);
+    return read ? "" : read.error().message;
+  };
+  EXPECT_THAT(wrong(1, 3), HasSubstr("byte 1 of the response is 0x03, the request had 0x04"));
+  EXPECT_THAT(wrong(2, 5), HasSubstr("a block's length of 5 bytes"));
+  EXPECT_THAT(wrong(5, 0x11), HasSubstr("compressed or encrypted data"));
+  EXPECT_THAT(wrong(6, 1), HasSubstr("a file's size of 259 bytes"));
+  EXPECT_THAT(wrong(13, 1), HasSubstr("compressed or encrypted data"));  // 1024 bytes in 1025
+  Bytes empty = response;
+  empty[3] = 0, empty[4] = 2;
+  EXPECT_THAT(read_file_response(empty).error().message, HasSubstr("blocks without data"));
+}
+
 TEST(UdsMessages, ResponsesAreReadAndChecked) {
   const auto timings = read_session_response(Bytes{0x50, 3, 0, 50, 1, 0xF4}, Session::extended);
   ASSERT_TRUE(timings);

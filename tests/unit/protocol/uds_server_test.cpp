@@ -84,39 +84,59 @@ TEST_F(UdsServer, SessionExpiresUnlessKept) {
   EXPECT_EQ(handler.expired, 1);
 }
 
+// Names that only this test gives.
+uds::Names names() {
+  uds::Names names;
+  names.dids = {{0xF18C, "serial"}, {0x0200, "state"}};
+  names.routines = {{0x0301, "turn"}};
+  names.texts = {0xF18C};
+  names.upload_by_page = true;
+  return names;
+}
+
 TEST(UdsDecode, MessagesByName) {
-  EXPECT_EQ(describe_message(Bytes{0x22, 0xF1, 0x8C}), "ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)");
+  const auto describe_message = [](const Bytes& message) { return uds::describe_message(message, names()); };
+  EXPECT_EQ(describe_message(Bytes{0x22, 0xF1, 0x8C}), "ReadDataByIdentifier (0x22) serial (0xF18C)");
   EXPECT_EQ(describe_message(Bytes{0x62, 0x02, 0x00, 1, 2}),
             "positive ReadDataByIdentifier (0x62) state (0x0200): 01 02");
   EXPECT_EQ(describe_message(Bytes{0x7F, 0x35, 0x31}), "negative RequestUpload: requestOutOfRange (0x31)");
   EXPECT_EQ(describe_message(Bytes{0x31, 1, 3, 1, 0, 0, 0, 5}),
-            "RoutineControl (0x31) start selfCalibration (0x0301): 00 00 00 05");
+            "RoutineControl (0x31) start turn (0x0301): 00 00 00 05");
   EXPECT_EQ(describe_message(Bytes{0x35, 0, 0x44, 0, 0, 0, 7, 0, 0, 0x10, 0}),
             "RequestUpload (0x35) from page 7, 4096 bytes");
   EXPECT_EQ(describe_message(Bytes{0x27, 2, 0xDE, 0xAD}), "SecurityAccess (0x27) key (2 bytes)");  // never the key
   EXPECT_EQ(describe_message(Bytes{0x62, 0xF1, 0x8C, 'S', 'I', 'M', '-', '1'}),
-            "positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"SIM-1\"");
+            "positive ReadDataByIdentifier (0x62) serial (0xF18C): \"SIM-1\"");
   EXPECT_EQ(describe_message(Bytes{0x62, 0xF1, 0x8C, 0x1B, '[', '"'}),
-            "positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"\\x1B[\\x22\"");
+            "positive ReadDataByIdentifier (0x62) serial (0xF18C): \"\\x1B[\\x22\"");
+  EXPECT_EQ(describe_message(Bytes{0x22, 0xF1, 0x95}), "ReadDataByIdentifier (0x22) unknown (0xF195)");
+  EXPECT_EQ(uds::describe_message(Bytes{0x35, 0, 0x32, 1, 0, 0, 2, 0}), "RequestUpload (0x35) from 0x100, 512 bytes");
+  EXPECT_EQ(describe_message(Bytes{0x35, 0, 0x44, 0, 0, 0, 7}), "RequestUpload (0x35): 00 44 00 00 00 07");
   EXPECT_EQ(describe_message({}), "empty message");
   EXPECT_EQ(describe_message(Bytes{0x7F, 1}), "malformed negative response: 01");
 }
 
 TEST(UdsDecode, LogOfFrames) {
-  LogDecoder decoder(DecoderOptions{});
+  DecoderOptions options;
+  options.request_id = 0x640;
+  options.response_id = 0x648;
+  options.functional_id = 0x7DF;
+  options.names = names();
+  options.status = [](const can::CanFrame& frame) {
+    return frame.id == 0x650 ? std::vector<LogEntry::Signal>{{"State", 2.0, "rotating"}, {"Alive", 171.0, "171"}}
+                             : std::vector<LogEntry::Signal>{};
+  };
+  LogDecoder decoder(options);
   const auto told = [&decoder](const char* text, Time now) {
     const auto entry = decoder.on_frame(frame(text), now);
     return entry ? line(*entry) : std::string("nothing");
   };
-  EXPECT_EQ(told("640#0322F18C", ms(1)), "(0.001000) tester  ReadDataByIdentifier (0x22) ecuSerialNumber (0xF18C)");
+  EXPECT_EQ(told("640#0322F18C", ms(1)), "(0.001000) tester  ReadDataByIdentifier (0x22) serial (0xF18C)");
   EXPECT_EQ(told("648#100862F18C414243", ms(2)), "nothing");
   EXPECT_EQ(told("640#300000", ms(3)), "nothing");
   EXPECT_EQ(told("648#214445CCCCCCCCCC", ms(4)),
-            "(0.004000) INS     positive ReadDataByIdentifier (0x62) ecuSerialNumber (0xF18C): \"ABCDE\"");
-  EXPECT_EQ(
-      told("650#12041303020100AB", ms(5)),
-      "(0.005000) status   State=rotating GimbalMoving=1 Unlocked=0 Session=0 Faults=4 Position=19 PagesWritten=66051 "
-      "StateAlive=171");
+            "(0.004000) INS     positive ReadDataByIdentifier (0x62) serial (0xF18C): \"ABCDE\"");
+  EXPECT_EQ(told("650#12041303020100AB", ms(5)), "(0.005000) status   State=rotating Alive=171");
   EXPECT_EQ(decoder.malformed(), 0U);
   EXPECT_EQ(told("648#2200", ms(6)), "(0.006000) INS     broken: consecutive frame without a first one");
   EXPECT_EQ(told("123#00", ms(7)), "nothing");

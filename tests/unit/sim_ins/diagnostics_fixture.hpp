@@ -7,9 +7,10 @@
 #include <optional>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "sim_ins/device/diagnostics.hpp"
 #include "sim_ins/simulate.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
 
 namespace selfcal::sim {
 
@@ -27,7 +28,9 @@ inline SimConfig small() {
 
 class DiagnosticsTest : public testing::Test {
  protected:
-  DiagnosticsTest() { switch_on_another(); }
+  explicit DiagnosticsTest(profile::ProfilePtr profile = profile::built_in()) : profile_(std::move(profile)) {
+    switch_on_another();
+  }
 
   // Fresh from the works.
   void switch_on_another() {
@@ -37,6 +40,7 @@ class DiagnosticsTest : public testing::Test {
     DiagnosticOptions options;
     options.key = right_key;
     options.seed_salt = 99;
+    options.profile = profile_;
     diagnostics_ = std::make_unique<Diagnostics>(*instrument_, options);
     power_cycle();
   }
@@ -110,6 +114,7 @@ class DiagnosticsTest : public testing::Test {
     return set;
   }
 
+  profile::ProfilePtr profile_;
   double now_s_ = 0.0;
   std::unique_ptr<Instrument> instrument_;
   std::unique_ptr<Diagnostics> diagnostics_;

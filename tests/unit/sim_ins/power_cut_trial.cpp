@@ -11,9 +11,10 @@
 
 #include "protocol/byte_order.hpp"
 #include "protocol/can/bus_load.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/client.hpp"
 #include "sim_ins/random.hpp"
+#include "tests/own_ins/identifiers.hpp"
+#include "tests/own_ins/records.hpp"
 #include "tests/unit/sim_ins/virtual_unit.hpp"
 
 namespace selfcal::sim {

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "protocol/byte_order.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
 #include "sim_ins/device/turnaround.hpp"
+#include "tests/own_ins/identifiers.hpp"
 #include "tests/unit/protocol/frames.hpp"
 #include "tests/unit/sim_ins/virtual_unit.hpp"
 

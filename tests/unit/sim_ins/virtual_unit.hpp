@@ -5,10 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include "protocol/ins_interface/identifiers.hpp"
 #include "protocol/uds/server.hpp"
 #include "sim_ins/device/diagnostics.hpp"
 #include "sim_ins/device/instrument.hpp"
+#include "tests/own_ins/identifiers.hpp"
 
 namespace selfcal::sim {
 

@@ -28,7 +28,7 @@ TEST(BusDecode, NamesRequestResponseAndRefusal) {
   const auto finished = run_selfcal({"bus", "decode", folder / "bus.log"});
   EXPECT_EQ(finished.status, 0) << finished.error;
   EXPECT_THAT(finished.out, HasSubstr("ReadDataByIdentifier"));
-  EXPECT_THAT(finished.out, HasSubstr("ecuSerialNumber (0xF18C): \"SIM-0001\""));
+  EXPECT_THAT(finished.out, HasSubstr("identity.serial (0xF18C): \"SIM-0001\""));
   EXPECT_THAT(finished.out, HasSubstr("onditionsNotCorrect"));  // NRC 0x22
   EXPECT_EQ(std::count(finished.out.begin(), finished.out.end(), '\n'), 3) << finished.out;
 }

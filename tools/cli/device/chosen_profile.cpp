@@ -23,9 +23,6 @@ Expected<profile::ProfilePtr> chosen_profile(const std::string& file) {
 }
 
 std::string cannot_try(const profile::Profile& profile) {
-  if (profile.bus.request_byte) {
-    return fmt::format("{}: bus.addressing: only frames without an address byte are tried as yet", profile.file);
-  }
   if (!profile.frames) {
     return {};
   }

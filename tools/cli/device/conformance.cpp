@@ -149,12 +149,7 @@ void Conformance::silent(const Requirement& requirement, ByteView request, bool 
   if (!ready(requirement)) {
     return;
   }
-  if (to_all) {
-    tester_.tell_all(request);
-  } else {
-    std::array<std::uint8_t, can::max_classic_bytes> data{};
-    tester_.put(std::span(data).first(isotp::encode_single(request, data)));
-  }
+  tester_.put_single(request, to_all);
   const Exchange exchange = tester_.receive(request[0], silence_s);
   judged(requirement, hex(request) + (to_all ? ", to all nodes" : ""), "nothing", words(exchange),
          exchange.kind == Exchange::Kind::silent);

@@ -56,8 +56,9 @@ std::string bus_of(const NewProfile& a) {
     text += fmt::format("request = 0x{:03X}\nresponse = 0x{:03X}\nfunctional = 0x{:03X}\n", a.request, a.response,
                         a.functional);
   }
-  return text + fmt::format("{}status = 0x650             # the gimbal frame has the next one\npadding = 0xCC\n",
-                            a.addressing == "normal" ? "" : "# ");
+  const profile::Bus& own = profile::built_in()->bus;
+  return text + fmt::format("{}status = 0x{:03X}             # the gimbal frame has the next one\npadding = 0x{:02X}\n",
+                            a.addressing == "normal" ? "" : "# ", own.status.value_or(0), own.padding);
 }
 
 // Nothing at the end of the input.

@@ -4,13 +4,15 @@
 #include <string>
 
 #include "protocol/error.hpp"
+#include "protocol/profile/profile.hpp"
 
 namespace selfcal::cli::device {
 
 struct NewProfile {
   std::string name = "my_ins";
   std::string addressing = "normal";  // normal, normal-29, normal-fixed
-  std::uint32_t request = 0x640, response = 0x648, functional = 0x7DF;
+  std::uint32_t request = profile::built_in()->bus.request, response = profile::built_in()->bus.response,
+                functional = profile::built_in()->bus.functional;
   std::uint32_t ins_address = 0x2A, tester_address = 0xF1;  // normal-fixed
   std::string byte_order = "big";
   std::string security = "aes-cmac";

@@ -99,7 +99,7 @@ Expected<std::vector<Address>> ask_around(can::Socket& socket, const ProbePlan& 
     }
     for (const can::CanFrame& one : *came) {
       if (answers(one) && !talkative.contains({one.extended, one.id})) {
-        found.push_back({asked.request, one.id, asked.extended_ids});
+        found.push_back({asked.request, one.id, asked.extended_ids, {}, {}});
       }
     }
   }
@@ -111,6 +111,8 @@ Expected<Found> read_all(const ProbePlan& plan, const Address& address) {
   profile.bus.request = address.request;
   profile.bus.response = address.response;
   profile.bus.extended_ids = address.extended_ids;
+  profile.bus.request_byte = address.request_byte;
+  profile.bus.response_byte = address.response_byte;
   auto tester = Tester::open(plan.interface, profile);
   if (!tester) {
     return tl::unexpected(tester.error());
@@ -157,7 +159,7 @@ Expected<ProbeResult> probe(const ProbePlan& plan) {
     talkative.emplace(heard.extended_ids, heard.id);
   }
   const profile::Bus& bus = plan.profile.bus;
-  std::vector<Address> addresses{{bus.request, bus.response, bus.extended_ids}};
+  std::vector<Address> addresses{{bus.request, bus.response, bus.extended_ids, bus.request_byte, bus.response_byte}};
   const auto others = ask_around(*socket, plan, talkative);
   if (!others) {
     return tl::unexpected(others.error());

@@ -15,6 +15,7 @@ namespace selfcal::cli::device {
 struct Address {
   std::uint32_t request = 0, response = 0;
   bool extended_ids = false;
+  std::optional<std::uint8_t> request_byte, response_byte;  // of frames that begin with an address
 };
 
 // A frame that came without being asked for.

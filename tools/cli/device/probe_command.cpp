@@ -20,14 +20,19 @@ std::string id_text(std::uint32_t id, bool extended) { return fmt::format("0x{:0
 std::vector<Address> usual_addresses() {
   std::vector<Address> list;
   for (std::uint32_t id = 0x7E0; id <= 0x7E7; ++id) {
-    list.push_back({id, 0, false});
+    list.push_back({id, 0, false, {}, {}});
   }
   for (std::uint32_t node = 0; node <= 0xFF; ++node) {
     if (node != 0xF1) {
-      list.push_back({0x18DA00F1 | node << 8U, 0, true});
+      list.push_back({0x18DA00F1 | node << 8U, 0, true, {}, {}});
     }
   }
   return list;
+}
+
+// With the address byte behind it, where there is one.
+std::string address_text(std::uint32_t id, bool extended, std::optional<std::uint8_t> byte) {
+  return byte ? fmt::format("{} address {:02X}", id_text(id, extended), *byte) : id_text(id, extended);
 }
 
 std::string ascii(ByteView bytes) {
@@ -51,8 +56,8 @@ void print(const ProbePlan& plan, const ProbeResult& result) {
   }
   for (const Found& found : result.found) {
     const Address& a = found.address;
-    fmt::print("answers   request {}, response {}: {}; {}\n", id_text(a.request, a.extended_ids),
-               id_text(a.response, a.extended_ids), hex(found.present), timings_text(found));
+    fmt::print("answers   request {}, response {}: {}; {}\n", address_text(a.request, a.extended_ids, a.request_byte),
+               address_text(a.response, a.extended_ids, a.response_byte), hex(found.present), timings_text(found));
     for (const Known& known : found.dids) {
       fmt::print("  {:04X}    {}\n", known.did,
                  known.record.empty()
@@ -83,12 +88,17 @@ std::string document_of(const ProbePlan& plan, const ProbeResult& result) {
                            : item["record"] = fmt::format("{:02X}", fmt::join(known.record, ""));
       dids.push_back(std::move(item));
     }
-    found.push_back({{"request_id", one.address.request},
-                     {"response_id", one.address.response},
-                     {"extended_id", one.address.extended_ids},
-                     {"tester_present", fmt::format("{:02X}", fmt::join(one.present, ""))},
-                     {"default_session", fmt::format("{:02X}", fmt::join(one.session, ""))},
-                     {"dids", std::move(dids)}});
+    Json address{{"request_id", one.address.request},
+                 {"response_id", one.address.response},
+                 {"extended_id", one.address.extended_ids}};
+    if (one.address.request_byte && one.address.response_byte) {
+      address["request_address"] = *one.address.request_byte;
+      address["response_address"] = *one.address.response_byte;
+    }
+    address.update({{"tester_present", fmt::format("{:02X}", fmt::join(one.present, ""))},
+                    {"default_session", fmt::format("{:02X}", fmt::join(one.session, ""))},
+                    {"dids", std::move(dids)}});
+    found.push_back(std::move(address));
   }
   return document::with_head(document::probe, {{"interface", plan.interface},
                                                {"listened_s", plan.listen_s},

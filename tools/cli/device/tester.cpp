@@ -49,6 +49,7 @@ Expected<Tester> Tester::open(const std::string& interface, const profile::Profi
   options.kernel_time = true;
   const std::uint32_t whole = bus.extended_ids ? 0x1FFFFFFF : 0x7FF;
   options.filters.push_back({bus.response, whole, bus.extended_ids});
+  options.filters.push_back({bus.request, whole, bus.extended_ids});  // of others: our own do not come back
   if (bus.status) {
     options.filters.push_back({*bus.status, whole, bus.extended_ids});
     options.filters.push_back({*bus.status + 1, whole, bus.extended_ids});
@@ -89,15 +90,31 @@ bool Tester::send(const can::CanFrame& frame) {
   return false;
 }
 
-void Tester::put(ByteView data, std::optional<std::uint8_t> fill, bool to_all) {
+void Tester::put_frame(std::uint32_t id, std::optional<std::uint8_t> address, ByteView data, std::uint8_t fill) {
   can::CanFrame frame;
-  frame.id = to_all ? bus_.functional : bus_.request;
+  frame.id = id;
   frame.extended = bus_.extended_ids;
   frame.fd = frame.bit_rate_switch = bus_.fd;
-  frame.size = static_cast<std::uint8_t>(can::frame_size_for(std::max(data.size(), can::max_classic_bytes)));
-  frame.data.fill(fill.value_or(bus_.padding));
-  std::ranges::copy(data, frame.data.begin());
+  frame.data.fill(fill);
+  const std::size_t begin = address ? 1 : 0;
+  const std::size_t held = std::min(data.size(), frame_bytes());
+  frame.size = static_cast<std::uint8_t>(can::frame_size_for(std::max(begin + held, can::max_classic_bytes)));
+  frame.data[0] = address.value_or(fill);
+  std::ranges::copy(data.first(held), frame.data.begin() + static_cast<std::ptrdiff_t>(begin));
   send(frame);
+}
+
+void Tester::put(ByteView data, std::optional<std::uint8_t> fill, bool to_all) {
+  put_frame(to_all ? bus_.functional : bus_.request, to_all ? bus_.functional_byte : bus_.request_byte, data,
+            fill.value_or(bus_.padding));
+}
+
+void Tester::put_addressed(std::uint8_t address, ByteView data) {
+  put_frame(bus_.request, address, data, bus_.padding);
+}
+
+bool Tester::is_of(const can::CanFrame& frame, std::uint32_t id, std::optional<std::uint8_t> address) const {
+  return frame.id == id && (!address || (frame.size > 0 && frame.data[0] == *address));
 }
 
 // Takes what the socket has, waiting for it.
@@ -115,13 +132,21 @@ bool Tester::fill(double within_s) {
     if (one.event) {
       continue;
     }
-    if (one.frame.id != bus_.response) {
+    if (is_of(one.frame, bus_.request, bus_.request_byte)) {
+      trouble_ = Error{ErrorKind::device,
+                       fmt::format("{}: somebody else speaks to the INS (frame 0x{:X}): end the service, or the other "
+                                   "tester, first",
+                                   interface(), one.frame.id)};
+      return false;
+    }
+    if (!is_of(one.frame, bus_.response, bus_.response_byte)) {
       others_.push_back(one.frame);
       continue;
     }
     ++frames_;
-    Frame frame{Bytes(one.frame.payload().begin(), one.frame.payload().end()), one.kernel_time};
-    if (!isotp::decode(frame.data)) {
+    const auto payload = one.frame.payload().subspan(address_bytes());
+    Frame frame{Bytes(payload.begin(), payload.end()), one.kernel_time};
+    if (!decode(frame.data)) {
       bad_frames_.push_back(frame.data);
     }
     waiting_.push_back(std::move(frame));
@@ -165,9 +190,11 @@ bool Tester::quiet(double seconds) {
   return nothing;
 }
 
-void Tester::tell_all(ByteView request) {
-  std::array<std::uint8_t, can::max_classic_bytes> data{};
-  put(std::span(data).first(isotp::encode_single(request, data)), std::nullopt, true);
+void Tester::put_single(ByteView request, bool to_all) {
+  std::array<std::uint8_t, can::max_fd_bytes> data{};
+  const bool classic = request.size() <= isotp::max_single_payload(classic_bytes());
+  const auto room = std::span(data).first(classic ? classic_bytes() : frame_bytes());
+  put(room.first(isotp::encode_single(request, room, address_bytes())), std::nullopt, to_all);
 }
 
 std::optional<isotp::FlowControl> Tester::put_first(ByteView request) {
@@ -176,7 +203,7 @@ std::optional<isotp::FlowControl> Tester::put_first(ByteView request) {
   isotp::encode_first(static_cast<std::uint32_t>(request.size()), request, frame);
   put(frame);
   while (const auto answer = next(transport_timeout_s)) {
-    const auto pdu = isotp::decode(answer->data);
+    const auto pdu = decode(answer->data);
     if (pdu && std::holds_alternative<isotp::FlowControl>(*pdu)) {
       return std::get<isotp::FlowControl>(*pdu);
     }
@@ -191,7 +218,7 @@ void Tester::put_rest(ByteView request, const isotp::FlowControl& first_flow, st
   for (std::size_t number = 1; at < request.size(); ++number) {
     if (flow.block_size != 0 && in_block == flow.block_size) {
       const auto answer = next(transport_timeout_s);
-      const auto pdu = answer ? isotp::decode(answer->data) : tl::unexpected(isotp::CodecError::empty);
+      const auto pdu = answer ? decode(answer->data) : tl::unexpected(isotp::CodecError::empty);
       if (!pdu || !std::holds_alternative<isotp::FlowControl>(*pdu)) {
         return;
       }
@@ -237,7 +264,7 @@ Exchange Tester::collect(const isotp::FirstFrame& first, const Receiving& receiv
       in_block = 0;
     }
     const auto frame = next(transport_timeout_s);
-    const auto pdu = frame ? isotp::decode(frame->data) : tl::unexpected(isotp::CodecError::empty);
+    const auto pdu = frame ? decode(frame->data) : tl::unexpected(isotp::CodecError::empty);
     const auto* part = pdu ? std::get_if<isotp::ConsecutiveFrame>(&*pdu) : nullptr;
     if (part == nullptr || part->sequence != sequence % 16) {
       exchange.kind = Exchange::Kind::broken;
@@ -274,7 +301,7 @@ Exchange Tester::receive(std::uint8_t service, double within_s, const Receiving&
   const auto begin = Clock::now();
   while (const auto frame = next(within_s - since(begin))) {
     const double waited_s = since(begin);
-    const auto pdu = isotp::decode(frame->data);
+    const auto pdu = decode(frame->data);
     if (!pdu) {
       continue;  // noted among the bad frames
     }
@@ -300,9 +327,7 @@ Exchange Tester::ask(ByteView request, const Receiving& receiving) {
   }
   waiting_.clear();
   if (request.size() <= isotp::max_single_payload(frame_bytes())) {
-    std::array<std::uint8_t, can::max_fd_bytes> data{};
-    const auto room = std::span(data).first(request.size() <= 7 ? can::max_classic_bytes : frame_bytes());
-    put(room.first(isotp::encode_single(request, room)));
+    put_single(request);
   } else {
     const auto flow = put_first(request);
     if (!flow || flow->status != isotp::FlowStatus::clear_to_send) {

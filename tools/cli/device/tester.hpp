@@ -46,11 +46,16 @@ class Tester {
  public:
   [[nodiscard]] static Expected<Tester> open(const std::string& interface, const profile::Profile& profile);
 
+  // Sends a request that fits a single frame, and waits for nothing.
+  void put_single(ByteView request, bool to_all = false);
   // Sends the request and waits for its answer, `patience_s` beyond what the profile and the INS allow.
   Exchange ask(ByteView request, const Receiving& receiving = {});
-  void tell_all(ByteView request);  // to all nodes, in a single frame
+  void tell_all(ByteView request) { put_single(request, true); }
   // Frame by frame. Data are filled with `fill`, the profile's padding otherwise.
+  // Behind the address byte, where frames have one; what the frame has no room for is left out.
   void put(ByteView data, std::optional<std::uint8_t> fill = std::nullopt, bool to_all = false);
+  // With this address byte in the place of the INS's.
+  void put_addressed(std::uint8_t address, ByteView data);
   std::optional<Frame> next(double within_s);
   // Whether the INS sends nothing for so long; what comes is dropped.
   bool quiet(double seconds);
@@ -82,8 +87,14 @@ class Tester {
  private:
   Tester(can::Socket socket, const profile::Profile& profile);
   bool send(const can::CanFrame& frame);
+  void put_frame(std::uint32_t id, std::optional<std::uint8_t> address, ByteView data, std::uint8_t fill);
+  bool is_of(const can::CanFrame& frame, std::uint32_t id, std::optional<std::uint8_t> address) const;
   bool fill(double within_s);
-  std::size_t frame_bytes() const { return bus_.fd ? can::max_fd_bytes : can::max_classic_bytes; }
+  std::size_t address_bytes() const { return bus_.request_byte ? 1 : 0; }
+  // Of a frame, what is left behind its address byte.
+  std::size_t frame_bytes() const { return (bus_.fd ? can::max_fd_bytes : can::max_classic_bytes) - address_bytes(); }
+  std::size_t classic_bytes() const { return can::max_classic_bytes - address_bytes(); }
+  auto decode(ByteView data) const { return isotp::decode(data, address_bytes()); }
   Exchange collect(const isotp::FirstFrame& first, const Receiving& receiving);
   void judge(Exchange& exchange, std::uint8_t service) const;
 

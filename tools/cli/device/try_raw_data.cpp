@@ -1,8 +1,9 @@
-// RequestUpload, TransferData, RequestTransferExit, or ReadMemoryByAddress: the oldest page of the latest run.
+// RequestUpload or RequestFileTransfer with TransferData and RequestTransferExit, or ReadMemoryByAddress: the oldest page of the latest run.
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "protocol/profile/raw_file.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
 #include "tools/cli/device/conformance.hpp"
@@ -11,10 +12,17 @@ namespace selfcal::cli::device {
 namespace {
 
 using uds::Nrc;
-constexpr std::string_view upload = "ISO 14229-1, 14.3", transfer = "ISO 14229-1, 14.4", leave = "ISO 14229-1, 14.5";
+constexpr std::string_view upload = "ISO 14229-1, 14.3", transfer = "ISO 14229-1, 14.4", leave = "ISO 14229-1, 14.5",
+                           file = "ISO 14229-1, 14.6";
 
-Bytes begin_request(const profile::Profile& p, std::uint32_t page) {
+bool by_file(const profile::Profile& p) { return p.raw.way == profile::Raw::Way::file; }
+std::string_view begin_clause(const profile::Profile& p) { return by_file(p) ? file : upload; }
+
+Bytes begin_request(const profile::Profile& p, std::uint32_t run, std::uint32_t page) {
   const profile::Raw& raw = p.raw;
+  if (by_file(p)) {
+    return uds::file_request(profile::file_name(raw.file, run, page));
+  }
   const auto bytes = static_cast<std::uint32_t>(raw.page.bytes);
   return uds::upload_request(raw.by_page ? page : page * bytes, bytes, {raw.address_bytes, raw.size_bytes});
 }
@@ -42,13 +50,10 @@ class Upload {
   Upload(Conformance& c, const ins::DirectoryRecord& directory) : c_(c), p_(c.profile()), directory_(directory) {}
 
   void run() {
-    const Requirement begun{"upload.begin", upload, "The upload of a page begins, and the longest block is told.",
-                            Mode::open};
-    const auto response = c_.answered(begun, begin_request(p_, directory_.first_page), 0, [&](ByteView bytes) {
-      const auto told = uds::read_upload_response(bytes);
-      longest_ = told.value_or(0);
-      return !told ? told.error().message : longest_ <= uds::transfer_overhead ? "a block without data" : "";
-    });
+    const Requirement begun{"upload.begin", begin_clause(p_),
+                            "The upload of a page begins, and the longest block is told.", Mode::open};
+    const Bytes request = begin_request(p_, directory_.run_id, directory_.first_page);
+    const auto response = c_.answered(begun, request, 0, [this](ByteView bytes) { return take_answer(bytes); });
     if (!response) {
       return;
     }
@@ -58,6 +63,22 @@ class Upload {
   }
 
  private:
+  std::string take_answer(ByteView bytes) {
+    if (!by_file(p_)) {
+      const auto told = uds::read_upload_response(bytes);
+      longest_ = told.value_or(0);
+      return told ? "" : told.error().message;
+    }
+    const auto told = uds::read_file_response(bytes);
+    if (!told) {
+      return told.error().message;
+    }
+    longest_ = told->longest;
+    return told->bytes == p_.raw.page.bytes
+               ? ""
+               : fmt::format("a file of {} bytes, a page has {}", told->bytes, p_.raw.page.bytes);
+  }
+
   Exchange block(std::uint8_t number) { return c_.tester().ask(uds::transfer_request(number)); }
 
   void first_block() {
@@ -196,17 +217,18 @@ void try_raw_data(Conformance& c) {
   c.refused({"transfer.no_exit", leave, "Without an upload there is none to end.", Mode::open},
             uds::transfer_exit_request(), {Nrc::request_sequence_error});
   const auto directory = directory_of(c);
-  Bytes format = begin_request(p, 0);
-  format[1] = 0x11;
-  c.refused({"upload.format", upload, "Compressed or encrypted data are refused.", Mode::open}, format,
+  const std::uint32_t run = directory ? directory->run_id : 0;
+  Bytes format = begin_request(p, run, 0);
+  (by_file(p) ? format.back() : format[1]) = 0x11;
+  c.refused({"upload.format", begin_clause(p), "Compressed or encrypted data are refused.", Mode::open}, format,
             {Nrc::request_out_of_range});
-  constexpr Requirement begin{"upload.begin", upload, "The upload of a page begins, and the longest block is told.",
-                              Mode::open};
+  const Requirement begin{"upload.begin", begin_clause(p),
+                          "The upload of a page begins, and the longest block is told.", Mode::open};
   if (!directory) {
     return c.not_tried(begin, directory.error().message);
   }
-  c.refused({"upload.range", upload, "Pages that are not there are refused.", Mode::open},
-            begin_request(p, directory->pages_written + 1), {Nrc::request_out_of_range});
+  c.refused({"upload.range", begin_clause(p), "Pages that are not there are refused.", Mode::open},
+            begin_request(p, run, directory->pages_written + 1), {Nrc::request_out_of_range});
   if (directory->pages_written <= directory->first_page) {
     return c.not_tried(begin, "the INS holds no raw data");
   }

@@ -66,6 +66,22 @@ void try_frames(Conformance& c) {
           std::array<std::uint8_t, 3>{0x30, 0, 0});
 }
 
+// Where frames have an address byte: one that begins with another is somebody else's.
+void try_address(Conformance& c) {
+  const auto& byte = c.profile().bus.request_byte;
+  constexpr Requirement other{"isotp.address", "ISO 15765-2, 10.3", "A frame with another address byte is ignored."};
+  if (!byte || !c.ready(other)) {
+    return;
+  }
+  const std::array<std::uint8_t, 3> present{2, uds::service::tester_present, 0};
+  const auto wrong = static_cast<std::uint8_t>(*byte ^ 0x41U);
+  c.tester().put_addressed(wrong, present);
+  const auto came = c.tester().next(silence_s);
+  const std::string after = then_present(c);
+  c.judged(other, fmt::format("3E 00 behind address {:02X}", wrong), "nothing",
+           (came ? "frame " + hex(came->data) : "nothing") + after, !came && after.empty());
+}
+
 void try_long_requests(Conformance& c) {
   const Bytes request = long_request();
   const std::string told = fmt::format("a request of {} bytes, service {:02X}", request.size(), no_service);
@@ -171,6 +187,7 @@ void try_flow_control(Conformance& c, ByteView request) {
 
 void try_transport(Conformance& c) {
   try_frames(c);
+  try_address(c);
   try_long_requests(c);
   if (const auto request = long_read(c)) {
     try_flow_control(c, *request);

@@ -1,10 +1,7 @@
-// The numbers by which the INS is spoken to: CAN identifiers, data identifiers, routines. THE table; the DBC, the
-// decoder's names and the documentation come from it.
+// The numbers of our own INS, for the tests alone: what the programs know of them stands in config/profiles/selfcal.toml.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <string_view>
 
 namespace selfcal::ins {
 
@@ -35,26 +32,5 @@ inline constexpr std::uint16_t erase_inactive = 0x0302;       // start: erase th
 inline constexpr std::uint16_t commit_coefficients = 0x0303;  // start: CRC u32 of the record to be made valid
 inline constexpr std::uint16_t navigation_check = 0x0304;     // start: NavigationCheckRequest; result: ...Record
 }  // namespace routine
-
-enum class Access : std::uint8_t { open, unlocked };  // unlocked: SecurityAccess and the extended session
-
-struct DataIdentifier {
-  std::uint16_t id;
-  std::string_view name;
-  Access write;  // meaningful if writable
-  bool writable;
-  std::string_view content;
-};
-extern const std::array<DataIdentifier, 10> data_identifiers;
-
-struct Routine {
-  std::uint16_t id;
-  std::string_view name;
-  std::string_view content;
-};
-extern const std::array<Routine, 4> routines;
-
-std::string_view did_name(std::uint16_t did);          // "unknown"
-std::string_view routine_name(std::uint16_t routine);  // "unknown"
 
 }  // namespace selfcal::ins

@@ -1,0 +1,48 @@
+// Noise by its spectrum: what no white noise, quantum or sine holds.
+#pragma once
+
+#include <complex>
+#include <cstdint>
+#include <vector>
+
+#include "sim_ins/base_motion.hpp"
+#include "sim_ins/random.hpp"
+
+namespace selfcal::sim {
+
+// One-sided density, the same between two edges, none outside them. Of a sensor: of its increments over the sampling interval, so that it
+// ends at half of the sampling rate. Of the base: of its tilt.
+struct NoiseSpectrum {
+  enum class Channel { gyro_x, gyro_y, gyro_z, accel_x, accel_y, accel_z, base_roll, base_pitch };
+  Channel channel = Channel::gyro_x;
+  std::vector<double> edges_hz;  // rising, one more than densities
+  std::vector<double> density;   // rad/s/sqrt(Hz), m/s^2/sqrt(Hz), rad/sqrt(Hz)
+  double above_m = 0.0;          // of the base: the sensors above the axis that it turns about
+};
+
+// Gaussian noise of this spectrum, one sample after another. Blocks of random phases (FFT) overlap by half under a window whose
+// squares add up to one: the spectrum is the table's, smoothed by the window of a block, which is a quarter of the narrowest band.
+// A band of twice the density around it is a line, a dither's or a vibration's: its power is the same in every block.
+class SpectrumNoise {
+ public:
+  SpectrumNoise(const NoiseSpectrum& spectrum, double rate_hz, std::uint64_t seed);
+  double next();  // of the rate, SI
+  int axis() const { return axis_; }
+
+ private:
+  std::vector<double> block();
+
+  int axis_;
+  std::vector<double> sigma_;  // of the cosine and of the sine of bin k
+  std::vector<bool> line_;     // bin k belongs to a line: a random phase, no random power
+  std::vector<double> current_, following_;
+  std::size_t half_, at_;
+  Random random_;
+};
+
+// The same of the base, whose motion needs derivatives: a dozen sines at frequencies drawn evenly from each band, of random amplitude.
+std::vector<Sine> sines_of(const NoiseSpectrum& spectrum, std::uint64_t seed);
+// Adds the tilt to the base, and what it moves the sensors by.
+void add_tilt(const NoiseSpectrum& spectrum, std::uint64_t seed, BaseMotion& base);
+
+}  // namespace selfcal::sim
