@@ -7,6 +7,7 @@
 #include <new>
 
 #include "estimator/geometry/units.hpp"
+#include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/resample.hpp"
 #include "protocol/import/time_axis.hpp"
 #include "protocol/import/units.hpp"
@@ -175,6 +176,34 @@ std::vector<double> intervals_of(const TimeAxis& axis, bool by_stamps) {
   return interval;
 }
 
+// Strictly, or without the rows that lack a number, which the notes then say.
+Expected<ColumnData> read_rows(const ColumnSource& source, ColumnRequest request, const ImportMap& map,
+                               const std::string& file, std::vector<std::string>& notes) {
+  if (!map.time.leave_out_incomplete) {
+    return source.read(request);
+  }
+  request.tolerant = true;
+  return source.read(request).and_then([&](ColumnData data) -> Expected<ColumnData> {
+    if (data.left_out) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: more than {} lines of numbers", file, request.most_rows));
+    }
+    constexpr double most_lost = 0.1;  // as of any recording
+    const std::vector<bool> lost = incomplete_rows(data, 1.0);
+    const auto count = std::count(lost.begin(), lost.end(), true);
+    if (static_cast<double>(count) > most_lost * static_cast<double>(data.rows)) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: {} of {} lines lack a number; at most a tenth is left out", file, count, data.rows));
+    }
+    if (count > 0) {
+      const auto first = static_cast<std::size_t>(std::find(lost.begin(), lost.end(), true) - lost.begin());
+      notes.push_back(fmt::format("{} lines lack a number and are left out as lost samples, the first at {}", count,
+                                  data.place(first)));
+      leave_out(lost, data);
+    }
+    return data;
+  });
+}
+
 Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const std::string& file) {
   if (const auto settled = check_settled(map); !settled) {
     return tl::unexpected(settled.error());
@@ -184,7 +213,8 @@ Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const
   if (columns.fault) {
     return tl::unexpected(*columns.fault);
   }
-  const Expected<ColumnData> data = source.read(columns.request);
+  Imported imported;
+  const Expected<ColumnData> data = read_rows(source, columns.request, map, file, imported.notes);
   if (!data) {
     return tl::unexpected(data.error());
   }
@@ -197,8 +227,7 @@ Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const
   if (!axis) {
     return tl::unexpected(axis.error());
   }
-  Imported imported;
-  imported.notes = std::move(axis->notes);
+  imported.notes.insert(imported.notes.end(), axis->notes.begin(), axis->notes.end());
   Recording& recording = imported.recording;
   recording.serial = map.serial;
   recording.start_time_utc = map.start_time_utc;

@@ -9,6 +9,7 @@
 #include "protocol/import/guess_orientation.hpp"
 #include "protocol/import/guess_roles.hpp"
 #include "protocol/import/guess_units.hpp"
+#include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/psins.hpp"
 #include "protocol/import/time_axis.hpp"
 
@@ -24,10 +25,11 @@ std::string_view si_unit(const UnitClaim& said, std::string_view increments, std
 
 class Guesser {
  public:
-  Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values)
+  Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values, std::vector<bool> lost)
       : source_(source),
         known_(knowledge),
         values_(std::move(values)),
+        lost_(std::move(lost)),
         named_(read_names(source.names(), source.units())) {}
 
   Guess guess() {
@@ -35,9 +37,10 @@ class Guesser {
       guess_.map.dialect = *source_.dialect();
     }
     psins_ = read_psins(source_.preamble());
-    roles_ = assign_roles(source_, named_, values_, psins_.has_value(), guess_.remarks);
+    roles_ = assign_roles(source_, named_, values_, lost_, psins_.has_value(), guess_.remarks);
     guess_site();
     guess_time();
+    guess_incomplete();
     if (roles_.gyro && roles_.accelerometer) {
       guess_sensors();
     }
@@ -131,6 +134,19 @@ class Guesser {
     if (known_.sample_rate_hz && std::abs(*known_.sample_rate_hz / rate.rate_hz - 1.0) > 1e-3) {
       doubt("time.unit", fmt::format("the times make {} Hz, {} Hz is given", rate.rate_hz, *known_.sample_rate_hz));
     }
+  }
+
+  void guess_incomplete() {
+    const auto count = std::count(lost_.begin(), lost_.end(), true);
+    if (count == 0) {
+      return;
+    }
+    const std::string lines = fmt::format("{} of {} lines lack a number", count, lost_.size());
+    if (!roles_.time) {
+      return doubt("time", lines + ", and no time says how long they were");
+    }
+    guess_.map.time.leave_out_incomplete = true;
+    say("time.leave_out_incomplete", lines + ": they are left out, as samples that were lost");
   }
 
   UnitClaim claim(const std::array<std::size_t, 3>& columns, const char* key) {
@@ -355,6 +371,7 @@ class Guesser {
   const ColumnSource& source_;
   const GuessKnowledge& known_;
   Values values_;
+  std::vector<bool> lost_;  // rows of the file that values_ is without
   std::vector<NamedColumn> named_;
   Roles roles_;
   std::optional<PsinsHeader> psins_;
@@ -386,8 +403,11 @@ Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& know
                                                   data->rows, fewest_rows));
   }
   const std::size_t rows = data->rows;
+  constexpr double most_lost = 0.01;  // beyond it a column is no sensor's
+  std::vector<bool> lost = incomplete_rows(*data, most_lost);
+  leave_out(lost, *data);
   const bool left_out = data->left_out;
-  Guess guess = Guesser(source, knowledge, std::move(data->values)).guess();
+  Guess guess = Guesser(source, knowledge, std::move(data->values), std::move(lost)).guess();
   if (left_out) {
     guess.remarks.insert(guess.remarks.begin(),
                          Remark{"columns", fmt::format("judged by the first {} rows", rows), false});

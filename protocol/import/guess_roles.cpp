@@ -9,6 +9,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/guess_axes.hpp"
+#include "protocol/import/incomplete_rows.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -41,8 +42,8 @@ bool even(const std::vector<Number>& values) {
 class Assigner {
  public:
   Assigner(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
-           std::vector<Remark>& remarks)
-      : source_(source), named_(named), values_(values), remarks_(remarks), used_(values.size(), false) {
+           const std::vector<bool>& lost, std::vector<Remark>& remarks)
+      : source_(source), named_(named), values_(values), lost_(lost), remarks_(remarks), used_(values.size(), false) {
     for (std::size_t k = 0; k < values.size(); ++k) {
       used_[k] = !all_finite(values[k]);  // of no use
     }
@@ -81,10 +82,13 @@ class Assigner {
     ColumnRequest request;
     request.tolerant = true;
     request.stamp = column;
-    request.most_rows = values_[column].size();
+    request.most_rows = lost_.size();
     for (const bool date : {false, true}) {
       request.stamp_is_date = date;
-      const Expected<ColumnData> data = source_.read(request);
+      Expected<ColumnData> data = source_.read(request);
+      if (data) {
+        leave_out(lost_, *data);
+      }
       if (data && increasing(data->stamps) && even(data->stamps)) {
         roles_.time = column;
         roles_.time_is_date = date;
@@ -408,6 +412,7 @@ class Assigner {
   const ColumnSource& source_;
   const std::vector<NamedColumn>& named_;
   const Values& values_;
+  const std::vector<bool>& lost_;
   std::vector<Remark>& remarks_;
   std::vector<bool> used_;
   std::vector<std::size_t> taken_;
@@ -425,14 +430,14 @@ TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3
 }
 
 Roles assign_roles(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
-                   bool by_format, std::vector<Remark>& remarks) {
+                   const std::vector<bool>& lost, bool by_format, std::vector<Remark>& remarks) {
   if (by_format) {
     Roles roles;
     roles.gyro = {0, 1, 2};
     roles.accelerometer = {3, 4, 5};
     return roles;
   }
-  return Assigner(source, named, values, remarks).assign();
+  return Assigner(source, named, values, lost, remarks).assign();
 }
 
 }  // namespace selfcal::import

@@ -21,7 +21,7 @@ const std::map<std::string_view, Keys>& known_keys() {
       {"text", {"separator", "decimal", "comment", "header_line", "first_line"}},
       {"recording", {"serial", "start_time_utc", "sample_rate_hz", "dwell_s", "rotation_s"}},
       {"site", {"latitude_deg", "longitude_deg", "height_m"}},
-      {"time", {"column", "unit", "stamp", "interval", "origin", "resample"}},
+      {"time", {"column", "unit", "stamp", "interval", "origin", "resample", "leave_out_incomplete"}},
       {"gyro", {"columns", "kind", "unit", "scale", "zero", "axes"}},
       {"accelerometer", {"columns", "kind", "unit", "scale", "zero", "axes"}},
       {"gimbal", {"outer", "inner", "unit", "signs", "offsets_deg", "fixed_deg", "absent"}},
@@ -273,6 +273,7 @@ void read_time(Section& section, ImportMap& map) {
   section.text("stamp", time.stamp, {"begin", "middle", "end"});
   section.text("interval", time.interval, {"nominal", "stamps"});
   section.flag("resample", time.resample);
+  section.flag("leave_out_incomplete", time.leave_out_incomplete);
   if (std::string word; section.is_text("origin")) {
     section.text("origin", word, {"first"});
     time.origin_first = true;
@@ -281,6 +282,9 @@ void read_time(Section& section, ImportMap& map) {
   }
   if (!time.column && !map.sample_rate_hz) {
     section.miss("time", "neither a column nor recording.sample_rate_hz");
+  }
+  if (!time.column && time.leave_out_incomplete) {
+    section.refuse("time.leave_out_incomplete", "without a column nothing says how long a row that is left out was");
   }
   if (!time.column && (time.resample || time.interval == "stamps")) {
     section.refuse(time.resample ? "time.resample" : "time.interval", "without a column there are no stamps");

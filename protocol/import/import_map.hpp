@@ -36,13 +36,14 @@ struct TriadMap {
 };
 
 struct TimeMap {
-  std::optional<ColumnRef> column;   // none: rows follow each other at the sample rate
-  std::string unit = "s";            // or "date"
-  std::string stamp = "end";         // of the interval: begin, middle, end
-  std::string interval = "nominal";  // what a rate is multiplied by: nominal, stamps
-  std::optional<double> origin;      // s, taken from the stamps
-  bool origin_first = false;         // the first sample's interval begins at 0
-  bool resample = false;             // onto a uniform grid
+  std::optional<ColumnRef> column;    // none: rows follow each other at the sample rate
+  std::string unit = "s";             // or "date"
+  std::string stamp = "end";          // of the interval: begin, middle, end
+  std::string interval = "nominal";   // what a rate is multiplied by: nominal, stamps
+  std::optional<double> origin;       // s, taken from the stamps
+  bool origin_first = false;          // the first sample's interval begins at 0
+  bool resample = false;              // onto a uniform grid
+  bool leave_out_incomplete = false;  // rows that lack a number are lost samples; else an error
 };
 
 struct GimbalMap {

@@ -145,6 +145,9 @@ void write_time(Writer& out, const TimeMap& time) {
   out.line("stamp", toml_text(time.stamp));
   out.line("interval", toml_text(time.interval));
   out.line("resample", time.resample ? "true" : "false");
+  if (time.leave_out_incomplete) {
+    out.line("leave_out_incomplete", "true");
+  }
 }
 
 void write_gimbal(Writer& out, const GimbalMap& gimbal) {

@@ -7,6 +7,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/build_recording.hpp"
+#include "protocol/import/guess.hpp"
 #include "protocol/recording/csv.hpp"
 #include "tests/unit/recording/sample_recording.hpp"
 
@@ -150,6 +151,72 @@ TEST_F(Build, FaultsNameLineColumnAndWhatIsExpected) {
   const std::string timed = std::string(site) + "[time]\ncolumn = 7\n" + counts;
   EXPECT_THAT(fault("1 2 3 0 0 1 0.1\n\n# a remark\n1 2 3 0 0 1 0.1\n", timed),
               HasSubstr("line 4: time 0.1 is not after 0.1"));
+}
+
+// Thirty samples at 100 Hz, the sixth and seventh without one number, the last cut off.
+std::string with_lost_lines() {
+  std::string text = "# a remark\n";
+  for (int k = 1; k < 30; ++k) {
+    text += fmt::format("1 2 3 0 {} 1 {:.2f}\n", k == 6 || k == 7 ? "NaN" : "0", 0.01 * k);
+    text += k == 3 ? "\n" : "";
+  }
+  return text + "1 2 3 0 0";
+}
+
+TEST_F(Build, LinesThatLackANumberAreLostSamplesWhereTheMapSaysSo) {
+  const std::string strict = std::string(site) + "[time]\ncolumn = 7\n" + without_rate();
+  EXPECT_THAT(fault(with_lost_lines(), strict), HasSubstr("line 8: column 5: \"NaN\"; a finite number is expected"));
+  const std::string map = std::string(site) + "[time]\ncolumn = 7\nleave_out_incomplete = true\n" + without_rate();
+  const auto built = build(with_lost_lines(), map);
+  ASSERT_TRUE(built) << built.error().message;
+  ASSERT_EQ(built->recording.time_s.size(), 27U);
+  EXPECT_EQ(built->recording.sample_rate_hz, 100.0);
+  EXPECT_NEAR(built->recording.time_s[4], 0.05, 1e-12);
+  EXPECT_NEAR(built->recording.time_s[5], 0.08, 1e-12);  // a gap, as lost samples leave it
+  EXPECT_THAT(
+      built->notes,
+      testing::Contains(HasSubstr("3 lines lack a number and are left out as lost samples, the first at line 8")));
+  // Lines behind those left out keep their numbers.
+  std::string back = with_lost_lines();
+  back.replace(back.find("0.20"), 4, "0.10");
+  EXPECT_THAT(fault(back, map), HasSubstr("line 22: time 0.1 is not after 0.19"));
+  EXPECT_THAT(fault("1 2 3 0 0 1 0.01\n1 2 3 0 0 NaN 0.02\n1 2 3 0 0 1 0.03\n", map),
+              HasSubstr("1 of 3 lines lack a number"));
+  EXPECT_THAT(fault(with_lost_lines(), std::string(site) + "[time]\nleave_out_incomplete = true\n" + counts),
+              HasSubstr("time.leave_out_incomplete"));
+}
+
+// A sensor at rest at 100 Hz, its last line cut off.
+TEST_F(Build, TheGuessLeavesOutLinesThatLackANumber) {
+  const auto text = [](int lost) {
+    std::string all = "time,gx,gy,gz,ax,ay,az\n";
+    for (int k = 1; k <= 2000; ++k) {
+      const bool bad = k > 700 && k <= 700 + lost;
+      all += bad ? fmt::format("{:.2f},nan,nan,nan,nan,nan,nan\n", 0.01 * k)
+                 : fmt::format("{:.2f},0.001,-0.002,0.0005,0.{},0.2,9.8\n", 0.01 * k, 10 + k % 7);
+    }
+    return all + "20.01,0.0";
+  };
+  const auto guessed = [&](const std::string& file) {
+    std::ofstream(file_) << file;
+    const auto source = open_columns(file_);
+    return source ? guess_map(**source, {}, "file.txt") : tl::unexpected(source.error());
+  };
+  const auto guess = guessed(text(12));
+  ASSERT_TRUE(guess) << guess.error().message;
+  EXPECT_TRUE(guess->map.time.leave_out_incomplete);
+  ASSERT_TRUE(guess->map.time.column);
+  EXPECT_EQ(guess->map.accelerometer.columns[2].name, "az");
+  EXPECT_EQ(guess->map.sample_rate_hz, 100.0);
+  const auto said = std::find_if(guess->remarks.begin(), guess->remarks.end(),
+                                 [](const Remark& r) { return r.key == "time.leave_out_incomplete"; });
+  ASSERT_NE(said, guess->remarks.end());
+  EXPECT_THAT(said->text, HasSubstr("13 of 2001 lines"));
+  EXPECT_TRUE(parse_import_map(format_import_map(guess->map, {}, ""), "map")->time.leave_out_incomplete);
+  // What lacks more than a hundredth is no sensor's.
+  const auto many = guessed(text(100));
+  ASSERT_TRUE(many) << many.error().message;
+  EXPECT_TRUE(many->map.accelerometer.columns[2].name.empty());
 }
 
 TEST_F(Build, DoubtsAndAMissingSiteWriteNothing) {
