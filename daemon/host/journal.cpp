@@ -6,7 +6,9 @@
 #include <systemd/sd-journal.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <utility>
 #include <vector>
 
 namespace selfcal::journal {
@@ -23,18 +25,18 @@ bool journal_is_there() {
 
 std::vector<std::string> entry(Level level, std::string_view message, const Fields& fields) {
   std::vector<std::string> lines{fmt::format("MESSAGE={}", message),
-                                 fmt::format("PRIORITY={}", static_cast<int>(level)), "SYSLOG_IDENTIFIER=selfcald"};
+                                 fmt::format("PRIORITY={}", static_cast<int>(level)),
+                                 fmt::format("SYSLOG_IDENTIFIER={}", program_invocation_short_name)};
   if (fields.run > 0) {
     lines.push_back(fmt::format("SELFCAL_RUN={}", fields.run));
   }
-  if (!fields.ins.empty()) {
-    lines.push_back("SELFCAL_INS=" + fields.ins);
-  }
-  if (!fields.serial.empty()) {
-    lines.push_back("SELFCAL_SERIAL=" + fields.serial);
-  }
-  if (!fields.state.empty()) {
-    lines.push_back("SELFCAL_STATE=" + fields.state);
+  for (const auto& [name, value] :
+       {std::pair("INS", &fields.ins), std::pair("SERIAL", &fields.serial), std::pair("STATE", &fields.state),
+        std::pair("BATCH", &fields.batch), std::pair("STEP", &fields.step), std::pair("TASK", &fields.task),
+        std::pair("KEY", &fields.key)}) {
+    if (!value->empty()) {
+      lines.push_back(fmt::format("SELFCAL_{}={}", name, *value));
+    }
   }
   if (fields.nrc >= 0) {
     lines.push_back(fmt::format("SELFCAL_NRC=0x{:02X}", fields.nrc));
@@ -42,22 +44,25 @@ std::vector<std::string> entry(Level level, std::string_view message, const Fiel
   return lines;
 }
 
+bool note(Level level, std::string_view message, const Fields& fields) {
+  if (!journal_is_there()) {
+    return false;
+  }
+  std::vector<std::string> lines = entry(level, message, fields);
+  std::vector<iovec> parts;
+  parts.reserve(lines.size());
+  for (std::string& line : lines) {
+    parts.push_back({line.data(), line.size()});
+  }
+  return sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) >= 0;
+}
+
 void write(Level level, std::string_view message, const Fields& fields) {
-  if (journal_is_there()) {
-    std::vector<std::string> lines = entry(level, message, fields);
-    std::vector<iovec> parts;
-    parts.reserve(lines.size());
-    for (std::string& line : lines) {
-      parts.push_back({line.data(), line.size()});
-    }
-    if (sd_journal_sendv(parts.data(), static_cast<int>(parts.size())) >= 0) {
-      return;
-    }
+  if (note(level, message, fields)) {
+    return;
   }
-  std::string line = fmt::format("<{}>selfcald: ", static_cast<int>(level));
-  if (isatty(STDERR_FILENO) != 0) {
-    line = "selfcald: ";
-  }
+  std::string line = isatty(STDERR_FILENO) != 0 ? "" : fmt::format("<{}>", static_cast<int>(level));
+  line += fmt::format("{}: ", program_invocation_short_name);
   if (!fields.ins.empty()) {
     line += fields.ins + ": ";
   }

@@ -117,12 +117,17 @@ Expected<std::unique_ptr<Connection>> Connection::open(const std::string& parame
     return fail(ErrorKind::device, "hub: " + one_line(PQerrorMessage(raw)));
   }
   const char* ours = security == Security::authenticated
-                         ? "SET search_path = selfcal, public; SET statement_timeout = '60s'; SET TIME ZONE 'UTC'"
+                         ? "SET search_path = selfcal, public; SET statement_timeout = '60s'; SET "
+                           "idle_in_transaction_session_timeout = '60s'; SET TIME ZONE 'UTC'"
                          : "SET search_path = selfcal, public; SET TIME ZONE 'UTC'";
   if (auto ok = connection->execute(ours); !ok) {
     return tl::unexpected(ok.error());
   }
   return connection;
+}
+
+Expected<void> check_authenticated(const std::string& parameters) {
+  return guarded(parameters).map([](const std::string&) {});
 }
 
 Connection::~Connection() { PQfinish(connection_); }
@@ -205,6 +210,23 @@ std::string sql_array(const std::vector<double>& values) {
     text += fmt::format("{}{:.17g}", text.size() > 1 ? "," : "", value);
   }
   return text + "}";
+}
+
+std::string sql_array(const std::vector<std::int64_t>& values) { return fmt::format("{{{}}}", fmt::join(values, ",")); }
+
+std::string sql_array(const std::vector<std::string>& texts) {
+  std::string array = "{";
+  for (const std::string& text : texts) {
+    array += array.size() > 1 ? ",\"" : "\"";
+    for (const char c : text) {
+      if (c == '"' || c == '\\') {
+        array += '\\';
+      }
+      array += c;
+    }
+    array += '"';
+  }
+  return array + "}";
 }
 
 }  // namespace selfcal::hub

@@ -69,10 +69,15 @@ class Connection {
   std::string sql_state_;
 };
 
+// What Connection::open asks of an authenticated set's connection string, without a server. An error (bad_input) says what is missing.
+Expected<void> check_authenticated(const std::string& parameters);
+
 // Quoted for SQL, as a name and as a text.
 std::string sql_name(const std::string& name);
 std::string sql_text(const std::string& text);
-// "{1,2.5}": an array's text; 17 digits give the same bits back.
+// Text of an array, as a parameter of a statement. "{1,2.5}": 17 digits give the same bits back.
 std::string sql_array(const std::vector<double>& values);
+std::string sql_array(const std::vector<std::int64_t>& values);
+std::string sql_array(const std::vector<std::string>& texts);
 
 }  // namespace selfcal::hub

@@ -22,6 +22,9 @@ constexpr Question questions[] = {
     {"SELECT count(*) FROM certificates c JOIN runs r USING (arrival) WHERE c.serial <> r.serial OR c.at <> r.ended OR "
      "r.state <> 'completed' OR c.set_name <> r.set_name",
      "certificates that differ from their run"},
+    {"SELECT count(*) FROM measurements m JOIN runs r USING (arrival) WHERE m.serial <> r.serial OR m.at <> r.ended OR "
+     "r.state <> 'completed' OR r.kind <> 'recording'",
+     "measurements that differ from their run"},
     {"SELECT count(*) FROM certificates c WHERE NOT EXISTS (SELECT FROM validities v WHERE v.arrival = c.arrival)",
      "certificates that were never in force"},
     {"SELECT count(*) FROM (SELECT upper(valid) AS ended, lead(lower(valid)) OVER (PARTITION BY serial ORDER BY valid) "

@@ -66,18 +66,25 @@ Expected<std::vector<OutboxEntry>> Outbox::waiting(int at_most) const {
   }
 }
 
-Expected<void> Outbox::keep_document(std::int64_t sequence, const std::string& document) {
-  Statement update(database_, "UPDATE outbox SET document=? WHERE sequence=? AND document=''");
-  return update.bind(document).bind(sequence).run();
+Expected<void> Outbox::keep_documents(const std::vector<OutboxEntry>& entries) {
+  return transaction(database_, [&]() -> Expected<void> {
+    Statement update(database_, "UPDATE outbox SET document=? WHERE sequence=? AND document=''");
+    for (const OutboxEntry& entry : entries) {
+      if (auto ok = update.bind(entry.document).bind(entry.sequence).run(); !ok) {
+        return ok;
+      }
+    }
+    return {};
+  });
 }
 
 // What was taken needs its document no more: the hub has it, and the run is here.
 Expected<void> Outbox::keep_answers(const std::vector<std::pair<std::int64_t, std::string>>& answers) {
   return transaction(database_, [&]() -> Expected<void> {
+    Statement update(database_,
+                     "UPDATE outbox SET answer=?1, document=CASE WHEN ?1 LIKE 'refused%' THEN document ELSE '' END "
+                     "WHERE sequence=?2");
     for (const auto& [sequence, answer] : answers) {
-      Statement update(database_,
-                       "UPDATE outbox SET answer=?1, document=CASE WHEN ?1 LIKE 'refused%' THEN document ELSE '' END "
-                       "WHERE sequence=?2");
       if (auto ok = update.bind(answer).bind(sequence).run(); !ok) {
         return ok;
       }
@@ -164,16 +171,15 @@ Expected<std::vector<std::pair<std::string, std::int64_t>>> Outbox::units() cons
 
 Expected<void> Outbox::keep_past(const std::vector<PastCertificate>& past) {
   return transaction(database_, [&]() -> Expected<void> {
+    Statement head(database_, "INSERT OR REPLACE INTO hub_past(arrival, set_name, run, serial, utc) VALUES(?,?,?,?,?)");
+    Statement row(database_,
+                  "INSERT OR REPLACE INTO hub_past_parameters(arrival, name, value, sigma, determined) "
+                  "VALUES(?,?,?,?,?)");
     for (const PastCertificate& one : past) {
-      Statement head(database_,
-                     "INSERT OR REPLACE INTO hub_past(arrival, set_name, run, serial, utc) VALUES(?,?,?,?,?)");
       if (auto ok = head.bind(one.arrival).bind(one.set).bind(one.run).bind(one.serial).bind(one.utc).run(); !ok) {
         return ok;
       }
       for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-        Statement row(database_,
-                      "INSERT OR REPLACE INTO hub_past_parameters(arrival, name, value, sigma, determined) "
-                      "VALUES(?,?,?,?,?)");
         row.bind(one.arrival).bind(std::string(sensor_parameters[i].name)).bind(one.parameters.value[i]);
         row.bind(one.parameters.sigma[i]).bind(std::int64_t{one.parameters.determined[i]});
         if (auto ok = row.run(); !ok) {

@@ -49,8 +49,8 @@ class Outbox {
   Outbox& operator=(const Outbox&) = delete;
 
   Expected<std::vector<OutboxEntry>> waiting(int at_most) const;  // in order
-  // What is sent is made once and kept, so that a repeat is the same to the byte.
-  Expected<void> keep_document(std::int64_t sequence, const std::string& document);
+  // What is sent is made once and kept, so that a repeat is the same to the byte. One transaction.
+  Expected<void> keep_documents(const std::vector<OutboxEntry>& entries);
   // Of the hub, for each sequence: one transaction.
   Expected<void> keep_answers(const std::vector<std::pair<std::int64_t, std::string>>& answers);
   Expected<std::optional<RunStore::Parameters>> parameters(RunId run) const;  // none: it estimated nothing

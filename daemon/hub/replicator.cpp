@@ -18,18 +18,6 @@ bool of_the_document(const std::string& sql_state) {
   return sql_state.starts_with("22") || sql_state.starts_with("23") || sql_state.starts_with("54");
 }
 
-std::string array_of_texts(const std::vector<std::string>& texts) {
-  std::string array = "{";
-  for (const std::string& text : texts) {
-    array += array.size() > 1 ? ",\"" : "\"";
-    for (const char c : text) {
-      array += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
-    }
-    array += '"';
-  }
-  return array + "}";
-}
-
 }  // namespace
 
 Replicator::Replicator(HubConfig config, std::map<std::string, std::string> types, RunStore& store, Outbox& outbox)
@@ -57,9 +45,6 @@ Expected<void> Replicator::connect() {
 }
 
 Expected<void> Replicator::make_document(OutboxEntry& entry) {
-  if (!entry.document.empty()) {
-    return {};
-  }
   const auto run = store_.run(entry.run);
   if (!run) {
     return tl::unexpected(run.error());
@@ -84,24 +69,45 @@ Expected<void> Replicator::make_document(OutboxEntry& entry) {
     return tl::unexpected(message.error());
   }
   entry.document = std::move(*message);
-  return outbox_.keep_document(entry.sequence, entry.document);
+  return {};
 }
 
-Expected<Replicator::Answers> Replicator::submit(const std::vector<OutboxEntry>& entries) {
-  Answers answers;
-  if (auto ok = connection_->execute("BEGIN"); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  for (const OutboxEntry& entry : entries) {
-    const auto rows = connection_->ask("SELECT submit_run($1, $2, $3)",
-                                       {std::to_string(entry.sequence), std::to_string(entry.run), entry.document});
-    if (!rows) {
-      return tl::unexpected(rows.error());
+Expected<void> Replicator::make_documents(std::vector<OutboxEntry>& entries) {
+  std::vector<OutboxEntry> made;
+  for (OutboxEntry& entry : entries) {
+    if (entry.document.empty()) {
+      if (auto ok = make_document(entry); !ok) {
+        return ok;
+      }
+      made.push_back(entry);
     }
-    answers.emplace_back(entry.sequence, rows->text(0, 0));
   }
-  if (auto ok = connection_->execute("COMMIT"); !ok) {
-    return tl::unexpected(ok.error());
+  return made.empty() ? Expected<void>{} : outbox_.keep_documents(made);
+}
+
+// One statement, so one transaction that waits for nobody: a set that is cut off in the middle of it leaves no lock at the hub.
+Expected<Replicator::Answers> Replicator::submit(const std::vector<OutboxEntry>& entries) {
+  std::vector<std::int64_t> sequences, runs;
+  std::vector<std::string> documents;
+  for (const OutboxEntry& entry : entries) {
+    sequences.push_back(entry.sequence);
+    runs.push_back(entry.run);
+    documents.push_back(entry.document);
+  }
+  const auto rows = connection_->ask(
+      "SELECT submit_run(sequence, run, document) FROM (SELECT * FROM unnest($1::bigint[], $2::bigint[], $3::jsonb[]) "
+      "WITH ORDINALITY e(sequence, run, document, place) ORDER BY place) e",
+      {sql_array(sequences), sql_array(runs), sql_array(documents)});
+  if (!rows) {
+    return tl::unexpected(rows.error());
+  }
+  if (rows->size() != static_cast<int>(entries.size())) {
+    return fail(ErrorKind::device,
+                fmt::format("hub {}: {} answers to {} runs", connection_->place(), rows->size(), entries.size()));
+  }
+  Answers answers;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    answers.emplace_back(entries[i].sequence, rows->text(static_cast<int>(i), 0));
   }
   return answers;
 }
@@ -112,7 +118,6 @@ Expected<Replicator::Answers> Replicator::submit_alone(const OutboxEntry& entry)
   if (answers || !of_the_document(connection_->sql_state())) {
     return answers;
   }
-  (void)connection_->execute("ROLLBACK");
   return Answers{{entry.sequence, "refused: " + answers.error().message}};
 }
 
@@ -122,15 +127,15 @@ Expected<int> Replicator::fetch_past() {
     return tl::unexpected(units.error());
   }
   std::vector<std::string> serials;
-  std::string after = "{";
+  std::vector<std::int64_t> after;
   for (const auto& [serial, arrival] : *units) {
     serials.push_back(serial);
-    after += fmt::format("{}{}", after.size() > 1 ? "," : "", arrival);
+    after.push_back(arrival);
   }
   const auto rows = connection_->ask(
       "SELECT arrival, set_name, run, serial, to_char(at, 'YYYY-MM-DD\"T\"HH24:MI:SS\"Z\"'), value, sigma, "
       "determined::int[] FROM units_past($1, $2)",
-      {array_of_texts(serials), after + "}"});
+      {sql_array(serials), sql_array(after)});
   if (!rows) {
     return tl::unexpected(rows.error());
   }
@@ -166,10 +171,8 @@ Expected<StepResult> Replicator::step() {
     return tl::unexpected(entries.error());
   }
   // Made while the hub is away too: recordings that are pruned later are then in the shared folder.
-  for (OutboxEntry& entry : *entries) {
-    if (auto ok = make_document(entry); !ok) {
-      return tl::unexpected(ok.error());
-    }
+  if (auto ok = make_documents(*entries); !ok) {
+    return tl::unexpected(ok.error());
   }
   const auto give_up = [this](const Error& error) -> tl::unexpected<Error> {
     connection_.reset();
@@ -182,7 +185,6 @@ Expected<StepResult> Replicator::step() {
   if (!entries->empty()) {
     auto answers = submit(*entries);
     if (!answers && of_the_document(connection_->sql_state())) {
-      (void)connection_->execute("ROLLBACK");
       entries->resize(1);
       answers = submit_alone(entries->front());
     }

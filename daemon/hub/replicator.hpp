@@ -30,7 +30,7 @@ class Replicator {
   // `types`: profile of each [ins.NAME]. Store and outbox outlive it.
   Replicator(HubConfig config, std::map<std::string, std::string> types, RunStore& store, Outbox& outbox);
 
-  // Connects where it has to, sends up to 50 entries in one transaction, fetches. An error (device: the hub, its
+  // Connects where it has to, sends up to 50 entries in one statement, fetches. An error (device: the hub, its
   // network, this set's disk; bad_input: the connection string) leaves everything to be tried again.
   Expected<StepResult> step();
   void disconnect() { connection_.reset(); }
@@ -38,6 +38,7 @@ class Replicator {
  private:
   Expected<void> connect();
   Expected<void> make_document(OutboxEntry& entry);
+  Expected<void> make_documents(std::vector<OutboxEntry>& entries);  // those that are not made yet
   using Answers = std::vector<std::pair<std::int64_t, std::string>>;
   Expected<Answers> submit(const std::vector<OutboxEntry>& entries);
   Expected<Answers> submit_alone(const OutboxEntry& entry);

@@ -79,6 +79,9 @@ Expected<std::string> run_message(const RunStore& store, const Outbox& outbox, c
   message["serial"] = run.serial;
   message["type"] = type;
   message["kind"] = kind_of(run);
+  if (!run.source.empty()) {
+    message["source"] = run.source;
+  }
   message["state"] = name(run.state);
   message["started_utc"] = run.started_utc;
   message["ended_utc"] = run.ended_utc;

@@ -64,6 +64,9 @@ bool pause(int signals, double seconds) {
 }
 
 int replicate(const Config& config, const HubConfig& to, bool until_empty) {
+  if (auto ok = hub::check_authenticated(to.connection); !ok) {
+    return complain(ok.error());
+  }
   auto store = RunStore::open(database_path(config.state_directory));
   if (!store) {
     return complain(store.error());
@@ -131,6 +134,8 @@ int run(int argc, char** argv) {
   }
   if (!*to) {
     fmt::print("{}: no section [hub]: nothing is sent\n", config_file);
+    // The unit is of Type=notify: without this an end that is no failure would count as one.
+    sd_notify(0, "READY=1\nSTATUS=No section [hub]: nothing is sent");
     return 0;
   }
   return replicate(*config, **to, until_empty);

@@ -266,9 +266,9 @@ Expected<void> RunStore::store_parameters(RunId run, const Parameters& parameter
   if (auto ok = execute(database_, "BEGIN IMMEDIATE"); !ok) {
     return ok;
   }
+  Statement insert(database_,
+                   "INSERT OR REPLACE INTO parameters(run, name, unit, value, sigma, determined) VALUES(?,?,?,?,?,?)");
   for (std::size_t i = 0; i < sensor_parameters.size(); ++i) {
-    Statement insert(
-        database_, "INSERT OR REPLACE INTO parameters(run, name, unit, value, sigma, determined) VALUES(?,?,?,?,?,?)");
     insert.bind(run).bind(std::string(sensor_parameters[i].name)).bind(std::string(sensor_parameters[i].unit));
     insert.bind(parameters.value[i]).bind(parameters.sigma[i]).bind(std::int64_t{parameters.determined[i]});
     if (auto ok = insert.run(); !ok) {

@@ -70,6 +70,8 @@ Expected<bool> Statement::step() {
 
 Expected<void> Statement::run() {
   const auto done = step();
+  sqlite3_reset(statement_);
+  bound_ = 0;
   if (!done) {
     return tl::unexpected(done.error());
   }

@@ -32,7 +32,8 @@ class Statement {
 
   // True: there is a row; false: done.
   Expected<bool> step();
-  Expected<void> run();  // for statements without rows
+  // For statements without rows. It can be bound and run again then: a loop prepares its statement once.
+  Expected<void> run();
 
   // The next column of the row.
   std::int64_t integer();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/fleet/jumps.hpp"
 #include "estimator/statistics/climb.hpp"
 
 namespace selfcal::fleet {
@@ -320,6 +321,9 @@ TypeModel fit_type(std::span<const UnitHistory> units, int sets) {
       model.sets[s].sigma = std::sqrt(std::max(0.0, effects.covariance(column, column)));
     }
   }
+  const Jumps jumps = jumps_of(units, model);
+  model.jumps_per_year = jumps.per_year;
+  model.jump_sd = jumps.sd;
   return model;
 }
 

@@ -29,6 +29,18 @@ struct Departure {
 // rare departures of what comes back.
 double leaving_rate(const Departure& departure, double limit);
 
+// The same where the walk goes by jumps: lambda a year, and `expected` of them in what is not known of the departure, since the last
+// calibration or left unknown by it. A Poisson mixture over their number k, with the variance P_k = P - expected s^2 + k s^2 and what of
+// c is no walk's; and the jumps' own crossings,
+//
+//   lambda P(|x| < a, |x + J| > a) = lambda sum over both sides (Q(h') - Q(h)) / 2 + T(h', s / sqrt(P_k))   (F5)
+//
+// h = (a - mu) / sqrt(P_k), h' = (a - mu) / sqrt(P_k + s^2), T: Owen's (Ann. Math. Statist. 27, 1956).
+struct Jumping {
+  double per_year = 0.0, sd = 0.0, expected = 0.0;
+};
+double leaving_rate(const Departure& departure, const Jumping& jumps, double limit);
+
 // Years from the last calibration until the probability that the true value has left its limits since then in any of the parameters
 // reaches `risk`; between `least` and `most`.
 double interval_years(std::span<const Watched> parameters, double last_year, double risk, double least, double most);

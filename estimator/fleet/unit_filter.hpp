@@ -43,6 +43,8 @@ struct TypeModel : Ageing {
   double mean = 0.0, ramp_per_year = 0.0;
   double settling = 0.0;  // v0
   double set_sd = 0.0;    // between sets; by the median, so that one that is wrong does not widen it
+  // Where the walk goes by jumps (jumps.hpp): walk_sd^2 = jumps_per_year jump_sd^2. 0: it is normal.
+  double jumps_per_year = 0.0, jump_sd = 0.0;
   std::vector<SetOffset> sets;
 };
 
@@ -88,6 +90,7 @@ class UnitFilter {
   UnitFilter(const TypeModel& model, double first_year);
   Innovation add(const Measurement& measurement);
   UnitState at(double year) const;  // of the true value; not before the last measurement
+  const TypeModel& model() const { return *model_; }
   // Of a calibration that states `sigma`, by whichever set.
   double variance_of_measurement(double year, double sigma) const;
 

@@ -120,7 +120,7 @@ class Oracle : public IntervalRule {
       }
     }
     double years = shortest_years;
-    for (; years < most_years; years += plan_years) {
+    for (int step = 1; years < most_years; ++step) {
       double rate = 0.0;
       for (std::size_t p = 0; p < filters_.size(); ++p) {
         rate += leaving_rate(filters_[p].departure(now.year + years, now.found[p]), limit_);
@@ -128,6 +128,7 @@ class Oracle : public IntervalRule {
       if (rate > rate_) {
         break;
       }
+      years = shortest_years + step * plan_years;
     }
     return years;
   }

@@ -28,10 +28,10 @@ def free_port():
 
 
 class Cluster:
-    def __init__(self, options=""):
+    def __init__(self, options="", address="127.0.0.1"):
         self.folder = Path(tempfile.mkdtemp(prefix="selfcal-hub."))
         self.folder.chmod(0o755)   # the socket is everybody's, the data are not
-        self.port, self.options, self.bin = free_port(), options, programs()
+        self.port, self.options, self.address, self.bin = free_port(), options, address, programs()
         self.data = self.folder / "data"
         self.as_owner = []
         if os.geteuid() == 0:
@@ -52,7 +52,7 @@ class Cluster:
             (self.folder / "root.crt").chmod(0o644)
             (self.data / "server.key").chmod(0o600)
             (self.data / "pg_hba.conf").write_text(f"local all {OWNER} trust\nlocal all all scram-sha-256\n"
-                                                   "hostssl all all 127.0.0.1/32 scram-sha-256\n", encoding="ascii")
+                                                   f"hostssl all all {self.address}/24 scram-sha-256\n", encoding="ascii")
             self.start()
             self.run(self.bin / "createdb", "-h", self.folder, "-p", str(self.port), "-U", OWNER, "selfcal")
         except subprocess.CalledProcessError as error:
@@ -65,7 +65,7 @@ class Cluster:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def start(self):
-        words = f"-k {self.folder} -p {self.port} -c listen_addresses=127.0.0.1 -c ssl=on -c max_connections=80 {self.options}"
+        words = f"-k {self.folder} -p {self.port} -c listen_addresses={self.address} -c ssl=on -c max_connections=80 {self.options}"
         self.run(self.bin / "pg_ctl", "-D", self.data, "-o", words, "-l", self.folder / "log", "-w", "-t", "60", "start")
 
     def stop(self, mode="fast"):
@@ -82,7 +82,7 @@ class Cluster:
         return f"host={self.folder} port={self.port} dbname=selfcal user={OWNER}"
 
     def by_tls(self, role, password, root="root.crt", mode="verify-full"):
-        return (f"host=localhost hostaddr=127.0.0.1 port={self.port} dbname=selfcal user={role} password={password} sslmode={mode} "
+        return (f"host=localhost hostaddr={self.address} port={self.port} dbname=selfcal user={role} password={password} sslmode={mode} "
                 f"sslrootcert={self.folder / root}")
 
     def psql(self, sql, connection=None, check=True):

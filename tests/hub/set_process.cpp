@@ -98,6 +98,9 @@ void write_runs(const Arguments& arguments, std::atomic<bool>& written) {
   }
   std::int64_t next = static_cast<std::int64_t>((*store)->runs_of_serial("")->size()) + 1;
   for (; next <= arguments.runs; ++next) {
+    while (next == arguments.runs && std::filesystem::exists(arguments.state / "hold")) {
+      std::this_thread::sleep_for(20ms);  // the trial has more to do to it
+    }
     RunRecord record = planned(arguments, next);
     record.ended_utc.clear();
     const auto id = (*store)->create_run(record);

@@ -87,7 +87,7 @@ Expected<std::string> answer_of(const std::vector<std::string>& words, const std
     return tl::unexpected(child.error());
   }
   const auto end = wait_for(*child, 0);
-  const auto text = read_text_file(output, longest_answer);
+  auto text = read_text_file(output, longest_answer);
   const std::string complaint = first_line(errors);
   std::error_code ignored;
   std::filesystem::remove(output, ignored);

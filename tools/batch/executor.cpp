@@ -19,8 +19,8 @@ constexpr std::size_t longest_output = 500'000'000;
 
 // Status 1 is an answer of these: done, but the answer is no.
 bool is_answer(Step step, int exit_status) {
-  return exit_status == 0 ||
-         (exit_status == 1 && (step == Step::estimate || step == Step::diagnose || step == Step::score));
+  return exit_status == 0 || (exit_status == 1 && (step == Step::estimate || step == Step::diagnose ||
+                                                   step == Step::answer || step == Step::score));
 }
 
 // Of another machine with the same process number too.
@@ -93,7 +93,7 @@ Expected<std::size_t> Executor::wait() {
 Expected<void> Executor::conclude(const Running& running, const ChildEnd& end) {
   const auto wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - running.begun).count();
   folder_.log_cost(running.task, end.processor_s, wall);
-  const auto concluded = [&]() -> Expected<void> {
+  auto concluded = [&]() -> Expected<void> {
     if (end.signal == SIGKILL || end.signal == SIGTERM) {
       return {};  // somebody's, or the machine's for want of memory: lost, and begun again
     }
@@ -184,7 +184,7 @@ Expected<void> work_off(BatchFolder& folder, const std::vector<std::size_t>& tas
         break;
       }
       const std::size_t before = executor.running();
-      if (const auto started = executor.start(*task); !started) {
+      if (auto started = executor.start(*task); !started) {
         return started;
       }
       if (executor.running() == before) {  // done already

@@ -18,20 +18,14 @@ constexpr std::size_t longest_file = 500'000'000;
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// The same batch in whatever folder.
-std::string identity_of(const Plan& plan) {
-  std::string keys;
-  for (const Task& task : plan.tasks) {
-    keys += task.key;
-  }
-  return sha256_of_text(keys);
-}
-
 }  // namespace
 
 Expected<std::unique_ptr<HubResults>> HubResults::open(const std::string& connection, const BatchFolder& folder) {
   std::unique_ptr<HubResults> results(new HubResults(connection, folder));
-  return results->connect().map([&] { return std::move(results); });
+  if (auto connected = results->connect(); !connected) {
+    return tl::unexpected(connected.error());
+  }
+  return results;
 }
 
 Expected<void> HubResults::connect() {
@@ -171,7 +165,7 @@ Expected<void> HubResults::note_batch() {
   const Counts counts = count(folder_.states());
   return connection_
       ->ask("SELECT note_batch($1, $2, $3, $4, $5, $6)",
-            {identity_of(folder_.plan()), folder_.plan().kind, folder_.plan().version, std::to_string(counts.all()),
+            {folder_.plan().identity(), folder_.plan().kind, folder_.plan().version, std::to_string(counts.all()),
              std::to_string(counts.done), std::to_string(counts.failed + counts.blocked)})
       .map([](const hub::Rows&) {});
 }

@@ -13,23 +13,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Expected<void> add_program(Plan& plan, const std::string& name) {
+  return sha256_of_file(program_folder() / name)
+      .map_error([&](const Error& error) {
+        return Error{ErrorKind::usage, name.find('/') == std::string::npos
+                                           ? fmt::format("{} does not stand beside selfcal ({})", name, error.message)
+                                           : error.message};
+      })
+      .map([&](const std::string& hash) { plan.programs[name] = hash; });
+}
+
 Expected<Planned> begun(std::string kind, std::initializer_list<Step> steps) {
   Planned planned;
   planned.plan.kind = std::move(kind);
   planned.plan.version = SELFCAL_VERSION;
   for (const Step step : steps) {
-    const std::string program = program_of(step);
-    if (program.empty()) {
-      continue;
+    if (const auto added = add_program(planned.plan, planned.plan.program_of(step)); !added) {
+      return tl::unexpected(added.error());
     }
-    auto hash = sha256_of_file(program_folder() / program);
-    if (!hash) {
-      return fail(ErrorKind::usage,
-                  fmt::format("{} does not stand beside selfcal ({})", program, hash.error().message));
-    }
-    planned.plan.programs[program] = *hash;
   }
   return planned;
+}
+
+// A program or a file that one uses: beside selfcal where it has no folder, else where the caller stands.
+std::string named(const std::string& file) {
+  return file.find('/') == std::string::npos ? file : fs::absolute(file).lexically_normal().string();
 }
 
 // Words for a step; those that name a file become its copy in the batch, which is named by content.
@@ -138,22 +146,37 @@ Expected<Planned> plan_of_recordings(Step step, const std::vector<std::string>& 
   return planned;
 }
 
-Expected<Planned> plan_of_blind_trial(const BlindTrial& trial) {
-  auto planned = begun("blind", {Step::draw, Step::answer});
-  if (!planned) {
-    return planned;
+Expected<Planned> plan_of_trial(const Trial& trial) {
+  Planned planned;
+  Plan& plan = planned.plan;
+  plan.kind = trial.kind;
+  plan.version = SELFCAL_VERSION;
+  std::vector<std::string> files = trial.uses;
+  for (const auto& [step, words] : {std::pair(Step::draw, trial.draw), std::pair(Step::answer, trial.answer)}) {
+    if (words.empty()) {
+      return fail(ErrorKind::usage, fmt::format("--{}: names no program", name_of(step)));
+    }
+    plan.trial_programs[std::string(name_of(step))] = named(words.front());
+    files.push_back(words.front());
+    if (const auto given = give_words(planned, step, {words.begin() + 1, words.end()}); !given) {
+      return tl::unexpected(given.error());
+    }
   }
-  Plan& plan = planned->plan;
-  plan.words["draw"] = {std::to_string(trial.seed), std::to_string(trial.clean), std::to_string(trial.repeats)};
   if (!trial.scorer.empty()) {
-    plan.words["score"] = {fs::absolute(trial.scorer).string()};
+    plan.trial_programs["score"] = fs::absolute(trial.scorer).lexically_normal().string();
+    files.push_back(plan.trial_programs["score"]);
+  }
+  for (const std::string& file : files) {
+    if (const auto added = add_program(plan, named(file)); !added) {
+      return tl::unexpected(added.error());
+    }
   }
   std::vector<std::size_t> drawn, answered;
-  for (std::uint64_t n = 0; n < trial.first; ++n) {
+  for (std::uint64_t n = 0; n < trial.cases; ++n) {
     drawn.push_back(plan.add(numbered(Step::draw, n)));
   }
   const std::size_t sealed = plan.add(single(Step::seal, drawn));
-  for (std::uint64_t n = 0; n < trial.first; ++n) {
+  for (std::uint64_t n = 0; n < trial.cases; ++n) {
     answered.push_back(plan.add(numbered(Step::answer, n, {drawn[n], sealed})));
   }
   plan.add(single(Step::score, answered));

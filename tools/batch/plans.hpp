@@ -23,13 +23,20 @@ struct Planned {
 Expected<Planned> plan_of_recordings(Step step, const std::vector<std::string>& recordings,
                                      const std::vector<std::string>& options);
 
-struct BlindTrial {
-  std::uint64_t seed = 1, clean = 300, repeats = 2, first = 100;
-  std::string scorer;  // a program that is given the folder with key.jsonl and answers.jsonl; "": none
+// A trial of somebody's own: cases with recordings, and what is answered to them.
+struct Trial {
+  std::string kind = "trial";
+  std::uint64_t cases = 100;
+  // Program and its first words, of which those that are a file's name stand for its content. `draw` is given a case's number and the recording to write, and prints {"case": what is true, for
+  // the key, "assumed": what the answerer may know, if anything}. `answer` is given the recording, and "assumed" where there is
+  // some, and prints its answer, a JSON object. Times ("elapsed_s", "cpu_s", "seconds") are no part of it.
+  std::vector<std::string> draw, answer;
+  std::vector<std::string> uses;  // further files that the results follow from: what a script runs, for example
+  std::string scorer;             // a program that is given the folder with key.jsonl and answers.jsonl; "": none
 };
 
-// Cases drawn, the key sealed, then answered, then scored. The trial's two programs stand beside selfcal (tests/blind).
-Expected<Planned> plan_of_blind_trial(const BlindTrial& trial);
+// Cases drawn, the key sealed, then answered, then scored.
+Expected<Planned> plan_of_trial(const Trial& trial);
 
 struct MonteCarlo {
   std::uint64_t seed = 1, runs = 100;

@@ -51,8 +51,9 @@ Expected<std::string> join(const BatchFolder& folder, const Task& task, Step ste
 
 // Times that a program took are no part of its answer, and a recording's place is none.
 void forget_circumstances(Json& answer) {
-  answer.erase("elapsed_s");
-  answer.erase("cpu_s");
+  for (const char* time : {"elapsed_s", "cpu_s", "seconds"}) {
+    answer.erase(time);
+  }
   if (answer.contains("passes") && answer["passes"].is_array()) {
     for (Json& pass : answer["passes"]) {
       pass.erase("seconds");
@@ -75,7 +76,7 @@ Expected<Json> finish_own(const BatchFolder& folder, const Task& task, const std
     return calibration_statistics(folder, task);
   }
   if (task.step == Step::score) {
-    const bool scored = !folder.plan().words_of(Step::score).empty();
+    const bool scored = !folder.plan().program_of(Step::score).empty();
     return sha256_of_file(folder.path() / "answers.jsonl").map([&](const std::string& hash) {
       return Json{{"answers_sha256", hash}, {"text", scored ? Json(output) : Json()}};
     });
@@ -104,9 +105,9 @@ Expected<Json> finish_printed(const BatchFolder& folder, const Task& task, const
     return finish_made(folder, scratch, std::move(answer));
   }
   if (task.step == Step::answer) {
+    forget_circumstances(answer);
     Json numbered = {{"number", task.number}};
     numbered.update(answer);
-    numbered.erase("cpu_s");
     return Json{{"answer", numbered}};
   }
   if (!task.recording_sha256.empty() && answer["input"]["sha256"] != task.recording_sha256) {
@@ -140,22 +141,23 @@ Expected<void> check_programs(const Plan& plan) {
 Expected<Words> command_of(const BatchFolder& folder, std::size_t index, const fs::path& scratch) {
   const Task& task = folder.task(index);
   const Words& more = folder.plan().words_of(task.step);
-  const std::string program = (program_folder() / program_of(task.step)).string();
+  const std::string named = folder.plan().program_of(task.step);
+  if (task.step == Step::score) {
+    return join(folder, task, Step::answer, "answer", folder.path() / "answers.jsonl").map([&](const std::string&) {
+      return named.empty() ? Words{} : Words{named, folder.path().string()};
+    });
+  }
+  if (named.empty()) {
+    return Words{};
+  }
+  const std::string program = (program_folder() / named).string();
   if (task.step == Step::draw) {
-    return joined(joined({program, "draw"}, more), {std::to_string(task.number), (scratch / "made.h5").string()});
+    return joined(joined({program}, more), {std::to_string(task.number), (scratch / "made.h5").string()});
   }
   if (task.step == Step::simulate) {
     return joined(joined({program, "simulate"}, more),
                   {"--seed", std::to_string(task.number), "--truth", (scratch / "truth.json").string(), "--output",
                    (scratch / "made.h5").string()});
-  }
-  if (task.step == Step::seal || task.step == Step::statistics) {
-    return Words{};
-  }
-  if (task.step == Step::score) {
-    return join(folder, task, Step::answer, "answer", folder.path() / "answers.jsonl").map([&](const std::string&) {
-      return more.empty() ? Words{} : joined(more, {folder.path().string()});
-    });
   }
   const auto recording = recording_of(folder, task);
   if (!recording) {
@@ -163,7 +165,8 @@ Expected<Words> command_of(const BatchFolder& folder, std::size_t index, const f
   }
   if (task.step == Step::answer) {
     return folder.result(task.needs.front()).map([&](const Json& drawn) {
-      return Words{program, *recording, drawn.at("assumed").dump()};
+      return joined(joined({program}, more),
+                    drawn.contains("assumed") ? Words{*recording, drawn["assumed"].dump()} : Words{*recording});
     });
   }
   return joined(joined({program, std::string(name_of(task.step)), "--json"}, more), {*recording});
@@ -173,7 +176,7 @@ Expected<std::string> finish(const BatchFolder& folder, std::size_t index, const
                              const std::string& output) {
   const Task& task = folder.task(index);
   Expected<Json> body = Json{};
-  if (program_of(task.step).empty()) {
+  if (task.step == Step::score || folder.plan().program_of(task.step).empty()) {
     body = finish_own(folder, task, output);
   } else if (task.step == Step::simulate) {
     body = read_text_file(scratch / "truth.json", longest_file).and_then([&](const std::string& truth) {

@@ -18,11 +18,12 @@ struct StepRow {
   std::string_view name, program;
 };
 
+// A trial's plan names the programs that draw, answer and score.
 constexpr std::array<StepRow, 8> steps = {{{Step::estimate, "estimate", "selfcal"},
                                            {Step::diagnose, "diagnose", "selfcal"},
-                                           {Step::draw, "draw", "selfcal_blind_generate"},
+                                           {Step::draw, "draw", ""},
                                            {Step::seal, "seal", ""},
-                                           {Step::answer, "answer", "selfcal_blind_answer"},
+                                           {Step::answer, "answer", ""},
                                            {Step::score, "score", ""},
                                            {Step::simulate, "simulate", "selfcal"},
                                            {Step::statistics, "statistics", ""}}};
@@ -31,13 +32,35 @@ const StepRow& row_of(Step step) {
   return *std::find_if(steps.begin(), steps.end(), [&](const StepRow& row) { return row.step == step; });
 }
 
+// Of the step's program, and in a trial of all files that one is used with: which step uses which nobody says.
+Json hashes_of(const Plan& plan, Step step) {
+  const std::string program = plan.program_of(step);
+  if (program.empty()) {
+    return "";
+  }
+  if (!plan.trial_programs.contains(std::string(name_of(step)))) {
+    return plan.programs.at(program);
+  }
+  Json hashes = {plan.programs.at(program)};
+  if (step == Step::score) {
+    return hashes;
+  }
+  for (const auto& [name, hash] : plan.programs) {
+    const bool other_step = std::any_of(plan.trial_programs.begin(), plan.trial_programs.end(),
+                                        [&, &name = name](const auto& entry) { return entry.second == name; });
+    if (!other_step) {
+      hashes.push_back(hash);
+    }
+  }
+  std::sort(hashes.begin() + 1, hashes.end());
+  return hashes;
+}
+
 // All that a result follows from. The recording's name and place are none of it.
 std::string key_of(const Plan& plan, const Task& task) {
-  const std::string program = program_of(task.step);
-  const auto hash = plan.programs.find(program);
   Json content = {{"step", name_of(task.step)},
                   {"version", plan.version},
-                  {"program", hash == plan.programs.end() ? "" : hash->second},
+                  {"program", hashes_of(plan, task.step)},
                   {"words", plan.words_of(task.step)},
                   {"recording", task.recording_sha256},
                   {"number", task.number},
@@ -51,8 +74,6 @@ std::string key_of(const Plan& plan, const Task& task) {
 }  // namespace
 
 std::string_view name_of(Step step) { return row_of(step).name; }
-
-std::string program_of(Step step) { return std::string(row_of(step).program); }
 
 Expected<Step> step_called(std::string_view name) {
   const auto row = std::find_if(steps.begin(), steps.end(), [&](const StepRow& r) { return r.name == name; });
@@ -71,6 +92,14 @@ std::size_t Plan::add(Task task) {
   return tasks.size() - 1;
 }
 
+std::string Plan::identity() const {
+  std::string keys;
+  for (const Task& task : tasks) {
+    keys += task.key;
+  }
+  return sha256_of_text(keys);
+}
+
 int Plan::levels() const {
   int highest = -1;
   for (const Task& task : tasks) {
@@ -85,11 +114,17 @@ const std::vector<std::string>& Plan::words_of(Step step) const {
   return found == words.end() ? none : found->second;
 }
 
+std::string Plan::program_of(Step step) const {
+  const auto own = trial_programs.find(std::string(name_of(step)));
+  return own != trial_programs.end() ? own->second : std::string(row_of(step).program);
+}
+
 Json to_json(const Plan& plan) {
-  Json document = {{"schema", {{"name", "selfcal.batch_plan"}, {"version", 1}}},
+  Json document = {{"schema", {{"name", "selfcal.batch_plan"}, {"version", 2}}},
                    {"kind", plan.kind},
                    {"version", plan.version},
                    {"programs", plan.programs},
+                   {"trial_programs", plan.trial_programs},
                    {"words", plan.words},
                    {"tasks", Json::array()}};
   for (const Task& task : plan.tasks) {
@@ -107,7 +142,8 @@ Json to_json(const Plan& plan) {
 // Keys are computed again: a plan that was edited is refused.
 Expected<Plan> plan_from_json(const Json& document) {
   try {
-    Plan plan{document.at("kind"), document.at("version"), document.at("programs"), document.at("words"), {}};
+    Plan plan{document.at("kind"),           document.at("version"), document.at("programs"),
+              document.at("trial_programs"), document.at("words"),   {}};
     for (const Json& entry : document.at("tasks")) {
       const auto step = step_called(entry.at("step").get<std::string>());
       if (!step) {

@@ -17,10 +17,10 @@ namespace selfcal::batch {
 enum class Step {
   estimate,    // selfcal estimate of a recording, or of a simulated one
   diagnose,    // selfcal diagnose of a recording
-  draw,        // blind: a case and its recording
-  seal,        // blind: the key, joined from the cases
-  answer,      // blind: the diagnosis' answer to a case
-  score,       // blind: the answers joined, and counted by the scorer where one is given
+  draw,        // a trial's case and its recording
+  seal,        // a trial's key, joined from the cases
+  answer,      // what is answered to a trial's case
+  score,       // a trial's answers joined, and counted by the scorer where one is given
   simulate,    // Monte Carlo: a recording and what is true of it
   statistics,  // Monte Carlo: errors against sigmas
 };
@@ -41,10 +41,13 @@ struct Task {
 };
 
 struct Plan {
-  std::string kind;     // estimate, diagnose, blind, monte-carlo
+  std::string kind;     // estimate, diagnose, trial, monte-carlo
   std::string version;  // of the program that planned
-  // SHA-256 of each program that a step runs: another build is another program.
+  // SHA-256 of each program that a step runs, and of each file that such a program uses: another build is another program. A
+  // name without a folder stands beside selfcal; else the path is absolute.
   std::map<std::string, std::string> programs;
+  // Of a trial: the program of the steps draw, answer and score, named as in `programs`.
+  std::map<std::string, std::string> trial_programs;
   // Words that a step's program gets besides what the task says.
   std::map<std::string, std::vector<std::string>> words;
   std::vector<Task> tasks;  // a task stands behind its needs
@@ -52,11 +55,11 @@ struct Plan {
   // Appends a task with the key and level that follow from the rest; returns its place.
   std::size_t add(Task task);
   int levels() const;
+  std::string identity() const;  // SHA-256 of its tasks' keys: the same batch in whatever folder
   const std::vector<std::string>& words_of(Step step) const;
+  // Program that a step runs, named as in `programs`; empty: none.
+  std::string program_of(Step step) const;
 };
-
-// Program that a step runs: "selfcal", "selfcal_blind_generate", ...; empty: none.
-std::string program_of(Step step);
 
 nlohmann::ordered_json to_json(const Plan& plan);
 Expected<Plan> plan_from_json(const nlohmann::ordered_json& document);

@@ -134,8 +134,11 @@ class Bench:
     def kill_daemon(self):
         self._end(self.daemon_process, signal.SIGKILL)
 
-    def stop(self):
+    def end_daemon(self):
         self._end(self.daemon_process, signal.SIGTERM)
+
+    def stop(self):
+        self.end_daemon()
         self._end(self.sim_process, signal.SIGTERM)
 
     def __enter__(self):

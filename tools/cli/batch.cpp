@@ -1,6 +1,7 @@
 // selfcal batch: the same work on many recordings, on this machine or a Slurm cluster.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -9,6 +10,7 @@
 
 #include "protocol/command_line/depot_ranges.hpp"
 #include "protocol/document/document_head.hpp"
+#include "tools/batch/batch_journal.hpp"
 #include "tools/batch/hub_results.hpp"
 #include "tools/batch/plans.hpp"
 #include "tools/batch/slurm.hpp"
@@ -26,12 +28,13 @@ constexpr double hub_patience_s = 60.0;
 
 struct Arguments {
   std::vector<std::string> recordings, sbatch;
-  std::string folder, options, simulation, hub, round;
+  std::string folder, options, simulation, hub, round, draw, answer;
   std::optional<std::uint64_t> jobs;
   std::uint64_t tasks_a_job = 8, tries = 3, limit_s = 3600;
   std::optional<std::uint64_t> part;
-  batch::BlindTrial blind;
+  batch::Trial trial;
   batch::MonteCarlo monte_carlo;
+  std::uint64_t seed = 1, clean = 300, repeats = 2;  // of the blind trial
   bool slurm = false, again = false, json = false;
 };
 
@@ -86,7 +89,8 @@ Expected<void> print_outcome(const batch::BatchFolder& folder) {
 }
 
 // Works the batch off, with the hub's results where one is given.
-Expected<void> work(batch::BatchFolder& folder, const Arguments& arguments, batch::HubResults* hub) {
+Expected<void> work(batch::BatchFolder& folder, const Arguments& arguments, const batch::BatchJournal& journal,
+                    batch::HubResults* hub) {
   std::vector<std::size_t> all;
   for (std::size_t i = 0; i < folder.plan().tasks.size(); ++i) {
     all.push_back(i);
@@ -95,6 +99,7 @@ Expected<void> work(batch::BatchFolder& folder, const Arguments& arguments, batc
   ProgressLine line;
   const batch::OnEnded on_ended = [&](std::size_t task) {
     ++ended;
+    journal.task_ended(task);
     line.show(fmt::format("batch {}: {} of {} tasks", folder.plan().kind, ended, all.size()));
     if (hub != nullptr && folder.has_result(task)) {
       hub->offer(task);
@@ -108,6 +113,27 @@ Expected<void> work(batch::BatchFolder& folder, const Arguments& arguments, batc
                          bounds_of(arguments), on_ended);
 }
 
+// With what the hub has of this batch. A batch that goes on waits for a hub that is away; a new one ends at once, for a person is there.
+Expected<std::unique_ptr<batch::HubResults>> results_of_hub(batch::BatchFolder& folder, const Arguments& arguments) {
+  const batch::Counts counts = batch::count(folder.states());
+  const auto end =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(counts.done > 0 ? hub_patience_s : 0.0);
+  while (true) {
+    auto hub = batch::HubResults::open(arguments.hub, folder);
+    const auto came = hub ? (*hub)->exchange(folder) : tl::unexpected(hub.error());
+    if (came) {
+      if (*came > 0) {
+        fmt::print("{} results came from the hub\n", *came);
+      }
+      return hub;
+    }
+    if (came.error().kind != ErrorKind::device || std::chrono::steady_clock::now() >= end) {
+      return tl::unexpected(came.error());
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
+}
+
 Expected<int> drive(batch::BatchFolder& folder, const Arguments& arguments) {
   const auto lock = folder.lock();
   const auto known = lock ? batch::check_programs(folder.plan()) : tl::unexpected(lock.error());
@@ -116,24 +142,22 @@ Expected<int> drive(batch::BatchFolder& folder, const Arguments& arguments) {
   }
   std::unique_ptr<batch::HubResults> hub;
   if (!arguments.hub.empty()) {
-    auto opened = batch::HubResults::open(arguments.hub, folder);
-    if (!opened) {
-      return tl::unexpected(opened.error());
+    auto there = results_of_hub(folder, arguments);
+    if (!there) {
+      return tl::unexpected(there.error());
     }
-    hub = std::move(*opened);
-    const auto came = hub->exchange(folder);
-    if (!came) {
-      return tl::unexpected(came.error());
-    }
-    if (*came > 0) {
-      fmt::print("{} results came from the hub\n", *came);
-    }
+    hub = std::move(*there);
   }
-  const auto worked = work(folder, arguments, hub.get());
+  const batch::BatchJournal journal(folder);
+  journal.begun();
+  const auto worked = work(folder, arguments, journal, hub.get());
   const auto sent = hub ? hub->flush(hub_patience_s) : Expected<void>{};
   if (!worked || !sent) {
-    return tl::unexpected(worked ? sent.error() : worked.error());
+    const Error& error = worked ? sent.error() : worked.error();
+    journal.broken_off(error);
+    return tl::unexpected(error);
   }
+  journal.ended();
   if (const auto printed = print_outcome(folder); !printed) {
     return tl::unexpected(printed.error());
   }
@@ -182,7 +206,21 @@ Expected<int> of_recordings(batch::Step step, const Arguments& arguments) {
 
 Expected<int> estimate(Arguments& arguments) { return of_recordings(batch::Step::estimate, arguments); }
 Expected<int> diagnose(Arguments& arguments) { return of_recordings(batch::Step::diagnose, arguments); }
-Expected<int> blind(Arguments& arguments) { return begin(batch::plan_of_blind_trial(arguments.blind), arguments); }
+
+Expected<int> trial(Arguments& arguments) {
+  arguments.trial.draw = batch::words_in(arguments.draw);
+  arguments.trial.answer = batch::words_in(arguments.answer);
+  return begin(batch::plan_of_trial(arguments.trial), arguments);
+}
+
+// The blind trial's two programs stand beside selfcal (tests/blind).
+Expected<int> blind(Arguments& arguments) {
+  arguments.trial.kind = "blind";
+  arguments.trial.draw = {"selfcal_blind_generate", "draw", std::to_string(arguments.seed),
+                          std::to_string(arguments.clean), std::to_string(arguments.repeats)};
+  arguments.trial.answer = {"selfcal_blind_answer"};
+  return begin(batch::plan_of_trial(arguments.trial), arguments);
+}
 
 Expected<int> monte_carlo(Arguments& arguments) {
   arguments.monte_carlo.simulation = batch::words_in(arguments.simulation);
@@ -284,15 +322,25 @@ void add_beginnings(Options& options, Arguments& a, std::vector<Below>& all) {
     own.text("--options", a.options, options_help);
     driving_options(own, a);
   }
-  all.emplace_back(options.command("blind", "a blind trial: cases drawn, sealed, answered, scored"), blind);
-  Options& trial = all.back().first;
-  trial.text("--into", a.folder, into_help, Needed::yes);
-  trial.whole("--seed", a.blind.seed, range::seed, "of the cases");
-  trial.whole("--clean", a.blind.clean, range::cases, "clean recordings among all that the seed gives");
-  trial.whole("--repeats", a.blind.repeats, range::cases, "of every effect at every strength, among all");
-  trial.whole("--first", a.blind.first, range::cases, "so many cases of these");
-  trial.text("--score", a.blind.scorer, "program that is given the folder with key.jsonl and answers.jsonl");
-  driving_options(trial, a);
+  const auto add_trial = [&](const char* name, const char* help, auto run) -> Options& {
+    all.emplace_back(options.command(name, help), run);
+    Options& own = all.back().first;
+    own.text("--into", a.folder, into_help, Needed::yes);
+    own.text("--score", a.trial.scorer, "program that is given the folder with key.jsonl and answers.jsonl");
+    driving_options(own, a);
+    return own;
+  };
+  Options& blinded = add_trial("blind", "a blind trial: cases drawn, sealed, answered, scored", blind);
+  blinded.whole("--seed", a.seed, range::seed, "of the cases");
+  blinded.whole("--clean", a.clean, range::cases, "clean recordings among all that the seed gives");
+  blinded.whole("--repeats", a.repeats, range::cases, "of every effect at every strength, among all");
+  blinded.whole("--first", a.trial.cases, range::cases, "so many cases of these");
+  Options& own_trial = add_trial("trial", "a trial by programs of your own that draw cases and answer them", trial);
+  own_trial.text("--draw", a.draw,
+                 "program and words; given a number and a file, writes the recording, prints the case", Needed::yes);
+  own_trial.text("--answer", a.answer, "program and words; given the recording, prints its answer", Needed::yes);
+  own_trial.texts("--uses", a.trial.uses, "a file that these programs use: results follow from it too; repeated");
+  own_trial.whole("--cases", a.trial.cases, range::cases, "so many, numbered from 0");
   all.emplace_back(options.command("monte-carlo", "recordings simulated and estimated, errors against sigmas"),
                    monte_carlo);
   Options& simulated = all.back().first;
@@ -308,7 +356,7 @@ CommandRun configure(Options& options) {
   auto arguments = std::make_shared<Arguments>();
   auto all = std::make_shared<std::vector<Below>>();
   Arguments& a = *arguments;
-  all->reserve(8);
+  all->reserve(9);
   add_beginnings(options, a, *all);
   const auto add = [&](const char* name, const char* help, auto run) -> Options& {
     all->emplace_back(options.command(name, help), run);

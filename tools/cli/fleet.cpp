@@ -155,6 +155,14 @@ Expected<int> unit(hub::Connection& connection, const Arguments& arguments) {
                     "ORDER BY c.at DESC LIMIT 10",
                     instant("c.at")),
         {arguments.name}},
+       {"recordings",
+        "Imported recordings",
+        {"utc", "set", "run", "source"},
+        fmt::format(
+            "SELECT {}, r.set_name, r.run, r.source FROM runs r WHERE r.serial = $1 AND r.kind = 'recording' AND "
+            "r.state = 'completed' ORDER BY r.ended DESC LIMIT 10",
+            instant("r.ended")),
+        {arguments.name}},
        {"forecast",
         "Next calibration",
         {"due_utc", "parameter", "unit", "last", "expected", "band_95", "change_per_year", "change_sigma"},

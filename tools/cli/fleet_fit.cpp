@@ -158,11 +158,11 @@ Expected<void> store_models(hub::Connection& connection, const std::string& id, 
     const fleet::TypeModel& m = type.models[p];
     const auto done = connection.ask(
         "INSERT INTO type_models(fit, type, position, mean, ramp_per_year, unit_sd, ramp_sd, walk_sd, setup_sd, "
-        "set_sd, settling, settling_sd, wander_sd, return_years) VALUES "
-        "($1,$2,$3,$4,$5,$6,$7,$8,$9,$10,$11,$12,$13,$14)",
+        "set_sd, settling, settling_sd, wander_sd, return_years, jumps_per_year, jump_sd) VALUES "
+        "($1,$2,$3,$4,$5,$6,$7,$8,$9,$10,$11,$12,$13,$14,$15,$16)",
         {id, name, std::to_string(p + 1), number(m.mean), number(m.ramp_per_year), number(m.unit_sd), number(m.ramp_sd),
          number(m.walk_sd), number(m.setup_sd), number(m.set_sd), number(m.settling), number(m.settling_sd),
-         number(m.wander_sd), number(m.return_years)});
+         number(m.wander_sd), number(m.return_years), number(m.jumps_per_year), number(m.jump_sd)});
     if (!done) {
       return tl::unexpected(done.error());
     }
@@ -238,8 +238,8 @@ Due due_of(const Type& type, const Certificate& last, const std::vector<UnitFilt
 // When the expected value passes its size, looked for month by month in the next twenty years; nothing where it does not.
 std::optional<std::pair<double, std::size_t>> passes_of(const Type& type, double year,
                                                         const std::vector<UnitFilter>& filters) {
-  constexpr double month = 1.0 / 12.0;
   std::optional<std::pair<double, std::size_t>> first;
+  int months = 240;
   for (std::size_t p = 0; p < all; ++p) {
     const fleet::UnitState now = filters[p].at(year);
     const double size = type.limits.size[p];
@@ -247,11 +247,11 @@ std::optional<std::pair<double, std::size_t>> passes_of(const Type& type, double
     if (!(size > 0.0) || std::abs(now.slope()) < 2.0 * now.slope_sigma()) {
       continue;
     }
-    const double until = std::min(first ? first->first : HUGE_VAL, year + 20.0);
-    for (double when = year; when < until; when += month) {
+    for (int k = 0; k < months; ++k) {
+      const double when = year + k / 12.0;
       if (std::abs(filters[p].at(when).value()) >= size) {
         first = {when, p};
-        break;
+        months = k;
       }
     }
   }
@@ -293,7 +293,7 @@ Expected<int> store_type(hub::Connection& connection, const std::string& id, con
   if (auto ok = store_models(connection, id, name, type); !ok) {
     return tl::unexpected(ok.error());
   }
-  const auto accused = store_sets(connection, id, name, fleet, type, standings, options.false_accusation);
+  auto accused = store_sets(connection, id, name, fleet, type, standings, options.false_accusation);
   if (!accused) {
     return accused;
   }
