@@ -134,11 +134,12 @@ discovery::NextExperiment second_look(const Schedule& done) {
   return next;
 }
 
-// Nothing where there is one recording and the catalogue explains it.
+// Nothing where there is one recording and the catalogue explains it. A walk or an instability that equations explain is no name.
 Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& request,
                                                   const std::vector<std::unique_ptr<Taken>>& taken,
                                                   const std::function<void()>& progress, const std::stop_token& stop) {
-  if (!taken.front()->diagnosis.faults.empty() || (taken.size() == 1 && !taken.front()->diagnosis.unexplained)) {
+  if (!taken.front()->diagnosis.faults.empty() ||
+      (taken.size() == 1 && !taken.front()->diagnosis.unexplained && !may_be_a_law(taken.front()->diagnosis))) {
     return std::nullopt;
   }
   std::vector<DiagnosedFile> files;
@@ -154,6 +155,11 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   options.stop = stop;
   BeyondAnswer answer;
   answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
+  diagnosis::Diagnosis& first = taken.front()->diagnosis;
+  replace_process(first, answer.found);
+  if (taken.size() == 1 && !first.unexplained) {
+    return std::nullopt;
+  }
   if (files.size() > 1) {
     answer.together = put_together(files, *rest, answer.found);
   }

@@ -99,6 +99,29 @@ bool confirmed(const Discovery* found) {
          found->processes.empty() && leaves_noise(*found);
 }
 
+bool may_be_a_law(const diagnosis::Diagnosis& d) {
+  const auto process = [](const diagnosis::Finding& f) { return f.process; };
+  const auto equation = [](const diagnosis::Finding& f) { return f.source != nullptr; };
+  return std::any_of(d.findings.begin(), d.findings.end(), process) &&
+         std::none_of(d.findings.begin(), d.findings.end(), equation);
+}
+
+bool replaces_process(const Discovery& found, const diagnosis::Diagnosis& d) {
+  return may_be_a_law(d) && !found.laws.empty() && found.processes.empty() && explains(&found);
+}
+
+void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {
+  if (!replaces_process(found, d)) {
+    return;
+  }
+  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(),
+                                          [](const diagnosis::Finding& f) { return !f.process; });
+  d.rejected.insert(d.rejected.end(), kept, d.findings.end());
+  d.findings.erase(kept, d.findings.end());
+  d.unexplained = d.mismatch = true;
+  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
+}
+
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
   if (diagnosis.unexplained && explains(found) && !found->laws.empty() && found->processes.empty()) {
     diagnosis.value = diagnosis.value_as_named = found->average.parameters.front();

@@ -19,6 +19,14 @@ bool explains(const discovery::Discovery* found);
 // stand behind a set that is written.
 bool confirmed(const discovery::Discovery* found);
 
+// A random walk or an instability follows any slow curve: where the catalogue names no equation beside one, what it names may be
+// a law that no catalogue holds.
+bool may_be_a_law(const diagnosis::Diagnosis& diagnosis);
+// Whether equations alone were found that explain what such a walk or instability had been named for.
+bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagnosis& diagnosis);
+// Then it is a rejected name, and the recording is unexplained by the catalogue; else nothing is changed.
+void replace_process(diagnosis::Diagnosis& diagnosis, const discovery::Discovery& found);
+
 // The diagnosis with the 24 as fitted with the laws, where laws explain what the catalogue leaves: those of the catalogue's
 // rejected names correct nothing.
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);

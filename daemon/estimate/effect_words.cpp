@@ -17,6 +17,8 @@ constexpr std::array noise = {
     Words{"accel_noise_level", "accelerometer noise (VRW) of another size than assumed"},
     Words{"gyro_random_walk", "random walk of the gyro drift (rate random walk)"},
     Words{"accel_random_walk", "random walk of the accelerometer bias"},
+    Words{"gyro_bias_instability", "gyro drift that wanders and comes back (bias instability)"},
+    Words{"accel_bias_instability", "accelerometer bias that wanders and comes back (bias instability)"},
     Words{"quantisation", "coarser quantisation than assumed"},
     Words{"vibration_line", "vibration at a single frequency"},
 };

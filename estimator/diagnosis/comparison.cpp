@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "estimator/diagnosis/noise/walk_check.hpp"
+#include "estimator/diagnosis/noise/process_check.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 
@@ -160,8 +160,8 @@ Rules Comparer::rules() const {
           .alpha = options_.false_alarm_rate,
           .motion_fitted = moored(),
           .tolerable_share = tolerable_share,
-          .goes_on = [this](const RandomWalk& walk) {
-            return walks_inside_dwells(recording_.data(), recording_.calibration.noise, walk);
+          .goes_on = [this](const BiasProcess& process) {
+            return goes_on_inside_dwells(recording_.data(), recording_.calibration.noise, process);
           }};
 }
 

@@ -6,8 +6,8 @@
 
 #include "estimator/diagnosis/noise/dwell_lines.hpp"
 #include "estimator/diagnosis/noise/noise_findings.hpp"
+#include "estimator/diagnosis/noise/process_check.hpp"
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
-#include "estimator/diagnosis/noise/walk_check.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 
@@ -177,7 +177,9 @@ Rules Diagnoser::rules() const {
           .alpha = options_.false_alarm_rate,
           .motion_fitted = d_.calibration.moored,
           .coloured = beats_,
-          .goes_on = [this](const RandomWalk& walk) { return walks_inside_dwells(data_, d_.calibration.noise, walk); }};
+          .goes_on = [this](const BiasProcess& process) {
+            return goes_on_inside_dwells(data_, d_.calibration.noise, process);
+          }};
 }
 
 // What faulty data do to the filter looks like anything: nothing else is concluded from them.

@@ -50,6 +50,7 @@ struct Finding {
   double held_out_gain = 0.0;                 // log-likelihood on dwells and rotations left out in turn
   double share = 0.0;                         // of the misfit that it takes away, given the other findings; 0 for noise
   bool stochastic = false;                    // a noise model, not a mean
+  bool process = false;                       // of a bias: a random walk, an instability
 };
 
 // A way in which a named effect differs from its equation.

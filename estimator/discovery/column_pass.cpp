@@ -16,16 +16,14 @@ class Carrier : public PassObserver {
         sums_(sums),
         sink_(sink),
         start_s_(input.data->time_s.front() - 1.0 / input.data->sample_rate_hz),
-        dynamic_(StateLayout::navigation_count + input.noise.observation.state_count()),
+        transition_(input.noise.observation, input.noise.biases, input.interval_s),
+        dynamic_(transition_.count()),
         n_(source.count()),
         s_(Eigen::MatrixXd::Zero(dynamic_ + sensor_parameter_count, n_)),
         batch_(Eigen::MatrixXd::Zero(batch_rows, n_)),
         batch_residual_(Eigen::VectorXd::Zero(batch_rows)) {
     sums_.information = Eigen::MatrixXd::Zero(n_, n_);
     sums_.score = Eigen::VectorXd::Zero(n_);
-    Phi_ = Eigen::MatrixXd::Zero(dynamic_, dynamic_);
-    const int motion = dynamic_ - StateLayout::navigation_count;
-    Phi_.bottomRightCorner(motion, motion) = input.noise.observation.transition(input.interval_s);
     if (sink_ != nullptr) {
       const double most = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s + 2.0;
       sink_->columns.resize(3 * static_cast<Eigen::Index>(most), n_);
@@ -37,8 +35,7 @@ class Carrier : public PassObserver {
   void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override {
     navigator_.next(own_);
     active_ = std::min(n_, source_.active(own_.end_s - start_s_));
-    Phi_.topLeftCorner<9, 9>() = own_.Phi;
-    next_.noalias() = Phi_ * s_.topLeftCorner(dynamic_, active_);
+    next_.noalias() = transition_.over(own_) * s_.topLeftCorner(dynamic_, active_);
     next_.topRows<9>().noalias() +=
         own_.Gamma.leftCols<sensor_parameter_count>() * s_.bottomLeftCorner(sensor_parameter_count, active_);
     next_.topRows<9>() += own_.Gamma.middleCols(sensor_parameter_count, active_);
@@ -95,9 +92,10 @@ class Carrier : public PassObserver {
   ColumnSums& sums_;
   RowSink* sink_;
   double start_s_, middle_s_ = 0.0;
+  DynamicTransition transition_;
   int dynamic_, n_, active_ = 0;
   Interval own_;
-  Eigen::MatrixXd Phi_, s_, next_, batch_;
+  Eigen::MatrixXd s_, next_, batch_;
   Eigen::VectorXd batch_residual_;
   Eigen::RowVectorXd nu_;
   Eigen::Index filled_ = 0, row_ = 0;

@@ -7,6 +7,8 @@
 #include <type_traits>
 
 #include "estimator/discovery/class_average.hpp"
+#include "estimator/discovery/constant_spread.hpp"
+#include "estimator/discovery/departure.hpp"
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
@@ -361,8 +363,9 @@ class Search {
   }
 
   // Several equations on one axis, the smaller of which take little beside the largest, are more probably one law whose form
-  // none of them has than laws of their own.
-  static bool form_is_known(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) {
+  // none of them has than laws of their own. So is one beside which its axis needs a process, or one that departs from what
+  // its axis does where a quantity is large.
+  bool form_is_known(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) const {
     constexpr double comparable = 0.5;
     double least = law.gain, most = law.gain;
     int on_axis = 0;
@@ -373,7 +376,10 @@ class Search {
         most = std::max(most, other.gain);
       }
     }
-    return on_axis == 1 || (on_axis == 2 && least > comparable * most);
+    const bool process_beside = std::any_of(state_.processes.begin(), state_.processes.end(),
+                                            [&](const DiscoveredProcess& p) { return p.axis == law.term.axis; });
+    const bool departs = law.departure_log_p < std::log(options_.departure_rate);
+    return !process_beside && !departs && (on_axis == 1 || (on_axis == 2 && least > comparable * most));
   }
 
   void tell() {
@@ -405,14 +411,25 @@ class Search {
         constant.sigma = std::sqrt(std::max(0.0, state_.fit.covariance(at, at)));
         ++at;
       }
+      if (const auto spread = spread_over_constant(laws_on_, state_.fit, k, options_.stop)) {
+        // Where the range of the search cuts off probable values, the spread is too small.
+        law.sigma = std::max(law.sigma, spread->coefficient);
+        law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
+      }
+      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
       const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
       law.significance =
           sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
     }
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
+    // What a form that is not known leaves shows on other axes too, as a weaker law there.
+    double unknown = 0.0;
+    for (const DiscoveredLaw& law : laws) {
+      unknown = form_is_known(law, laws) ? unknown : std::max(unknown, law.gain);
+    }
     for (DiscoveredLaw& law : laws) {
-      (form_is_known(law, laws) ? result_.laws : result_.described).push_back(law);
+      (form_is_known(law, laws) && law.gain > unknown ? result_.laws : result_.described).push_back(law);
     }
   }
 

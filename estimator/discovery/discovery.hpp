@@ -19,6 +19,7 @@ namespace selfcal::discovery {
 
 struct DiscoveryOptions {
   double false_alarm_rate = 0.004;  // of a whole recording, over all functions, axes and processes
+  double departure_rate = 0.01;     // of laws of the true form that are described only, for they seem to depart from it
   int most_terms = 6;
   double least_odds = 0.01;  // of a member of a class against the best
   std::stop_token stop;
@@ -47,13 +48,14 @@ struct DiscoveredLaw {
   std::string expression;                 // constants as numbers
   double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
   std::vector<Constant> constants;
-  double significance = 0.0;   // sigma, after correction for all that was tried
-  double gain = 0.0;           // fall of the residuals' square
-  double held_out_gain = 0.0;  // log-likelihood on dwells and rotations left out in turn
-  double share = 0.0;          // of the misfit beyond noise
-  double stability = 0.0;      // share of draws of three quarters of the dwells and rotations in which it, or what
-                               // cannot be told from it, explains most
-  double carries_over = 0.0;   // probability that it leaves at most a tenth of the misfit on a plan never used
+  double significance = 0.0;     // sigma, after correction for all that was tried
+  double gain = 0.0;             // fall of the residuals' square
+  double held_out_gain = 0.0;    // log-likelihood on dwells and rotations left out in turn
+  double share = 0.0;            // of the misfit beyond noise
+  double stability = 0.0;        // share of draws of three quarters of the dwells and rotations in which it, or what
+                                 // cannot be told from it, explains most
+  double departure_log_p = 0.0;  // that a true form departs as far (departure.hpp), the logarithm
+  double carries_over = 0.0;     // probability that it leaves at most a tenth of the misfit on a plan never used
   std::vector<ClassMember> ambiguous;  // what this recording cannot tell from it, itself included, simplest first
 };
 
@@ -72,7 +74,8 @@ struct ClassAverage {
 
 struct Discovery {
   std::vector<DiscoveredLaw> laws;  // best first
-  // Equations that only together make up what an axis does: its form is none of them, and on another plan they may be far off.
+  // Equations whose axis does something else still: they make it up only together, or beside a process, or a form is short of
+  // it where a quantity is large. The axis' form is none of them, and on another plan they may be far off.
   // The fit holds them too.
   std::vector<DiscoveredLaw> described;
   std::vector<DiscoveredProcess> processes;

@@ -236,25 +236,32 @@ LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> t
 }
 
 std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
-                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop) {
+                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop,
+                                GivenConstants given_constants) {
+  const bool free = given_constants == GivenConstants::free;
   std::vector<LawTerm> all = given;
   all.insert(all.end(), alternatives.begin(), alternatives.end());
   Eigen::MatrixXd information;
   Eigen::VectorXd score;
   for (const LawRecording& r : recordings) {
-    LawColumns source(r.motion, r.table, all, false);
+    LawColumns source(r.motion, r.table, all, free);
     const ColumnSums sums = run_columns(r.input, source, stop);
     information = information.size() == 0 ? sums.information : Eigen::MatrixXd(information + sums.information);
     score = score.size() == 0 ? sums.score : Eigen::VectorXd(score + sums.score);
   }
-  const std::vector<int> base = first_numbers(given.size());
+  std::vector<int> base = first_numbers(given.size());
+  for (int k = 0; free && k < constants_of(given); ++k) {
+    base.push_back(static_cast<int>(all.size()) + k);  // derivatives stand behind all terms
+  }
   const double before = base.empty() ? 0.0 : solve(information(base, base), score(base)).gain;
   std::vector<SingleFit> fits;
   for (std::size_t k = 0; k < alternatives.size(); ++k) {
     std::vector<int> with = base;
     with.push_back(static_cast<int>(given.size() + k));
     const Solution solution = solve(information(with, with), score(with));
-    fits.push_back({solution.gain - before, solution.value(solution.value.size() - 1)});
+    const Eigen::Index last = solution.value.size() - 1;
+    const double own = information(with.back(), with.back()), variance = solution.covariance(last, last);
+    fits.push_back({solution.gain - before, solution.value(last), variance, own > 0.0 ? 1.0 / (own * variance) : 0.0});
   }
   return fits;
 }

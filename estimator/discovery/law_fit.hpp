@@ -81,11 +81,17 @@ LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> t
 struct SingleFit {
   double gain = 0.0;         // fall of the residuals' square
   double coefficient = 0.0;  // in unit_of(axis)
+  double variance = 0.0;     // of the coefficient, the alternative's constants known
+  double left = 0.0;         // share of its information that the given ones leave, 0 to 1
 };
 
-// Each of the alternatives alone beside `given`, from one pass over each recording; constants as they are.
+enum class GivenConstants { known, free };
+
+// Each of the alternatives alone beside `given`, from one pass over each recording; its constants as they are, those of `given`
+// as they are or, linearised, free.
 std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const std::vector<LawTerm>& given,
-                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop = {});
+                                const std::vector<LawTerm>& alternatives, const std::stop_token& stop = {},
+                                GivenConstants given_constants = GivenConstants::known);
 
 // The recording less the laws, stretch by stretch, each spread evenly over its samples.
 diagnosis::CorrectedRecording without_laws(const LawRecording& recording, const std::vector<LawTerm>& terms,

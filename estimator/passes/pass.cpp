@@ -9,21 +9,20 @@ namespace {
 
 constexpr double history_points = 200.0;
 
-// The dynamic part of the state: navigation errors and, behind them, the oscillations of the base.
+// Noise and observation of the dynamic part of the state.
 struct DynamicModel {
-  MatrixX Phi, L;
+  MatrixX L;
   VectorX q, drive;
   std::array<VectorX, 3> h;  // observation row of each axis
 
-  DynamicModel(const ObservationModel& observation, double interval_s, const ProcessNoise& noise) {
-    const int d = StateLayout::navigation_count + observation.state_count();
-    Phi = MatrixX::Zero(d, d);
-    L = MatrixX::Identity(d, d);  // the motion states are driven one by one
+  DynamicModel(const ObservationModel& observation, const StateLayout& layout, double interval_s,
+               const ProcessNoise& noise) {
+    const int d = layout.dynamic_count();
+    L = MatrixX::Identity(d, d);  // motion and biases are driven one by one
     q = VectorX::Zero(d);
     drive = VectorX::Zero(d);
     L.topLeftCorner<9, 9>() = noise.L;
     q.head<9>() = noise.q;
-    Phi.bottomRightCorner(observation.state_count(), observation.state_count()) = observation.transition(interval_s);
     int at = StateLayout::navigation_count;
     for (int axis = 0; axis < 3; ++axis) {
       VectorX& row = h[static_cast<std::size_t>(axis)];
@@ -46,7 +45,7 @@ class CoastNoise {
     L_.topLeftCorner<9, 9>().setIdentity();
     attitude_ = input.noise.gyro_arw * input.noise.gyro_arw;
   }
-  const MatrixX& L() const { return L_; }
+  MatrixX& L() { return L_; }
   const VectorX& q(const Interval& interval) {
     const double opened = interval.turned >= 0 ? prior_.attitude * prior_.attitude : 0.0;
     q_.segment<3>(StateLayout::position).setConstant(prior_.position * prior_.position);
@@ -114,6 +113,9 @@ VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
       at += 2;
     }
   }
+  for (const BiasNoise& bias : input.noise.biases) {
+    sigma(at++) = bias.sigma;
+  }
   sigma.tail(layout.constant_count()) = input.prior.parameter_sigma;
   return sigma;
 }
@@ -141,17 +143,30 @@ double NoiseModel::inflation(double time_s) const {
   return after != disturbed.end() && after->start_s <= time_s ? after->factor : 1.0;
 }
 
+Navigated navigate(const PassInput& input) {
+  IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, nullptr,
+                              input.force);
+  Navigated all;
+  for (Interval interval; navigator.next(interval);) {
+    all.intervals.push_back(interval);
+    all.C_nb.push_back(navigator.C_nb());
+  }
+  return all;
+}
+
 PassOutput run_pass(const PassInput& input, const PassProgress& progress, const std::stop_token& stop,
                     PassObserver* observer) {
   PassOutput out;
   out.layout.observation_count = input.noise.observation.state_count();
+  out.layout.bias_count = static_cast<int>(input.noise.biases.size());
   out.layout.extra_count = input.extra != nullptr ? input.extra->count() : 0;
   const StateLayout& layout = out.layout;
   UdFilter filter = make_filter(input, layout);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra,
                               input.force);
+  DynamicTransition transition(input.noise.observation, input.noise.biases, input.interval_s);
   DynamicModel model(
-      input.noise.observation, input.interval_s,
+      input.noise.observation, layout, input.interval_s,
       process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s, input.sign));
   CoastNoise coast_noise(input, model);
   UnseenTurns turns(*input.data, input.sign);
@@ -179,20 +194,38 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     filter.update(h, 0.0, noise_variance);
   }
   turns.before(navigator.C_nb(), filter.mean());
-  while (navigator.next(interval)) {
+  std::size_t replayed = 0;
+  Matrix3 C_nb = navigator.C_nb();
+  const auto next = [&] {
+    if (input.navigated == nullptr) {
+      const bool more = navigator.next(interval);
+      C_nb = navigator.C_nb();
+      return more;
+    }
+    if (replayed == input.navigated->intervals.size()) {
+      return false;
+    }
+    interval = input.navigated->intervals[replayed];
+    C_nb = input.navigated->C_nb[replayed++];
+    return true;
+  };
+  while (next()) {
     if (stop.stop_requested()) {
       out.stopped = true;
       return out;
     }
-    model.Phi.topLeftCorner<9, 9>() = interval.Phi;
     model.drive.head<9>() = interval.drive;
     Gamma.topRows<9>() = interval.Gamma;
     const double inflation = input.noise.inflation(0.5 * (interval.start_s + interval.end_s));
-    if (interval.coasted) {
-      filter.propagate(model.Phi, Gamma, model.drive, coast_noise.L(), coast_noise.q(interval));
-    } else {
-      filter.propagate(model.Phi, Gamma, model.drive, model.L, inflation * model.q);
+    MatrixX& L = interval.coasted ? coast_noise.L() : model.L;
+    VectorX q = interval.coasted ? coast_noise.q(interval) : VectorX(inflation * model.q);
+    if (layout.bias_count > 0) {
+      L.rightCols(layout.bias_count) = transition.drive(interval);
+      for (int k = 0; k < layout.bias_count; ++k) {
+        q(layout.biases() + k) = input.noise.biases[static_cast<std::size_t>(k)].drive_variance(interval.length_s);
+      }
     }
+    filter.propagate(transition.over(interval), Gamma, model.drive, L, q);
     ++index;
     if (interval.coasted) {
       if (observer != nullptr) {
@@ -201,8 +234,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       for (const VectorX& h : model.h) {  // as where the pass begins
         filter.update(h, 0.0, noise_variance);
       }
-      turns.behind(interval, navigator.C_nb(), filter.mean());
-      turns.before(navigator.C_nb(), filter.mean());
+      turns.behind(interval, C_nb, filter.mean());
+      turns.before(C_nb, filter.mean());
       continue;
     }
     if (std::abs(interval.length_s - input.interval_s) > 0.1 * input.interval_s) {
@@ -227,8 +260,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
                                    std::log(2.0 * std::numbers::pi * innovation.variance));
     }
     epoch.position = filter.mean().segment<3>(StateLayout::position);
-    turns.behind(interval, navigator.C_nb(), filter.mean());
-    turns.before(navigator.C_nb(), filter.mean());
+    turns.behind(interval, C_nb, filter.mean());
+    turns.before(C_nb, filter.mean());
     out.epochs.push_back(epoch);
     if (index % history_step == 0) {
       record_history();
@@ -239,7 +272,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   out.turns = turns.take();
   out.mean = filter.mean();
   out.covariance = filter.covariance();
-  out.C_nb = matrix_from_rotation_vector(out.mean.segment<3>(StateLayout::attitude)) * navigator.C_nb();
+  out.C_nb = matrix_from_rotation_vector(out.mean.segment<3>(StateLayout::attitude)) * C_nb;
   return out;
 }
 

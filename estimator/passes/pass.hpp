@@ -12,6 +12,7 @@
 
 #include "estimator/filter/ud_filter.hpp"
 #include "estimator/navigation/interval_navigator.hpp"
+#include "estimator/passes/dynamic_transition.hpp"
 #include "estimator/passes/motion_model.hpp"
 
 namespace selfcal {
@@ -26,6 +27,7 @@ struct NoiseModel {
   double gyro_arw = 0.0;   // rad/s/sqrt(Hz)
   double accel_vrw = 0.0;  // m/s^2/sqrt(Hz)
   ObservationModel observation;
+  std::vector<BiasNoise> biases;       // that change with time
   std::vector<Disturbance> disturbed;  // chronological, no two overlap
   // Of the variance of an interval whose middle is at `time_s`.
   double inflation(double time_s) const;
@@ -40,6 +42,12 @@ struct PriorModel {
   std::optional<MatrixX> carried;  // [24 x 24] instead, about the linearisation: counts data again
 };
 
+// A trajectory as navigated once: passes that differ by noise alone need no other.
+struct Navigated {
+  std::vector<Interval> intervals;
+  std::vector<Matrix3> C_nb;  // at the end of each
+};
+
 struct PassInput {
   const ImuData* data = nullptr;
   ParameterVector parameters = ParameterVector::Zero();  // linearisation
@@ -51,6 +59,8 @@ struct PassInput {
   PriorModel prior;
   ExtraSignatures* extra = nullptr;
   ForceSource force = ForceSource::accelerometers;
+  const Navigated* navigated =
+      nullptr;        // of this data, linearisation, direction and interval, without `extra`; else navigated here
   bool held = false;  // who iterates keeps the linearisation: along what the data leave open it would walk away
 };
 
@@ -86,6 +96,8 @@ class PassObserver {
   virtual void updated(int axis, const VectorX& h_dynamic, const ScalarInnovation& innovation,
                        const UdFilter& filter) = 0;
 };
+
+Navigated navigate(const PassInput& input);
 
 PassOutput run_pass(const PassInput& input, const PassProgress& progress = {}, const std::stop_token& stop = {},
                     PassObserver* observer = nullptr);

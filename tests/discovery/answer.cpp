@@ -40,7 +40,10 @@ ordered_json to_json(const discovery::Discovery& d) {
   j["laws"] = ordered_json::array();
   j["described"] = ordered_json::array();
   for (const discovery::DiscoveredLaw& law : d.described) {
-    j["described"].push_back({{"axis", law.term.axis}, {"expression", law.expression}, {"gain", law.gain}});
+    j["described"].push_back({{"axis", law.term.axis},
+                              {"expression", law.expression},
+                              {"gain", law.gain},
+                              {"departure_log_p", law.departure_log_p}});
   }
   for (const discovery::DiscoveredLaw& law : d.laws) {
     ordered_json members = ordered_json::array();
@@ -59,6 +62,7 @@ ordered_json to_json(const discovery::Discovery& d) {
                          {"held_out_gain", law.held_out_gain},
                          {"share", law.share},
                          {"stability", law.stability},
+                         {"departure_log_p", law.departure_log_p},
                          {"carries_over", law.carries_over},
                          {"class", members}});
   }

@@ -2,6 +2,8 @@
 //
 //   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS FILE   one JSON line a case, as far as missing
 //   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
+//   selfcal_discovery_generate draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS NUMBER FILE   a case's recording; prints its line of
+//                                                            the key as "case", and for the program that asks what is left as "assumed"
 //   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
 //                                                            another schedule: a file, or "random:SECONDS"
 //   selfcal_discovery_generate left KEY NUMBER LAWS.toml     share of the misfit's power that these laws leave on a plan
@@ -76,18 +78,50 @@ std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts) {
   return discovery_trial::recipes({counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5)});
 }
 
-int write_key(std::span<char*> arguments) {
+// What a key follows from: its seed and the number of cases of each kind.
+struct Drawing {
+  std::uint64_t seed = 0;
   ordered_json counts = ordered_json::array();
-  for (std::size_t k = 1; k < 7; ++k) {
-    const auto count = to_number(arguments[k]);
-    if (!count) {
-      return complain({ErrorKind::usage, fmt::format("{}: no count", arguments[k])});
+
+  Expected<ordered_json> line(int number, Case* drawn = nullptr) const {
+    const auto recipes = recipes_of(counts);
+    if (number < 0 || number >= static_cast<int>(recipes.size())) {
+      return fail(ErrorKind::usage, fmt::format("case {}: there are {}", number, recipes.size()));
     }
-    counts.push_back(*count);
+    auto c = discovery_trial::draw_case(recipes[static_cast<std::size_t>(number)], number, seed);
+    if (!c) {
+      return tl::unexpected(c.error());
+    }
+    ordered_json told = to_json(*c, seed);
+    told["counts"] = counts;
+    if (drawn != nullptr) {
+      *drawn = std::move(*c);
+    }
+    return told;
   }
-  const auto seed = to_number(arguments[0]);
+};
+
+// SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS
+Expected<Drawing> drawing_in(std::span<char*> words) {
+  const auto seed = to_number(words[0]);
   if (!seed) {
-    return complain({ErrorKind::usage, fmt::format("{}: no seed", arguments[0])});
+    return fail(ErrorKind::usage, fmt::format("{}: no seed", words[0]));
+  }
+  Drawing drawing{static_cast<std::uint64_t>(*seed), ordered_json::array()};
+  for (std::size_t k = 1; k < 7; ++k) {
+    const auto count = to_number(words[k]);
+    if (!count) {
+      return fail(ErrorKind::usage, fmt::format("{}: no count", words[k]));
+    }
+    drawing.counts.push_back(*count);
+  }
+  return drawing;
+}
+
+int write_key(std::span<char*> arguments) {
+  const auto drawing = drawing_in(arguments);
+  if (!drawing) {
+    return complain(drawing.error());
   }
   int done = 0;
   {
@@ -96,32 +130,28 @@ int write_key(std::span<char*> arguments) {
       ++done;
     }
   }
-  const auto recipes = recipes_of(counts);
   std::ofstream file(arguments[7], std::ios::app);
-  for (int n = done; n < static_cast<int>(recipes.size()); ++n) {
-    const auto drawn =
-        discovery_trial::draw_case(recipes[static_cast<std::size_t>(n)], n, static_cast<std::uint64_t>(*seed));
-    if (!drawn) {
-      return complain(drawn.error());
+  for (int n = done; n < static_cast<int>(recipes_of(drawing->counts).size()); ++n) {
+    const auto line = drawing->line(n);
+    if (!line) {
+      return complain(line.error());
     }
-    ordered_json line = to_json(*drawn, static_cast<std::uint64_t>(*seed));
-    line["counts"] = counts;
-    file << line.dump() << '\n' << std::flush;
+    file << line->dump() << '\n' << std::flush;
   }
   return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[7])});
 }
 
+// The case whose line of the key has this number.
 Expected<Case> case_in(const std::string& key, int number) {
   std::ifstream file(key);
-  std::string line;
-  for (int n = 0; n <= number; ++n) {
-    if (!std::getline(file, line)) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: no case {}", key, number));
+  for (std::string line; std::getline(file, line);) {
+    const ordered_json j = ordered_json::parse(line);
+    if (j.at("number") == number) {
+      const auto recipes = recipes_of(j.at("counts"));
+      return discovery_trial::draw_case(recipes.at(static_cast<std::size_t>(number)), number, j.at("trial_seed"));
     }
   }
-  const ordered_json j = ordered_json::parse(line);
-  const auto recipes = recipes_of(j.at("counts"));
-  return discovery_trial::draw_case(recipes.at(static_cast<std::size_t>(number)), number, j.at("trial_seed"));
+  return fail(ErrorKind::bad_input, fmt::format("{}: no case {}", key, number));
 }
 
 int write_record(const Case& c, const std::string& path) {
@@ -131,6 +161,21 @@ int write_record(const Case& c, const std::string& path) {
   }
   const auto written = write_recording(*recording, path);
   return written ? 0 : complain(written.error());
+}
+
+int draw(std::span<char*> arguments) {
+  const auto drawing = drawing_in(arguments);
+  const auto number = to_number(arguments[7]);
+  if (!drawing || !number) {
+    return complain(drawing ? Error{ErrorKind::usage, fmt::format("{}: no case", arguments[7])} : drawing.error());
+  }
+  Case drawn;
+  const auto line = drawing->line(*number, &drawn);
+  if (!line) {
+    return complain(line.error());
+  }
+  fmt::print("{}\n", ordered_json{{"case", *line}, {"assumed", *line}}.dump());
+  return write_record(drawn, arguments[8]);
 }
 
 int print_left(const Case& c, const std::string& laws) {
@@ -186,6 +231,9 @@ int run(std::span<char*> arguments) {
   if (verb == "key" && arguments.size() == 10) {
     return write_key(arguments.subspan(2));
   }
+  if (verb == "draw" && arguments.size() == 11) {
+    return draw(arguments.subspan(2));
+  }
   const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
   if ((again || ((verb == "record" || verb == "left") && arguments.size() == 5)) && to_number(arguments[3])) {
     const auto c = case_in(arguments[2], *to_number(arguments[3]));
@@ -199,7 +247,8 @@ int run(std::span<char*> arguments) {
   }
   fmt::print(stderr,
              "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS FILE | "
-             "record KEY NUMBER FILE | again KEY NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
+             "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS NUMBER FILE | record KEY NUMBER FILE | again KEY "
+             "NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 

@@ -15,3 +15,15 @@ def left_elsewhere(programs, key, number, laws, folder):
     done = subprocess.run([f"{programs}/selfcal_discovery_generate", "left", str(key), str(number), str(path)], check=True,
                           capture_output=True, text=True)
     return json.loads(done.stdout)
+
+
+def answer_of(programs, way, case, recording, folder):
+    """The answer to a case's recording, with what its laws leave elsewhere. Of a case the answering program knows nothing."""
+    words = [] if case["kind"] == "effect" and way == "discover" else [f"--{way}"]
+    out = subprocess.run([f"{programs}/selfcal_discovery_answer", str(recording), *words], check=True, capture_output=True, text=True).stdout
+    answer = json.loads(out)
+    if case["laws"] and not any(law["process"] for law in case["laws"]) and "discovery" in answer:
+        key = folder / "case.jsonl"
+        key.write_text(json.dumps(case) + "\n")
+        answer.update(left_elsewhere(programs, key, case["number"], answer["discovery"]["laws"], folder))
+    return answer

@@ -20,6 +20,8 @@ using diagnosis::Diagnosis;
 using diagnosis::Finding;
 using diagnosis::FindingParameter;
 
+constexpr double finest_count = 1e-2;  // of the quantum assumed
+
 std::string key_value(std::string_view key, double value) { return fmt::format("{} = {:.9g}\n", key, value); }
 std::string effect_head(std::string_view id) { return fmt::format("\n[[effect]]\nid = \"{}\"\n", id); }
 
@@ -130,13 +132,68 @@ double density(const Diagnosis& d, std::string_view effect, double assumed) {
   return found != d.findings.end() ? std::min(found->parameters.front().value, assumed) : assumed;
 }
 
+// Where quanta or lines were named the noise is not white: the simulation then draws it by its spectra, lines included.
+bool has_spectra(const Diagnosis& d) {
+  return std::any_of(d.findings.begin(), d.findings.end(),
+                     [](const Finding& f) { return f.effect == "quantisation" || f.effect == "vibration_line"; });
+}
+
+// What the spectra hold.
+bool in_spectra(const Finding& f) {
+  return f.effect == "quantisation" || f.effect == "vibration_line" || f.effect == "gyro_noise_level" ||
+         f.effect == "accel_noise_level";
+}
+
+// What the recording counts in; where it has no counts the simulation's own are fine enough.
+double gyro_count(const Diagnosis& d, const diagnosis::AssumedNoise& assumed) {
+  return d.calibration.gyro_quantum > 0.0 ? d.calibration.gyro_quantum : finest_count * assumed.gyro_quantum;
+}
+double accel_count(const Diagnosis& d, const diagnosis::AssumedNoise& assumed) {
+  return d.calibration.accel_quantum > 0.0 ? d.calibration.accel_quantum : finest_count * assumed.accel_quantum;
+}
+
+std::string spectrum_text(std::string_view channel, std::string_view unit, double si_per_unit,
+                          const diagnosis::DensityTable& table) {
+  std::string edges, densities;
+  for (const double hz : table.edges_hz) {
+    edges += fmt::format("{}{:.6g}", edges.empty() ? "" : ", ", hz);
+  }
+  for (const double density : table.density) {
+    densities += fmt::format("{}{:.4g}", densities.empty() ? "" : ", ", density / si_per_unit);
+  }
+  return table.density.empty() ? ""
+                               : fmt::format(
+                                     "\n[[spectrum]]\nchannel = \"{}\"\nunit = \"{}\"\nedges_hz = [{}]\n"
+                                     "density = [{}]\n",
+                                     channel, unit, edges, densities);
+}
+
+std::string tilt_text(std::string_view channel, const diagnosis::TiltSpectrum& tilt) {
+  const std::string text = spectrum_text(channel, "arcsec/sqrt(Hz)", units::arcsecond, tilt.table);
+  return text.empty() ? text : text + key_value("above_m", tilt.above_m);
+}
+
+std::string spectra_text(const diagnosis::NoiseSpectra& spectra) {
+  constexpr std::array<const char*, 6> names = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    text += k < 3 ? spectrum_text(names[k], "deg/h/sqrt(Hz)", units::degree_per_hour, spectra.sensors[k])
+                  : spectrum_text(names[k], "ug/sqrt(Hz)", units::micro_g, spectra.sensors[k]);
+  }
+  return text + tilt_text("base_roll", spectra.roll) + tilt_text("base_pitch", spectra.pitch);
+}
+
 }  // namespace
 
-std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, double latitude) {
+std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, double latitude,
+                         const std::optional<diagnosis::NoiseSpectra>& spectra) {
   std::string text = "# Physics that a diagnosis found left out; sim_ins and selfcal simulate load it.\n";
   const double heading = d.calibration.initial_attitude.heading;
   for (const Finding& f : d.findings) {
     const bool moves = f.source != nullptr && f.source->displacement != nullptr;
+    if (spectra && in_spectra(f)) {
+      continue;
+    }
     if (moves && f.source->constant.kind == diagnosis::EffectConstant::Kind::spectrum) {
       text += sway_text(f, heading);
     } else if (moves) {
@@ -149,10 +206,11 @@ std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assu
       text += equation_text(f, d.mean_temperature_c, latitude);
     }
   }
-  return text;
+  return spectra ? text + spectra_text(*spectra) : text;
 }
 
-std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, const Recording& recording) {
+std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, const Recording& recording,
+                            bool spectra) {
   const Attitude& attitude = d.calibration.initial_attitude;
   std::string text = "# What a diagnosis makes of a recording: load it with the physics file beside it.\n";
   if (d.unexplained) {
@@ -165,13 +223,12 @@ std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& a
   text += "\n[attitude]\n" + key_value("roll_deg", attitude.roll / units::degree) +
           key_value("pitch_deg", attitude.pitch / units::degree) +
           key_value("heading_deg", attitude.heading / units::degree);
-  text += "\n[noise]\n" +
-          key_value("gyro_arw_deg_per_sqrt_h",
-                    density(d, "gyro_noise_level", assumed.gyro_arw / units::degree_per_sqrt_hour)) +
-          key_value("accel_vrw_ug_per_sqrt_hz",
-                    density(d, "accel_noise_level", assumed.accel_vrw / units::micro_g_per_sqrt_hz)) +
-          key_value("gyro_lsb_arcsec", assumed.gyro_quantum / units::arcsecond) +
-          key_value("accel_lsb_m_per_s", assumed.accel_quantum);
+  const double gyro_arw = density(d, "gyro_noise_level", assumed.gyro_arw / units::degree_per_sqrt_hour),
+               accel_vrw = density(d, "accel_noise_level", assumed.accel_vrw / units::micro_g_per_sqrt_hz);
+  text += "\n[noise]\n" + key_value("gyro_arw_deg_per_sqrt_h", spectra ? 0.0 : gyro_arw) +
+          key_value("accel_vrw_ug_per_sqrt_hz", spectra ? 0.0 : accel_vrw) +
+          key_value("gyro_lsb_arcsec", (spectra ? gyro_count(d, assumed) : assumed.gyro_quantum) / units::arcsecond) +
+          key_value("accel_lsb_m_per_s", spectra ? accel_count(d, assumed) : assumed.accel_quantum);
   text += "\n[gimbal]\npositioning_error_deg = 0\n";
   text += "\n[parameters]\n";
   for (int k = 0; k < sensor_parameter_count; ++k) {
@@ -189,8 +246,15 @@ Expected<void> write_amendment(const std::filesystem::path& folder, const Diagno
   if (error) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", folder.string(), error.message()));
   }
-  return write_file_atomically(folder / "physics.toml", physics_text(d, assumed, data.site.latitude) + laws)
-      .and_then([&] { return write_file_atomically(folder / "sim.toml", sim_config_text(d, assumed, recording)); })
+  std::optional<diagnosis::NoiseSpectra> spectra;
+  if (has_spectra(d)) {
+    spectra =
+        diagnosis::noise_spectra(data, find_segments(data), d.calibration.gyro_quantum, d.calibration.accel_quantum);
+  }
+  return write_file_atomically(folder / "physics.toml", physics_text(d, assumed, data.site.latitude, spectra) + laws)
+      .and_then([&] {
+        return write_file_atomically(folder / "sim.toml", sim_config_text(d, assumed, recording, spectra.has_value()));
+      })
       .and_then([&] {
         return write_file_atomically(folder / "schedule.toml", format_schedule(schedule_of(recording, data)));
       });

@@ -320,14 +320,14 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!others) {
     return tl::unexpected(others.error());
   }
-  const diagnosis::DiagnosisOutcome outcome = [&] {
+  diagnosis::DiagnosisOutcome outcome = [&] {
     ProgressLine line;
     return diagnose_sound(**opened, options, arguments.strict, [&line](const std::string& words) { line.show(words); });
   }();
   if (!outcome.diagnosis) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.recording, outcome.failure));
   }
-  const diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
+  diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
   if (!diagnosis.faults.empty()) {
     return tell_faults(arguments, diagnosis, (*opened)->file);
   }
@@ -350,6 +350,9 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   const Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit);
   if (!beyond) {
     return tl::unexpected(beyond.error());
+  }
+  if (beyond->found) {
+    replace_process(diagnosis, *beyond->found);
   }
   std::optional<diagnosis::EmpiricalDescription> description;
   if (diagnosis.unexplained && !beyond->explains()) {

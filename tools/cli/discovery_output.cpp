@@ -92,8 +92,8 @@ std::string described_text(const Discovery& found) {
     return {};
   }
   std::string text =
-      "  no equation of its own, for only several together make it up; a description of this\n"
-      "  recording, not to be used on another:\n";
+      "  no equation of its own, for the axis does more than these forms hold; a description of\n"
+      "  this recording, not to be used on another:\n";
   for (const DiscoveredLaw& law : found.described) {
     text += fmt::format("    {:<8} ({}) * {}, {:.0f} % of the misfit\n", name_of_axis(law.term.axis),
                         with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,

@@ -110,8 +110,8 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   BeyondCatalogue result;
   const bool unexplained =
       std::any_of(recordings.begin(), recordings.end(), [](const DiagnosedFile& r) { return r.diagnosis.unexplained; });
-  const bool discover =
-      arguments.discover || unexplained || recordings.size() > 1 || !arguments.next_experiment.empty();
+  const bool asked = arguments.discover || unexplained || recordings.size() > 1 || !arguments.next_experiment.empty();
+  const bool discover = asked || may_be_a_law(recordings.front().diagnosis);
   if (!discover && arguments.laws.empty()) {
     return result;
   }
@@ -127,6 +127,10 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   if (discover) {
     ProgressLine line;
     result.found = discovery::discover(rest->recordings(), {}, [&line](const std::string& words) { line.show(words); });
+    if (!asked && !replaces_process(*result.found, recordings.front().diagnosis)) {
+      result.found.reset();
+      return result;
+    }
     if (recordings.size() > 1) {
       result.together = put_together(recordings, *rest, *result.found);
     }

@@ -42,8 +42,8 @@ struct BeyondCatalogue {
   void add_to(nlohmann::ordered_json& document) const;
 };
 
-// Looks where the diagnosis of a recording left something unexplained, where there are several, or where asked to; in all of them
-// together. Errors: a file of laws that is wrong (file, law, column), a schedule that cannot be written.
+// Looks where the diagnosis of a recording left something unexplained, where it named nothing but a walk or an instability of a bias (and
+// then keeps only what replaces that), where there are several, or where asked to; in all of them together. Errors: a file of laws that is wrong (file, law, column), a schedule that cannot be written.
 Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings);
 
 }  // namespace selfcal::cli

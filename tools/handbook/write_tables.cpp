@@ -11,12 +11,10 @@
 #include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/passes/calibration.hpp"
-#include "protocol/flash/page.hpp"
-#include "protocol/ins_interface/identifiers.hpp"
-#include "protocol/ins_interface/record_fields.hpp"
-#include "protocol/ins_interface/status.hpp"
 #include "protocol/isotp/transport.hpp"
 #include "protocol/profile/coefficient_fields.hpp"
+#include "protocol/profile/describe.hpp"
+#include "protocol/profile/frames.hpp"
 #include "protocol/profile/roles.hpp"
 #include "protocol/uds/client.hpp"
 #include "protocol/uds/server.hpp"
@@ -73,7 +71,7 @@ with which significance it would see that size (`expected_z` in its JSON).
   }
   text +=
       R"(The diagnosis also reports the stochastic part (`gyro_noise_level`, `accel_noise_level`, `gyro_random_walk`,
-`accel_random_walk`, `quantisation`, `vibration_line`) and faults of the data, such as `lost_samples`.
+`accel_random_walk`, `gyro_bias_instability`, `accel_bias_instability`, `quantisation`, `vibration_line`) and faults of the data, such as `lost_samples`.
 
 ## Keys of a physics file
 
@@ -104,103 +102,27 @@ std::string milliseconds(Time time) {
   return fmt::format("{} ms", std::chrono::duration_cast<std::chrono::milliseconds>(time).count());
 }
 
-std::string record_tables() {
-  std::string text;
-  for (const ins::RecordLayout& record : ins::record_layouts()) {
-    std::size_t offset = 0;
-    bool open_ended = false;
-    text += fmt::format("### {}\n\n{}\n\n| offset | field | type | meaning |\n|---|---|---|---|\n", record.name,
-                        record.what);
-    for (const ins::RecordField& f : record.fields) {
-      const std::string type =
-          f.count == 1 ? std::string(ins::name(f.type)) : fmt::format("{}[{}]", ins::name(f.type), f.count);
-      text += fmt::format("| {} | {} | {} | {} |\n", offset, f.name, type, f.meaning);
-      offset += ins::bytes(f);
-      open_ended = open_ended || f.repeated;
-    }
-    text +=
-        fmt::format("\n{} bytes{}.\n\n", offset, open_ended ? " with one position, 12 more with each further one" : "");
-  }
-  return text;
+// Sections of the document of a profile, without its title.
+std::string own_interface() {
+  const std::string document = profile::describe(*profile::built_in(), profile::Markup::markdown);
+  const std::size_t first = document.find("\n## ");
+  return document.substr(first + 1);
 }
 
 std::string interface_page() {
-  std::string text = "# INS interface\n\n" + made_from("protocol/ins_interface");
+  std::string text = "# INS interface\n\n" + made_from("config/profiles/selfcal.toml");
   text +=
-      R"(How the service speaks to an INS: UDS (ISO 14229-1) over ISO-TP (ISO 15765-2) on classic CAN or CAN FD. `config/selfcal.dbc`
-holds the two status frames for CAN tools. Records and raw pages are big-endian; the signals of the status frames are
-little-endian.
+      R"(How the service speaks to our own INS, and to the virtual one: UDS (ISO 14229-1) over ISO-TP (ISO 15765-2) on classic CAN or CAN
+FD. `selfcal device describe` writes such a page for any [profile](profile.md). `config/selfcal.dbc` holds the status frames for
+CAN tools. An INS has other identifiers by its profile, or by `request_id`, `response_id`, `functional_id` and `status_id` in its
+section of the service's configuration.
 
-## CAN identifiers
-
-| identifier | direction | use |
-|---|---|---|
 )";
-  text += fmt::format("| 0x{:03X} | tester to INS | requests (key `request_id`) |\n", ins::can_id::request);
-  text += fmt::format("| 0x{:03X} | INS to tester | responses (key `response_id`) |\n", ins::can_id::response);
-  text += fmt::format("| 0x{:03X} | tester to all | TesterPresent (key `functional_id`) |\n", ins::can_id::functional);
-  text += fmt::format("| 0x{:03X} | INS to all | state frame, periodic (key `status_id`) |\n", ins::can_id::status);
-  text += fmt::format("| 0x{:03X} | INS to all | gimbal frame, periodic |\n", ins::can_id::gimbal);
-  text += "\n## Data identifiers\n\n| DID | name | content | write |\n|---|---|---|---|\n";
-  for (const ins::DataIdentifier& d : ins::data_identifiers) {
-    text += fmt::format("| 0x{:04X} | {} | {} | {} |\n", d.id, d.name, d.content,
-                        !d.writable                        ? "no"
-                        : d.write == ins::Access::unlocked ? "extended session, unlocked"
-                                                           : "yes");
-  }
-  text += R"(
-## Routines
-
-All need the extended session and the unlocked state.
-
-| routine | name | actions |
-|---|---|---|
-)";
-  for (const ins::Routine& r : ins::routines) {
-    text += fmt::format("| 0x{:04X} | {} | {} |\n", r.id, r.name, r.content);
-  }
-  text += "\n## Records\n\n" + record_tables();
-  text += R"(## Status frames
-
-Eight bytes each, little-endian, start bit as in a DBC.
-
-| frame | signal | start bit | bits | factor | range | unit | values |
-|---|---|---|---|---|---|---|---|
-)";
-  for (const ins::Signal& s : ins::status_signals) {
-    text += fmt::format("| 0x{:03X} | {} | {} | {} | {:g} | {:g} to {:.10g} | {} | {} |\n", s.frame_id, s.name,
-                        s.start_bit, s.bits, s.factor, s.minimum, s.maximum, s.unit, s.values);
-  }
-  text += fmt::format(R"(
-## Raw data
-
-RequestUpload (0x35) addresses pages, not bytes: page *p* of the latest run, in multiples of {} bytes. A page has {} bytes of
-header and up to {} samples of {} bytes; unused room is 0xFF:
-
-| offset | field | type |
-|---|---|---|
-| 0 | magic "SCRP" | u32 |
-| 4 | format, {} | u16 |
-| 6 | number of samples | u16 |
-| 8 | run id | u32 |
-| 12 | sequence, from 0 | u32 |
-| 16 | index of the first sample | u64 |
-| 24 | temperature, 0.01 degC | i16 |
-| 26 | flags: {} last of the run, {} a sensor was saturated | u16 |
-| 28 | reserved, 0 | u32 |
-| 32 | CRC-32C of all {} bytes, this field taken as 0 | u32 |
-
-A sample is three i32 of delta theta, three i32 of delta v, and u16 outer and inner angle, in counts; DID `sampleFormat` says what
-a count is worth. Sample *i* of the run ends at (i + 1) / rate.
-
-)",
-                      flash::page_bytes, flash::page_header_bytes, flash::samples_per_page, flash::sample_bytes,
-                      flash::page_format, flash::page_flag::last_of_run, flash::page_flag::sensor_saturated,
-                      flash::page_bytes);
+  text += own_interface();
   const uds::ServerTimings server;
   const uds::ClientTimings client;
   const isotp::Options transport;
-  text += "## Timing\n\n| time | value | meaning |\n|---|---|---|\n";
+  text += "\n## Timing\n\n| time | value | meaning |\n|---|---|---|\n";
   text += fmt::format("| P2 (INS) | {} | the virtual INS answers within it, or says response-pending |\n",
                       milliseconds(server.p2));
   text += fmt::format("| P2* (INS) | {} | the same after response-pending |\n", milliseconds(server.p2_star));
@@ -216,9 +138,8 @@ a count is worth. Sample *i* of the run ends at (i + 1) / rate.
   text += R"(
 ## Unlocking
 
-SecurityAccess (0x27) level 1 gives a seed of 16 bytes; the key is AES-CMAC-128 of the seed (NIST SP 800-38B, RFC 4493) with the
-secret of the INS, 32 hexadecimal digits in the key file. Everything that writes or turns needs the extended session and the
-unlocked state.
+Level 1 of SecurityAccess gives a seed of 16 bytes; the key is AES-CMAC-128 of the seed (NIST SP 800-38B, RFC 4493) with the secret
+of the INS, 32 hexadecimal digits in the key file.
 )";
   return text;
 }
@@ -264,7 +185,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | table | keys |
 |---|---|
 | | `name`; `byte_order` big or little, of every number that says nothing else |
-| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), extended, extended-29 (with the three identifiers, of which requests to one and to all may be the same, and `ins_address`, `tester_address`, `functional_address`), mixed (with the three identifiers and `address_extension`), mixed-29 (with `ins_address`, `tester_address`, `address_extension`), none (no UDS, with `extended_ids`: see `frames`); `status` of the state frame, the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
+| `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), extended, extended-29 (with the three identifiers, of which requests to one and to all may be the same, and `ins_address`, `tester_address`, `functional_address`), mixed (with the three identifiers and `address_extension`), mixed-29 (with `ins_address`, `tester_address`, `address_extension`), none (no UDS, with `extended_ids`: see `frames`); `status` of the [state frame](#status-frames), the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
 | `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
@@ -274,6 +195,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
 | `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
+| `file` | RequestFileTransfer in its place, each page a file: `name`, with `{page}` and perhaps `{run}`; `{page:6}` has six digits at least |
 | `frames` | of an INS without UDS, [below](#plain-frames) |
 | `page` | a record |
 | `axes` | `imu`, `gimbal`: ours, in the INS's words, `-` for the other way round |
@@ -306,7 +228,22 @@ With `addressing = "none"` a message is a CAN frame and its fields are signals. 
 A frame: `id` and `bytes`, or `message` of the DBC; `signals.NAME`. A signal: `start`, `length`, `byte_order` as in a DBC, `type` (unsigned, signed,
 float), or `of` with the DBC's name; `scale`, `offset`, `unit`, `codes`, `constant` as of a field, before what the DBC says.
 
-## A field
+## Status frames
+
+`status.state` and `status.gimbal` say what stands in the frames that an INS sends again and again beside UDS: `bytes` and
+`signals.NAME`, as of a plain frame. Their identifiers are `bus.status` and the next one. Where the table is left out, they are as our
+own INS's.
+
+)";
+  for (const std::string_view name : {"status.state", "status.gimbal"}) {
+    text += fmt::format("### {}\n\n| signal | unit here | needed | meaning |\n|---|---|---|---|\n", name);
+    for (const profile::RoleField& f : profile::frame_role(name).signals) {
+      text += fmt::format("| `{}` | {} | {} | {}{} |\n", f.name, f.unit, f.needed ? "yes" : "", f.meaning,
+                          f.words.empty() ? "" : fmt::format(": `codes` for {}", fmt::join(f.words, ", ")));
+    }
+    text += "\n";
+  }
+  text += R"(## A field
 
 A field: `at` (byte, from 0), `type` (u8 u16 u24 u32 u64 i8 i16 i24 i32 i64 f32 f64, ascii with `length`), `count` (elements, one behind
 the other), `byte_order`, `first_bit` and `bits` (part of an unsigned integer, 0 the lowest), `scale`, `offset` (value = number times

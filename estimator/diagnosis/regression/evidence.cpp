@@ -92,56 +92,6 @@ GroupTest test_group(const Evidence& e, const std::vector<int>& group, const std
   return test;
 }
 
-RandomWalk test_walk(const Evidence& e, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
-                     const std::vector<int>& others) {
-  RandomWalk test;
-  test.axis = axis;
-  std::vector<double> time_h;
-  std::vector<int> columns;
-  for (std::size_t k = 0; k < map.size(); ++k) {
-    const bool segment = map[k].kind == LocatedColumn::Kind::dwell || map[k].kind == LocatedColumn::Kind::rotation;
-    if (map[k].axis == axis && segment) {
-      test.places.push_back(static_cast<int>(k));
-      columns.push_back(first_map_column + static_cast<int>(k));
-      time_h.push_back(0.5 * (map[k].start_s + map[k].end_s) / 3600.0);
-    }
-  }
-  const Normal given = e.given(columns, others);
-  const Eigen::MatrixXd& J = given.information;
-  const Eigen::VectorXd& b = given.score;
-  const auto n = static_cast<Eigen::Index>(time_h.size());
-  Eigen::MatrixXd K(n, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) {
-      K(i, j) = std::min(time_h[static_cast<std::size_t>(i)], time_h[static_cast<std::size_t>(j)]);
-    }
-  }
-  const auto twice_log_likelihood = [&](double q) {
-    const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(n, n) + q * J * K;
-    const Eigen::PartialPivLU<Eigen::MatrixXd> lu(M);
-    return q * b.dot(K * lu.solve(b)) - lu.matrixLU().diagonal().cwiseAbs().array().log().sum();
-  };
-  constexpr int steps_per_decade = 8, first_decade = -4, last_decade = 8;
-  double best_q = 0.0;
-  for (int step = first_decade * steps_per_decade; step <= last_decade * steps_per_decade; ++step) {
-    const double q = std::pow(10.0, static_cast<double>(step) / steps_per_decade);
-    const double value = twice_log_likelihood(q);
-    if (value > test.delta_chi2) {
-      test.delta_chi2 = value;
-      best_q = q;
-    }
-  }
-  test.rate = std::sqrt(best_q);
-  if (best_q > 0.0) {  // curvature in the logarithm of the rate
-    const double h = 0.1;
-    const double around = twice_log_likelihood(best_q * std::exp(2.0 * h)) +
-                          twice_log_likelihood(best_q * std::exp(-2.0 * h)) - 2.0 * test.delta_chi2;
-    test.sigma = test.rate / std::sqrt(std::max(-0.5 * around / (h * h), 1.0));
-  }
-  test.covariance = best_q * K;
-  return test;
-}
-
 double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual, const std::vector<int>& fold,
                      const std::vector<int>& full, const std::vector<int>& reduced) {
   const std::vector<int> all = joined(full, reduced);

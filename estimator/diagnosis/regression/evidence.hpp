@@ -51,18 +51,6 @@ struct GroupTest {
 // `group` given that `others` are fitted too.
 GroupTest test_group(const Evidence& evidence, const std::vector<int>& group, const std::vector<int>& others);
 
-// Bias of one sensor axis that walks: variance growth per hour found with the map's columns of dwells and rotations.
-struct RandomWalk {
-  int axis = 0;                // 0..2 gyro, 3..5 accelerometer
-  double delta_chi2 = 0.0;     // twice the log-likelihood gained
-  double rate = 0.0;           // map units per sqrt(h)
-  double sigma = 0.0;          // of the rate, from the curvature
-  std::vector<int> places;     // of the map: the axis' dwells and rotations
-  Eigen::MatrixXd covariance;  // of their columns at that rate
-};
-RandomWalk test_walk(const Evidence& evidence, const std::vector<LocatedColumn>& map, int first_map_column, int axis,
-                     const std::vector<int>& others);
-
 // Cross-validated gain in log-likelihood: every fold's rows predicted by a fit to the rest, with `full` against
 // `reduced` columns. `fold` gives each row's number.
 double held_out_gain(const Eigen::MatrixXd& columns, const Eigen::VectorXd& residual, const std::vector<int>& fold,

@@ -1,10 +1,10 @@
-// What a recording is explained by, as a value: effects with constants and amplitudes, random walks, noise.
+// What a recording is explained by, as a value: effects with constants and amplitudes, bias processes, noise.
 #pragma once
 
 #include <cmath>
 #include <vector>
 
-#include "estimator/diagnosis/regression/evidence.hpp"
+#include "estimator/diagnosis/regression/bias_process.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -26,11 +26,11 @@ struct Term : Variant {
 
 struct Hypothesis {
   std::vector<Term> terms;
-  std::vector<RandomWalk> walks;
+  std::vector<BiasProcess> processes;
   NoiseModel noise;
 
-  bool empty() const { return terms.empty() && walks.empty(); }
-  std::size_t size() const { return terms.size() + walks.size(); }
+  bool empty() const { return terms.empty() && processes.empty(); }
+  std::size_t size() const { return terms.size() + processes.size(); }
   bool names(const Effect& effect) const;
   // The terms that lie in the increments.
   Correction correction() const;

@@ -195,4 +195,10 @@ double log_determinant(const InnovationColour& colour, Eigen::Index rows) {
   return sum;
 }
 
+double whitened_gain(const InnovationColour& colour, Eigen::VectorXd& rows) {
+  const double square = rows.squaredNorm();
+  whiten(colour, rows);
+  return 0.5 * (square - rows.squaredNorm()) + log_determinant(colour, rows.size());
+}
+
 }  // namespace selfcal::diagnosis

@@ -34,5 +34,7 @@ void whiten(const InnovationColour& colour, Eigen::Ref<Eigen::MatrixXd> rows);
 Eigen::VectorXd with_colour(const InnovationColour& colour, const Eigen::VectorXd& white);
 // log-likelihood of x = that of its white rows + this.
 double log_determinant(const InnovationColour& colour, Eigen::Index rows);
+// Whitens one column and returns by how much its log-likelihood differs from that of white rows as they were.
+double whitened_gain(const InnovationColour& colour, Eigen::VectorXd& rows);
 
 }  // namespace selfcal::diagnosis

@@ -69,7 +69,7 @@ LinearModel LinearModel::about(const RecordingContext& context, const OperatingP
   for (const Candidate& c : taken_out.effects) {
     of_taken_out.push_back(among(c));
   }
-  SignaturePass pass(context, std::move(candidates), map || !hypothesis.walks.empty());
+  SignaturePass pass(context, std::move(candidates), map);
   for (const std::size_t k : of_terms) {
     model.terms_.push_back(pass.candidates()[k]);
   }
@@ -85,11 +85,10 @@ LinearModel LinearModel::about(const RecordingContext& context, const OperatingP
   model.first_map_column_ = pass.first_map_column();
   model.linearisation_ = point.input.parameters;
   model.rows_ = std::make_shared<const SignatureRows>(pass.run(point.pass(hypothesis.noise)));
-  model.plain_ = Evidence(*model.rows_);
+  model.evidence_ = Evidence(*model.rows_);
   if (!model.taken_out_.empty()) {
-    model.plain_.restore(model.taken_out_, model.taken_out_size_);
+    model.evidence_.restore(model.taken_out_, model.taken_out_size_);
   }
-  model.marginalise(hypothesis.walks);
   return model;
 }
 
@@ -101,22 +100,6 @@ std::vector<Candidate> LinearModel::terms_of(const Hypothesis& other) const {
     all.push_back(candidates_[static_cast<std::size_t>(found - variants_.begin())]);
   }
   return all;
-}
-
-std::vector<int> LinearModel::columns_of_walk(const RandomWalk& walk) const {
-  std::vector<int> columns = walk.places;
-  for (int& column : columns) {
-    column += first_map_column_;
-  }
-  return columns;
-}
-
-void LinearModel::marginalise(std::vector<RandomWalk> walks) {
-  walks_ = std::move(walks);
-  evidence_ = plain_;
-  for (const RandomWalk& walk : walks_) {
-    evidence_.marginalise(columns_of_walk(walk), walk.covariance);
-  }
 }
 
 GroupTest LinearModel::test(const Candidate& alternative) const {
@@ -158,13 +141,6 @@ Eigen::VectorXd LinearModel::residual_after(const std::vector<int>& fitted, cons
   if (!known.empty()) {
     left -= rows_->columns(Eigen::all, known) * known_size;
   }
-  for (const RandomWalk& walk : walks_) {
-    const Eigen::MatrixXd Z = rows_->columns(Eigen::all, columns_of_walk(walk));
-    const Eigen::MatrixXd J = Z.transpose() * Z;
-    const auto n = J.rows();
-    left -= Z * (walk.covariance * (Eigen::MatrixXd::Identity(n, n) + J * walk.covariance).inverse() *
-                 (Z.transpose() * left));
-  }
   return left;
 }
 
@@ -187,14 +163,14 @@ ParameterMatrix LinearModel::covariance() const {
 
 int LinearModel::append(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& shift) {
   const Eigen::Index at = rows_->columns.cols(), count = columns.cols();
-  plain_.append(rows_->columns.transpose() * columns, columns.transpose() * columns, columns.transpose() * residual());
+  evidence_.append(rows_->columns.transpose() * columns, columns.transpose() * columns,
+                   columns.transpose() * residual());
   auto rows = std::make_shared<SignatureRows>(*rows_);
   rows->columns.conservativeResize(Eigen::NoChange, at + count);
   rows->shift.conservativeResize(Eigen::NoChange, at + count);
   rows->columns.rightCols(count) = columns;
   rows->shift.rightCols(count) = shift;
   rows_ = std::move(rows);
-  marginalise(walks_);
   return static_cast<int>(at);
 }
 

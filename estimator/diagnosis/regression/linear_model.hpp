@@ -21,11 +21,10 @@ struct OperatingPoint {
 OperatingPoint settle(const RecordingContext& context, const OperatingPoint& from, const Hypothesis& hypothesis);
 
 // The one place that makes normal equations of a recording, and the only one that numbers columns. What was taken out of the
-// increments counts as still in them, with the constants it was taken out with; random walks are marginalised.
+// increments counts as still in them, with the constants it was taken out with.
 class LinearModel {
  public:
-  // Columns: those of `alternatives`, those of terms that are not among them, then with `map` those of where a bias may be off
-  // (at any rate where there are walks).
+  // Columns: those of `alternatives`, those of terms that are not among them, then with `map` those of where a bias may be off.
   static LinearModel about(const RecordingContext& context, const OperatingPoint& point, const Hypothesis& hypothesis,
                            const std::vector<Variant>& alternatives, bool map);
 
@@ -39,17 +38,16 @@ class LinearModel {
   int first_map_column() const { return first_map_column_; }
   const SignatureRows& rows() const { return *rows_; }
   const Evidence& evidence() const { return evidence_; }
-  const Evidence& evidence_without_walks() const { return plain_; }
 
   // Given the hypothesis.
   GroupTest test(const Candidate& alternative) const;
   // `h` with the amplitudes of the greatest likelihood.
   Hypothesis fitted(Hypothesis h) const;
-  // Of the recording with the terms at their best sizes, walks marginalised.
+  // Of the recording with the terms at their best sizes.
   double log_likelihood() const;
   // Of the recording with what was taken out.
   Eigen::VectorXd residual() const;
-  // The same less columns `fitted` at their best sizes, `known` ones at theirs, and the walks' own estimate.
+  // The same less columns `fitted` at their best sizes, `known` ones at theirs.
   Eigen::VectorXd residual_after(const std::vector<int>& fitted, const std::vector<int>& known = {},
                                  const Eigen::VectorXd& known_size = {}) const;
   // Estimate of the 24 with these sizes of `columns`: truth = estimate + shift * (size - what was taken out).
@@ -57,14 +55,10 @@ class LinearModel {
   // Of the 24, given the columns' sizes.
   ParameterMatrix covariance() const;
 
-  // These walks, and no others.
-  void marginalise(std::vector<RandomWalk> walks);
   // Further columns [rows x n] and what they shift the 24 by [24 x n]. Returns where they begin.
   int append(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& shift);
 
  private:
-  std::vector<int> columns_of_walk(const RandomWalk& walk) const;
-
   std::vector<Variant> variants_;  // with columns: alternatives, other terms
   std::vector<Candidate> candidates_, alternatives_, terms_;
   std::vector<LocatedColumn> map_;
@@ -73,8 +67,7 @@ class LinearModel {
   std::shared_ptr<const SignatureRows> rows_;
   std::vector<int> taken_out_;  // columns, and how much of them
   Eigen::VectorXd taken_out_size_;
-  std::vector<RandomWalk> walks_;
-  Evidence plain_, evidence_;
+  Evidence evidence_;
 };
 
 }  // namespace selfcal::diagnosis

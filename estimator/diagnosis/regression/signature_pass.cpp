@@ -88,7 +88,8 @@ class RowWriter : public PassObserver {
         candidates_(candidates),
         start_s_(start_s),
         rows_(rows),
-        dynamic_(StateLayout::navigation_count + input.noise.observation.state_count()),
+        transition_(input.noise.observation, input.noise.biases, input.interval_s),
+        dynamic_(transition_.count()),
         s_(Eigen::MatrixXd::Zero(dynamic_ + sensor_parameter_count, signatures.count())),
         at_epoch_(Eigen::Matrix3Xd::Zero(3, signatures.count())) {
     const double most = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s + 2.0;
@@ -96,15 +97,11 @@ class RowWriter : public PassObserver {
     rows.residual.resize(rows.columns.rows());
     displace(0.0);
     s_.topRows<3>() = -at_epoch_;  // where the pass begins the position was observed too
-    Phi_ = Eigen::MatrixXd::Zero(dynamic_, dynamic_);
-    Phi_.bottomRightCorner(dynamic_ - StateLayout::navigation_count, dynamic_ - StateLayout::navigation_count) =
-        input.noise.observation.transition(input.interval_s);
   }
 
   void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override {
     navigator_.next(own_);
-    Phi_.topLeftCorner<9, 9>() = own_.Phi;
-    Eigen::MatrixXd next = Phi_ * s_.topRows(dynamic_);
+    Eigen::MatrixXd next = transition_.over(own_) * s_.topRows(dynamic_);
     next.topRows<9>().noalias() +=
         own_.Gamma.leftCols<sensor_parameter_count>() * s_.bottomRows<sensor_parameter_count>();
     next.topRows<9>() += own_.Gamma.rightCols(s_.cols());
@@ -153,8 +150,9 @@ class RowWriter : public PassObserver {
   double start_s_;
   SignatureRows& rows_;
   Interval own_;
+  DynamicTransition transition_;
   int dynamic_;
-  Eigen::MatrixXd s_, Phi_;
+  Eigen::MatrixXd s_;
   Eigen::Matrix3Xd at_epoch_;
   double middle_s_ = 0.0;
   Eigen::Index row_ = 0;
@@ -226,14 +224,6 @@ void compare_with(const Eigen::VectorXd& reference, SignatureRows& rows) {
   rows.pass.log_likelihood += 0.5 * (own_square - rows.residual.squaredNorm());
 }
 
-void without_colour(const InnovationColour& colour, SignatureRows& rows) {
-  const double square = rows.residual.squaredNorm();
-  whiten(colour, rows.residual);
-  whiten(colour, rows.columns);
-  rows.pass.log_likelihood +=
-      0.5 * (square - rows.residual.squaredNorm()) + log_determinant(colour, rows.residual.size());
-}
-
 }  // namespace
 
 double map_unit(int axis) { return axis < 3 ? 0.01 * units::degree_per_hour : 10.0 * units::micro_g; }
@@ -286,7 +276,8 @@ SignatureRows SignaturePass::run(const PassInput& input) {
   if (context_->reference()) {
     compare_with(context_->reference()(input.noise), rows);
   }
-  without_colour(context_->colour(), rows);
+  rows.pass.log_likelihood += whitened_gain(context_->colour(), rows.residual);
+  whiten(context_->colour(), rows.columns);
   return rows;
 }
 

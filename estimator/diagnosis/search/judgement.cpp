@@ -29,14 +29,14 @@ bool structure_good(const Structure& left, const Rules& rules) {
          left.log_p_elsewhere > std::log(rules.budget.structure * rules.alpha);
 }
 
-// What is named, in words; walks that jump apart from it.
+// What is named, in words; processes that only jump apart from it.
 void describe_all(const SearchResult& found, const Rules& rules, Judgement& j) {
   for (const NamedTerm& term : found.named) {
     j.named.push_back(describe(term, found.rows));
     j.named.back().share = term.delta_chi2 / found.misfit;
   }
-  for (const RandomWalk& walk : found.walks) {
-    (rules.goes_on(walk) ? j.named : j.jumps).push_back(describe(walk, found.rows));
+  for (const BiasProcess& process : found.processes) {
+    (rules.goes_on(process) ? j.named : j.jumps).push_back(describe(process, found.rows));
   }
   std::stable_sort(j.named.begin(), j.named.end(),
                    [](const Finding& a, const Finding& b) { return a.log_p < b.log_p; });
@@ -86,19 +86,34 @@ Finding describe(const NamedTerm& term, double rows) {
   return f;
 }
 
-Finding describe(const RandomWalk& walk, double rows) {
+Finding describe(const BiasProcess& process, double rows) {
+  const bool gyro = process.of_gyro(), walks = process.kernel.kind == BiasKernel::Kind::random_walk;
+  const std::array<const char*, 2> ids = gyro ? std::array{"gyro_random_walk", "gyro_bias_instability"}
+                                              : std::array{"accel_random_walk", "accel_bias_instability"};
   Finding f;
-  f.effect = walk.axis < 3 ? "gyro_random_walk" : "accel_random_walk";
-  f.equation = "bias walks: variance grows with time";
+  f.effect = ids[walks ? 0 : 1];
+  f.equation = walks ? "bias walks: variance grows with time" : "bias wanders: correlation exp(-t/tau)";
   f.excited = "whole recording";
   f.experiment = "a longer recording";
-  const double unit = map_unit(walk.axis) / (walk.axis < 3 ? units::degree_per_hour : units::micro_g);
-  f.parameters.push_back({axis_letters[static_cast<std::size_t>(walk.axis)],
-                          walk.axis < 3 ? "deg/h/sqrt(h)" : "ug/sqrt(h)", walk.rate * unit, walk.sigma * unit});
-  f.log_p = log_normal_tail(std::sqrt(walk.delta_chi2));
+  const double unit = map_unit(process.axes.front()) / (gyro ? units::degree_per_hour : units::micro_g);
+  const std::string unit_name = gyro ? "deg/h" : "ug";
+  for (const int axis : process.axes) {
+    f.parameters.push_back({axis_letters[static_cast<std::size_t>(axis)], walks ? unit_name + "/sqrt(h)" : unit_name,
+                            process.size * unit, process.sigma * unit});
+  }
+  if (!walks) {
+    f.parameters.push_back({"tau_s", "s", process.kernel.correlation_s, process.correlation_sigma_s});
+  }
+  constexpr double of_the_class = 0.01;
+  if (process.probability_of_other_kind > of_the_class) {
+    f.equivalent.emplace_back(ids[walks ? 1 : 0]);
+  }
+  f.probability = {{ids[walks ? 0 : 1], 1.0 - process.probability_of_other_kind},
+                   {ids[walks ? 1 : 0], process.probability_of_other_kind}};
+  f.log_p = process.log_p();
   f.significance = sigma_from_log_p(f.log_p);
-  f.delta_bic = walk.delta_chi2 - std::log(rows);
-  f.stochastic = true;
+  f.delta_bic = process.delta_chi2 - process.coefficients() * std::log(rows);
+  f.process = f.stochastic = true;
   return f;
 }
 

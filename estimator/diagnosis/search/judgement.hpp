@@ -11,11 +11,11 @@ namespace selfcal::diagnosis {
 
 Finding describe(const Suspect& suspect);
 Finding describe(const NamedTerm& term, double rows);
-Finding describe(const RandomWalk& walk, double rows);
+Finding describe(const BiasProcess& process, double rows);
 
 // Of the false-alarm rate of a whole answer, what each kind of test may use up; together all of it.
 struct FalseAlarmBudget {
-  double names = 0.0;       // the catalogue and the walks
+  double names = 0.0;       // the catalogue and the bias processes
   double map = 0.0;         // single biases by dwell, rotation, after turns, time
   double structure = 0.0;   // biases of an axis together
   double whiteness = 0.0;   // of the innovations
@@ -42,14 +42,14 @@ struct Rules {
   bool coloured = false;       // by beats of a quantum, which are named as such and are no question of whiteness
   // Share of the misfit up to which what remains lets the names stand, though something else is there that has no name.
   double tolerable_share = 0.0;
-  // Whether a walk goes on inside the dwells. What jumps between them is nothing that the catalogue holds.
-  std::function<bool(const RandomWalk&)> goes_on;
+  // Whether a process goes on inside the dwells. What jumps between them is nothing that the catalogue holds.
+  std::function<bool(const BiasProcess&)> goes_on;
 };
 
 struct Judgement {
   Adequacy before, after;      // after.accepted: the names explain what is seen, and nothing remains
   std::vector<Finding> named;  // best first
-  std::vector<Finding> jumps;  // walks that are none
+  std::vector<Finding> jumps;  // processes that are none
   bool names_stand = false;
 };
 

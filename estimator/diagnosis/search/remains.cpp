@@ -17,12 +17,12 @@ Eigen::VectorXd sigmas(const Term& term) {
 }
 
 // Columns of the dwells and rotations of a walk's triad: what one axis's walk does not take up another's does.
-std::vector<int> columns_of_triad(const LinearModel& model, const RandomWalk& walk) {
+std::vector<int> columns_of_triad(const LinearModel& model, const BiasProcess& process) {
   std::vector<int> columns;
   for (std::size_t k = 0; k < model.map().size(); ++k) {
     const LocatedColumn& m = model.map()[k];
     const bool segment = m.kind == LocatedColumn::Kind::dwell || m.kind == LocatedColumn::Kind::rotation;
-    if (segment && m.axis / 3 == walk.axis / 3) {
+    if (segment && (m.axis < 3) == process.of_gyro()) {
       columns.push_back(model.first_map_column() + static_cast<int>(k));
     }
   }
@@ -57,8 +57,10 @@ bool any_collinear(const LinearModel& model, const Hypothesis& named) {
         return true;
       }
     }
-    for (const RandomWalk& walk : named.walks) {
-      if (stands_for(model, columns_of_triad(model, walk), terms[i], z)) {
+    for (const BiasProcess& process : named.processes) {
+      // A walk follows any slow curve. An instability is noise of the filter, beside which the term is significant or not.
+      if (process.kernel.kind == BiasKernel::Kind::random_walk &&
+          stands_for(model, columns_of_triad(model, process), terms[i], z)) {
         return true;
       }
     }
@@ -69,7 +71,7 @@ bool any_collinear(const LinearModel& model, const Hypothesis& named) {
 Structure structure_left(const Stage& stage) {
   using Kind = LocatedColumn::Kind;
   const std::vector<int> others = stage.columns();
-  const std::vector<RandomWalk>& walks = stage.hypothesis().walks;
+  const std::vector<BiasProcess>& processes = stage.hypothesis().processes;
   const Evidence& given = stage.given_forms();
   const Eigen::VectorXd size = given.fit(others).value;
   Structure found;
@@ -83,10 +85,10 @@ Structure structure_left(const Stage& stage) {
         }
       }
       const GroupTest left = test_group(given, group, others);
-      const bool walks_there =
-          std::any_of(walks.begin(), walks.end(), [&](const RandomWalk& w) { return w.axis / 3 == axis / 3; });
+      const bool processes_there = std::any_of(processes.begin(), processes.end(),
+                                               [&](const BiasProcess& p) { return p.of_gyro() == (axis < 3); });
       const bool named =
-          walks_there || (!others.empty() && square_within(given, group, others, size) >= left.delta_chi2);
+          processes_there || (!others.empty() && square_within(given, group, others, size) >= left.delta_chi2);
       double& smallest = named ? found.log_p_named : found.log_p_elsewhere;
       smallest = std::min(smallest, left.log_p);
       ++tests;
@@ -173,7 +175,7 @@ ByQuantity locate_by_quantities(const RecordingContext& context, const Stage& st
   }
   const LinearModel model = LinearModel::about(context, stage.point, stage.hypothesis(), bins, false);
   const double mean_c = context.mean_temperature();
-  return {locate_by_quantity(model.evidence_without_walks(), model.alternatives(), {}, mean_c),
+  return {locate_by_quantity(model.evidence(), model.alternatives(), {}, mean_c),
           locate_by_quantity(model.evidence(), model.alternatives(), columns_of(model.terms()), mean_c)};
 }
 

@@ -7,6 +7,7 @@
 #include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/regression/multiplicity.hpp"
 #include "estimator/diagnosis/search/averaging.hpp"
+#include "estimator/diagnosis/search/bias_noise.hpp"
 #include "estimator/diagnosis/search/steps.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
@@ -15,7 +16,7 @@ namespace {
 
 constexpr std::size_t most_effects = 6;
 constexpr int most_exchanges = 3;
-constexpr double walk_axes = 6.0;
+constexpr double processes_tested = 8.0;  // six axes, two triads
 const double line_log_p = std::log(1e-4);
 
 bool of_spectrum(const Effect& effect) { return effect.constant.kind == EffectConstant::Kind::spectrum; }
@@ -61,11 +62,11 @@ Stage first_stage(const RecordingContext& context, const PassInput& input) {
   return stage;
 }
 
-// The catalogue's tests on this recording (multiplicity.hpp) and the walks of six axes, each at the edge of its range.
+// The catalogue's tests on this recording (multiplicity.hpp) and the bias processes: of each a walk, at the edge of its range, and an instability.
 Significance significance_on(const Stage& first, double log_threshold) {
   const double of_effects =
       effective_tests(first.model.evidence(), first.model.alternatives(), std::exp(log_threshold));
-  return {log_threshold, of_effects + 0.5 * walk_axes, first.model.evidence().rows};
+  return {log_threshold, of_effects + 1.5 * processes_tested, first.model.evidence().rows};
 }
 
 // Replaces the stage where the step was taken.
@@ -89,7 +90,8 @@ Stage course(const SearchGround& ground, Stage s, const SearchOptions& options) 
     while (taken(s, drop_weak(ground, s))) {
     }
   }
-  while (goes_on() && taken(s, drop_weak_walk(ground, s))) {
+  taken(s, refit_processes(ground, s));
+  while (goes_on() && taken(s, drop_weak_process(ground, s))) {
   }
   taken(s, sharpen_observation(ground, s));
   // Under noise that no longer holds them the names are tested again; where one falls the noise is fitted without it.
@@ -213,6 +215,9 @@ void report_parameters(const Stage& stage, const Hypothesis& reported, const Ave
   result.value_as_named = stage.model.parameters(columns, amplitudes);
   result.value = stage.model.parameters() + averages.shift;
   result.covariance = stage.model.covariance() + averages.shift_covariance + covariance_of_closed_forms(stage);
+  const KindAverage kinds = average_kinds(stage);
+  result.value += kinds.shift;
+  result.covariance += kinds.covariance;
   if (!forms.empty()) {
     const Eigen::MatrixXd S = shift(Eigen::all, forms.columns);
     result.value += S * forms.mean;
@@ -246,7 +251,7 @@ SearchResult search(const RecordingContext& context, const PassInput& input, con
   const Hypothesis reported = averaged(stage.hypothesis(), averages);
   result.log_p_lack_of_fit = log_p_of_lack_of_fit(context, stage, with, reported);
   result.named = named_terms(context, stage, reported, averages, ground.significance);
-  result.walks = reported.walks;
+  result.processes = reported.processes;
   result.noise = reported.noise;
   result.rows = stage.model.evidence().rows;
   result.log_p_limit = options.log_threshold - std::log(ground.significance.independent_tests);

@@ -50,7 +50,7 @@ struct OpenForm {
 
 struct SearchResult {
   std::vector<NamedTerm> named;  // most significant first, amplitudes averaged
-  std::vector<RandomWalk> walks;
+  std::vector<BiasProcess> processes;
   NoiseModel noise;  // as filtered, beside what is named
   double rows = 0.0;
   double log_p_limit =
@@ -70,7 +70,7 @@ struct SearchResult {
   ParameterMatrix covariance = ParameterMatrix::Zero();
   Stage stage;  // where the search ended
 
-  bool empty() const { return named.empty() && walks.empty(); }
+  bool empty() const { return named.empty() && processes.empty(); }
 };
 
 // `input`: forward pass about the calibrated recording.

@@ -39,9 +39,9 @@ double Significance::corrected(double log_p, const Effect& effect) const {
 double Significance::corrected(double log_p) const { return log_corrected(log_p, independent_tests); }
 
 std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
-                                      const std::vector<Candidate>& alternatives, const std::vector<RandomWalk>& walks,
-                                      const Significance& significance,
-                                      const std::function<bool(const RandomWalk&)>& goes_on,
+                                      const std::vector<Candidate>& alternatives,
+                                      const std::vector<BiasProcess>& processes, const Significance& significance,
+                                      const std::function<bool(const BiasProcess&)>& goes_on,
                                       const std::function<bool(const Candidate&, const GroupTest&)>& immaterial) {
   double best_equation = 0.0, best_walk = 0.0, detected = 0.0;  // name by the former, presence by the last
   const Candidate* equation = nullptr;
@@ -57,25 +57,25 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
       equation = &c;
     }
   }
-  // A walk has one coefficient, at the edge of its range (half a chi-squared).
-  const RandomWalk* walk = nullptr;
-  for (const RandomWalk& test : walks) {
-    const double log_p = log_chi_squared_tail(test.delta_chi2, 1.0);
+  // A walk has one coefficient, at the edge of its range (half a chi-squared), an instability its correlation time besides.
+  const BiasProcess* process = nullptr;
+  for (const BiasProcess& test : processes) {
+    const double log_p = test.log_p();
     detected = std::min(detected, significance.corrected(log_p));
     if (log_p < std::min(best_walk, best_equation)) {
       best_walk = log_p;
-      walk = &test;
+      process = &test;
     }
   }
-  if (!significance.holds(detected) || (walk == nullptr && equation == nullptr)) {
+  if (!significance.holds(detected) || (process == nullptr && equation == nullptr)) {
     return std::nullopt;
   }
-  if (walk != nullptr && equation != nullptr &&
-      best_equation < (goes_on(*walk) ? equation_share : jump_share) * best_walk) {
-    walk = nullptr;
+  if (process != nullptr && equation != nullptr &&
+      best_equation < (goes_on(*process) ? equation_share : jump_share) * best_walk) {
+    process = nullptr;
   }
-  if (walk != nullptr) {
-    return Addition{{}, *walk};
+  if (process != nullptr) {
+    return Addition{{}, *process};
   }
   return Addition{*equation, {}};
 }

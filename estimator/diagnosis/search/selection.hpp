@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/diagnosis/regression/evidence.hpp"
+#include "estimator/diagnosis/regression/bias_process.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -24,7 +24,7 @@ struct Significance {
 // One of both.
 struct Addition {
   std::optional<Candidate> term;
-  std::optional<RandomWalk> walk;
+  std::optional<BiasProcess> process;
 };
 
 // What explains most beside what is fitted: among `alternatives`, best by the p of its whole group, and `walks`, tested on the
@@ -32,9 +32,9 @@ struct Addition {
 // equation by far, and by further where it does not go on inside the dwells (`goes_on`, asked when it matters).
 // What is `immaterial` though significant is passed over.
 std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
-                                      const std::vector<Candidate>& alternatives, const std::vector<RandomWalk>& walks,
-                                      const Significance& significance,
-                                      const std::function<bool(const RandomWalk&)>& goes_on,
+                                      const std::vector<Candidate>& alternatives,
+                                      const std::vector<BiasProcess>& processes, const Significance& significance,
+                                      const std::function<bool(const BiasProcess&)>& goes_on,
                                       const std::function<bool(const Candidate&, const GroupTest&)>& immaterial = {});
 
 // The first term that is no longer significant given the others.

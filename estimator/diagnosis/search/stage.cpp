@@ -41,11 +41,4 @@ Stage settled(const RecordingContext& context, const Stage& from, Selection sele
   }
 }
 
-Stage with_walks(const RecordingContext& context, Stage stage, std::vector<RandomWalk> walks) {
-  stage.model.marginalise(walks);
-  stage.selection.hypothesis.walks = std::move(walks);
-  stage.selection.hypothesis = stage.model.fitted(std::move(stage.selection.hypothesis));
-  return with_forms(context, std::move(stage));
-}
-
 }  // namespace selfcal::diagnosis

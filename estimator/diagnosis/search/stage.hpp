@@ -45,9 +45,6 @@ Stage linearised(const RecordingContext& context, const OperatingPoint& point, S
 // trajectory, until the amplitudes stand still. All terms have columns in `from`.
 Stage settled(const RecordingContext& context, const Stage& from, Selection selection);
 
-// With these walks marginalised and no others, at the same point.
-Stage with_walks(const RecordingContext& context, Stage stage, std::vector<RandomWalk> walks);
-
 // `evidence` with the open forms marginalised.
 Evidence given_forms(const Evidence& evidence, const OpenForms& open);
 

@@ -1,16 +1,19 @@
 #include "estimator/diagnosis/search/steps.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
+#include "estimator/diagnosis/noise/process_check.hpp"
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
-#include "estimator/diagnosis/noise/walk_check.hpp"
+#include "estimator/diagnosis/search/bias_noise.hpp"
 #include "estimator/diagnosis/search/constants.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr int walk_axes = 6;
+// Sensors of one kind are alike: what each axis may do alone, a triad may do with one size.
+const std::array<std::vector<int>, 8> process_axes = {{{0}, {1}, {2}, {3}, {4}, {5}, {0, 1, 2}, {3, 4, 5}}};
 
 // Square of what an equation leaves that is right to 3 % of its amplitude, over its own.
 constexpr double form_square = 1e-3;
@@ -30,9 +33,9 @@ double largest_square(const Stage& stage, Counts counts) {
 }
 
 // A bias that wanders by less than what the named effect's form may be off by.
-bool within_form(const Stage& stage, const RandomWalk& walk) {
-  const bool of_gyro = walk.axis < 3;
-  return walk.delta_chi2 <
+bool within_form(const Stage& stage, const BiasProcess& process) {
+  const bool of_gyro = process.of_gyro();
+  return process.delta_chi2 <
          form_square * largest_square(
                            stage, [&](const Effect& effect) { return (effect.triad == Triad::gyro) == of_gyro; });
 }
@@ -80,25 +83,40 @@ Term term_of(const Variant& variant) {
   return term;
 }
 
-std::vector<RandomWalk> walks_to_test(const Stage& stage) {
-  const std::vector<RandomWalk>& named = stage.hypothesis().walks;
-  std::vector<RandomWalk> walks;
-  for (int axis = 0; axis < walk_axes; ++axis) {
-    if (std::none_of(named.begin(), named.end(), [&](const RandomWalk& w) { return w.axis == axis; })) {
-      walks.push_back(
-          test_walk(stage.given_forms(), stage.model.map(), stage.model.first_map_column(), axis, stage.columns()));
+std::vector<BiasProcess> processes_to_test(const Stage& stage) {
+  const std::vector<BiasProcess>& named = stage.hypothesis().processes;
+  std::vector<BiasProcess> processes;
+  const auto taken = [&](int axis) {
+    return std::any_of(named.begin(), named.end(), [&](const BiasProcess& p) {
+      return std::find(p.axes.begin(), p.axes.end(), axis) != p.axes.end();
+    });
+  };
+  for (const std::vector<int>& axes : process_axes) {
+    if (std::none_of(axes.begin(), axes.end(), taken)) {
+      processes.push_back(test_bias_process(stage.given_forms(), stage.model.map(), stage.model.first_map_column(),
+                                            axes, stage.columns()));
     }
   }
-  std::erase_if(walks, [&](const RandomWalk& w) { return within_form(stage, w); });
-  return walks;
+  std::erase_if(processes, [&](const BiasProcess& w) { return within_form(stage, w); });
+  return processes;
 }
 
-// Of the recording, corrected as it is, with the amplitudes of what is named fitted under this noise.
-double log_likelihood(const SearchGround& ground, const Stage& stage, const NoiseModel& noise) {
-  Hypothesis h = stage.hypothesis();
-  h.noise = noise;
-  return h.empty() ? run_pass(stage.point.pass(noise)).log_likelihood
-                   : LinearModel::about(ground.context, stage.point, h, {}, false).log_likelihood();
+// A strong one of the accelerometers bends the attitude, and the columns of the gyros' biases take it up: the best of either
+// triad, for the filter to decide.
+std::vector<BiasProcess> best_of_triads(const SearchGround& ground, const BiasProcess& best,
+                                        const std::vector<BiasProcess>& all) {
+  std::vector<BiasProcess> chosen = {best};
+  const BiasProcess* other = nullptr;
+  for (const BiasProcess& p : all) {
+    if (p.of_gyro() != best.of_gyro() && ground.significance.holds(ground.significance.corrected(p.log_p())) &&
+        (other == nullptr || p.log_p() < other->log_p())) {
+      other = &p;
+    }
+  }
+  if (other != nullptr) {
+    chosen.push_back(*other);
+  }
+  return chosen;
 }
 
 Stage with_noise(const SearchGround& ground, const Stage& stage, const NoiseModel& noise) {
@@ -109,6 +127,15 @@ Stage with_noise(const SearchGround& ground, const Stage& stage, const NoiseMode
 
 }  // namespace
 
+double log_likelihood(const SearchGround& ground, const Stage& stage, const NoiseModel& noise) {
+  Hypothesis h = stage.hypothesis();
+  h.noise = noise;
+  if (h.terms.empty() && is_white(ground.context.colour()) && !ground.context.reference()) {
+    return run_pass(stage.point.pass(noise)).log_likelihood;
+  }
+  return LinearModel::about(ground.context, stage.point, h, {}, false).log_likelihood();
+}
+
 std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
   std::vector<Candidate> alternatives;
   for (std::size_t k = 0; k < stage.model.alternatives().size(); ++k) {
@@ -116,8 +143,8 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
       alternatives.push_back(stage.model.alternatives()[k]);
     }
   }
-  const auto goes_on = [&](const RandomWalk& walk) {
-    return walks_inside_dwells(ground.context.data(), stage.hypothesis().noise, walk);
+  const auto goes_on = [&](const BiasProcess& process) {
+    return goes_on_inside_dwells(ground.context.data(), stage.hypothesis().noise, process);
   };
   // The p-values of coloured noise rest on a spectrum that was estimated from the same recording: a name must be worth its
   // coefficients by BIC too.
@@ -125,15 +152,14 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
   const auto says_nothing = [&](const Candidate& c, const GroupTest& test) {
     return immaterial(stage, c, test) || (coloured && test.delta_chi2 < test.rank * std::log(ground.significance.rows));
   };
-  const auto found = best_addition(stage.given_forms(), stage.columns(), alternatives, walks_to_test(stage),
-                                   ground.significance, goes_on, says_nothing);
+  const std::vector<BiasProcess> processes = processes_to_test(stage);
+  const auto found = best_addition(stage.given_forms(), stage.columns(), alternatives, processes, ground.significance,
+                                   goes_on, says_nothing);
   if (!found) {
     return std::nullopt;
   }
-  if (found->walk) {
-    std::vector<RandomWalk> walks = stage.hypothesis().walks;
-    walks.push_back(*found->walk);
-    return with_walks(ground.context, stage, std::move(walks));
+  if (found->process) {
+    return with_process(ground, stage, best_of_triads(ground, *found->process, processes));
   }
   Selection selection = stage.selection;
   selection.hypothesis.terms.push_back(term_of(variant_of(stage, *found->term)));
@@ -163,16 +189,13 @@ std::optional<Stage> exchange(const SearchGround& ground, const Stage& stage) {
   return settled(ground.context, stage, std::move(selection));
 }
 
-std::optional<Stage> drop_weak_walk(const SearchGround& ground, const Stage& stage) {
-  const std::vector<RandomWalk>& walks = stage.hypothesis().walks;
-  for (std::size_t i = 0; i < walks.size(); ++i) {
-    std::vector<RandomWalk> others = walks;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const Stage without = with_walks(ground.context, stage, std::move(others));
-    const RandomWalk left = test_walk(without.given_forms(), without.model.map(), without.model.first_map_column(),
-                                      walks[i].axis, without.columns());
-    if (!ground.significance.holds(ground.significance.corrected(log_chi_squared_tail(left.delta_chi2, 1.0)))) {
-      // The constants were found beside the walk.
+std::optional<Stage> drop_weak_process(const SearchGround& ground, const Stage& stage) {
+  const std::vector<BiasProcess>& all = stage.hypothesis().processes;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double left = log_chi_squared_tail(std::max(0.0, gain_of_process(ground, stage, i)), all[i].coefficients());
+    if (!ground.significance.holds(ground.significance.corrected(left))) {
+      const Stage without = without_process(ground, stage, i);
+      // The constants were found beside it.
       const Selection selection = with_constants_followed(ground.context, without, without.selection, false);
       return settled(ground.context, linearised(ground.context, without.point, selection), selection);
     }

@@ -14,7 +14,7 @@ const Effect a = one_coefficient("a");
 constexpr double alpha = 0.005;
 
 Rules rules_of_one(bool goes_on = true) {
-  return {.budget = budget_of_one, .alpha = alpha, .goes_on = [goes_on](const RandomWalk&) { return goes_on; }};
+  return {.budget = budget_of_one, .alpha = alpha, .goes_on = [goes_on](const BiasProcess&) { return goes_on; }};
 }
 
 // 3000 rows of unit noise, a map of 100 places.
@@ -46,10 +46,10 @@ SearchResult one_named() {
 
 SearchResult with_walk() {
   SearchResult r = clean();
-  RandomWalk walk;
-  walk.axis = 3;
-  walk.delta_chi2 = 100.0;
-  r.walks = {walk};
+  BiasProcess process;
+  process.axes = {3};
+  process.delta_chi2 = 100.0;
+  r.processes = {process};
   return r;
 }
 
@@ -142,9 +142,9 @@ TEST(Verdict, RefusesNamesThatAreACurveOrLeaveTheirLikeness) {
 }
 
 TEST(Verdict, RefusesAWalkThatJumps) {
-  const Judgement walks = judge(with_walk(), rules_of_one());
-  EXPECT_TRUE(walks.after.accepted);
-  EXPECT_EQ(walks.named.size(), 1U);
+  const Judgement processes = judge(with_walk(), rules_of_one());
+  EXPECT_TRUE(processes.after.accepted);
+  EXPECT_EQ(processes.named.size(), 1U);
   const Judgement jumps = judge(with_walk(), rules_of_one(false));
   EXPECT_FALSE(jumps.after.accepted);
   EXPECT_EQ(jumps.jumps.size(), 1U);

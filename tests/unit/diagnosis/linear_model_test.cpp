@@ -39,9 +39,8 @@ class CreepingRecording : public testing::Test {
     creeping_ = CorrectedRecording(RecordingContext(ideal_.data()), input_, added);
   }
 
-  LinearModel about(const RecordingContext& context, const OperatingPoint& point,
-                    const std::vector<RandomWalk>& walks = {}, double constant = tau_s) const {
-    return LinearModel::about(context, point, {{}, walks, input_.noise}, {{&creep(), constant, constant}}, true);
+  LinearModel about(const RecordingContext& context, const OperatingPoint& point, double constant = tau_s) const {
+    return LinearModel::about(context, point, {{}, {}, input_.noise}, {{&creep(), constant, constant}}, true);
   }
 
   IdealRecording ideal_;
@@ -81,28 +80,9 @@ TEST_F(CreepingRecording, TakenOutOfTheIncrementsStaysInTheEquations) {
   EXPECT_NEAR((model.rows().residual - own).norm() / all.norm(), 0.5, linear_to);
   EXPECT_NEAR((model.residual() - own).norm() / all.norm(), 1.0, linear_to);
   // Another constant's column is another column: what was taken out keeps its own.
-  const LinearModel beside = about(context, settled, {}, 2.0 * tau_s);
+  const LinearModel beside = about(context, settled, 2.0 * tau_s);
   EXPECT_EQ(beside.alternatives().size(), 1U);
   EXPECT_NEAR(beside.residual().norm(), model.residual().norm(), linear_to * model.residual().norm());
-}
-
-// Marginalised in the model as by hand.
-TEST_F(CreepingRecording, WalksAreMarginalised) {
-  const RecordingContext context(creeping_.data());
-  const OperatingPoint point{input_, CorrectedRecording(creeping_.data())};
-  const LinearModel without = about(context, point);
-  const RandomWalk walk = test_walk(without.evidence(), without.map(), without.first_map_column(), 5, {});
-  ASSERT_GT(walk.delta_chi2, 0.0);
-  Evidence by_hand = without.evidence();
-  std::vector<int> columns = walk.places;
-  for (int& column : columns) {
-    column += without.first_map_column();
-  }
-  by_hand.marginalise(columns, walk.covariance);
-  const LinearModel with = about(context, point, {walk});
-  EXPECT_NEAR(with.evidence().square, by_hand.square, 1e-9 * without.evidence().square);
-  EXPECT_LT(with.evidence().information(2, 2), without.evidence().information(2, 2));
-  EXPECT_NEAR(with.evidence_without_walks().square, without.evidence().square, 1e-9 * without.evidence().square);
 }
 
 // A value: a copy outlives what it was made from.

@@ -15,7 +15,7 @@ const Candidate column_a{&a, NAN, 0, 1}, column_b{&b, NAN, 1, 1}, column_c{&c, N
 const std::vector<Candidate> all = {column_a, column_b, column_c};
 constexpr double length = 10.0;
 
-bool never(const RandomWalk& /*walk*/) {
+bool never(const BiasProcess& /*process*/) {
   ADD_FAILURE() << "asked where nothing hangs on it";
   return false;
 }
@@ -62,18 +62,18 @@ TEST(BestAddition, OfASpectrumIsCorrectedForItsFrequencies) {
 // (0.85) and against jumps (0.6).
 TEST(BestAddition, IsAnEquationBeforeAWalkThatJumpsButNotBeforeOneThatWalks) {
   const Evidence e = evidence_of(length * Eigen::Matrix3d::Identity(), std::sqrt(50.0) * Eigen::Vector3d::UnitX());
-  RandomWalk walk;
-  walk.axis = 3;
-  walk.delta_chi2 = 70.0;
+  BiasProcess process;
+  process.axes = {3};
+  process.delta_chi2 = 70.0;
   const double share = log_chi_squared_tail(50.0, 1.0) / log_chi_squared_tail(70.0, 1.0);
   ASSERT_GT(share, 0.6);
   ASSERT_LT(share, 0.85);
-  for (const bool walks : {true, false}) {
-    const auto goes_on = [&](const RandomWalk&) { return walks; };
-    const auto found = best_addition(e, {}, all, {walk}, with_threshold(-10.0), goes_on);
+  for (const bool processes : {true, false}) {
+    const auto goes_on = [&](const BiasProcess&) { return processes; };
+    const auto found = best_addition(e, {}, all, {process}, with_threshold(-10.0), goes_on);
     ASSERT_TRUE(found);
-    EXPECT_EQ(found->walk.has_value(), walks);
-    EXPECT_EQ(found->term.has_value(), !walks);
+    EXPECT_EQ(found->process.has_value(), processes);
+    EXPECT_EQ(found->term.has_value(), !processes);
   }
 }
 
@@ -127,16 +127,16 @@ TEST(WalkAgainstRamp, EachIsTakenForWhatItIs) {
   const Dwells dwells;
   const auto decide = [&](const Eigen::VectorXd& biases) {
     const Evidence e = dwells.of(biases);
-    return best_addition(e, {}, {column_a}, {test_walk(e, dwells.map, 1, 3, {})}, with_threshold(-10.0),
-                         [](const RandomWalk&) { return true; });
+    return best_addition(e, {}, {column_a}, {test_bias_process(e, dwells.map, 1, {3}, {})}, with_threshold(-10.0),
+                         [](const BiasProcess&) { return true; });
   };
   const auto ramp = decide(dwells.time_h);
   ASSERT_TRUE(ramp);
-  EXPECT_TRUE(ramp->term && !ramp->walk);
+  EXPECT_TRUE(ramp->term && !ramp->process);
   const Eigen::Vector4d zigzag(1.0, -1.0, -1.0, 1.0);
-  const auto walk = decide(zigzag.replicate<3, 1>());
-  ASSERT_TRUE(walk);
-  EXPECT_TRUE(walk->walk && !walk->term);
+  const auto process = decide(zigzag.replicate<3, 1>());
+  ASSERT_TRUE(process);
+  EXPECT_TRUE(process->process && !process->term);
 }
 
 // Biases that are free by c^2 each leave the ramp 1/(1 + c^2 length^2) of its information, and as much of its score.

@@ -1,0 +1,46 @@
+#include "estimator/passes/dynamic_transition.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "estimator/filter/state_layout.hpp"
+
+namespace selfcal {
+
+double BiasNoise::drive_variance(double length_s) const {
+  return rate * rate * length_s - sigma * sigma * std::expm1(-2.0 * length_s / correlation_s);
+}
+
+DynamicTransition::DynamicTransition(const ObservationModel& observation, std::vector<BiasNoise> biases,
+                                     double interval_s)
+    : biases_(std::move(biases)) {
+  const int motion = observation.state_count(), at = StateLayout::navigation_count;
+  const int n = at + motion + static_cast<int>(biases_.size());
+  Phi_ = Eigen::MatrixXd::Zero(n, n);
+  Phi_.block(at, at, motion, motion) = observation.transition(interval_s);
+}
+
+const Eigen::MatrixXd& DynamicTransition::over(const Interval& interval) {
+  Phi_.topLeftCorner<StateLayout::navigation_count, StateLayout::navigation_count>() = interval.Phi;
+  for (int k = 0; k < static_cast<int>(biases_.size()); ++k) {
+    const BiasNoise& bias = biases_[static_cast<std::size_t>(k)];
+    const int at = first_bias() + k;
+    Phi_(at, at) = std::exp(-interval.length_s / bias.correlation_s);
+    Phi_.col(at).head<StateLayout::navigation_count>() =
+        0.5 * (1.0 + Phi_(at, at)) * interval.Gamma.col(bias.parameter);
+  }
+  return Phi_;
+}
+
+Eigen::MatrixXd DynamicTransition::drive(const Interval& interval) const {
+  const auto n = static_cast<Eigen::Index>(biases_.size());
+  Eigen::MatrixXd drive = Eigen::MatrixXd::Zero(count(), n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    drive.col(k).head<StateLayout::navigation_count>() =
+        0.5 * interval.Gamma.col(biases_[static_cast<std::size_t>(k)].parameter);
+    drive(first_bias() + k, k) = 1.0;
+  }
+  return drive;
+}
+
+}  // namespace selfcal
