@@ -46,6 +46,10 @@ void tell_lost(const Profile& p, std::vector<std::string>& lost) {
   }
   lost.emplace_back("page: where the samples stand, for a page comes in several blocks");
   lost.push_back(axes_words(p.raw));
+  if (p.set_form != profile::SetForm::errors) {
+    lost.push_back(fmt::format("coefficients: the 24 are those of the {}, not of the errors",
+                               profile::set_forms[static_cast<std::size_t>(p.set_form)]));
+  }
   lost.emplace_back(p.slots ? "coefficients: the order erase, write, commit, restart, and what each may take"
                             : "coefficients: there is one set, used from the next power-on on");
 }

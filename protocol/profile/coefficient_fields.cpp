@@ -73,6 +73,19 @@ std::optional<Span> span_of(std::string_view field) {
   return std::nullopt;
 }
 
+Factor factor_of(std::string_view field) {
+  const auto span = span_of(field);
+  if (!span || field == "values") {
+    return Factor::none;
+  }
+  if (span->first >= parameter::accel_scale_neg && span->first < parameter::accel_misalignment) {
+    return Factor::negative_slope;
+  }
+  const bool accel = span->first >= plus && span->first < parameter::accel_scale_neg;
+  const bool gyro = span->first >= parameter::gyro_scale && span->first < parameter::gyro_misalignment;
+  return accel || gyro ? Factor::slope : Factor::none;
+}
+
 std::vector<std::string> coefficient_complaints(const Layout& layout) {
   std::array<std::vector<std::string>, ins::coefficient_count> named;
   for (const Field& field : layout.fields) {

@@ -24,6 +24,10 @@ struct Span {
   std::size_t first = 0, count = 0;
   bool one_factor = false;
 };
+// Scale factors: such a field may tell its nominal value times 1 + it, and of K- times 1 - it, the slope.
+enum class Factor : std::uint8_t { none, slope, negative_slope };
+Factor factor_of(std::string_view field);
+
 std::optional<Span> span_of(std::string_view field);
 
 }  // namespace selfcal::profile

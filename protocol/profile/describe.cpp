@@ -23,6 +23,10 @@ std::string meaning(const Field& field, const RecordRole& role) {
   }
   const auto known = std::ranges::find(role.fields, field.name, &RoleField::name);
   std::string words(known == role.fields.end() ? "" : known->meaning);
+  if (field.nominal != 0.0) {
+    const char sign = factor_of(field.name) == Factor::negative_slope ? '-' : '+';
+    words += fmt::format("; told as {:.10g} (1 {} it)", field.nominal, sign);
+  }
   if (!field.codes.empty()) {
     std::vector<std::string> codes;
     for (const auto& [ours, theirs] : field.codes) {
@@ -42,6 +46,9 @@ std::string scale_text(const Field& field, const RecordRole& role) {
   const Unit* own = find_unit(field.unit.empty() ? known->unit : field.unit);
   const Unit* wanted = find_unit(known->unit);
   const double factor = field.unit.empty() || own == wanted ? 1.0 : own->si / wanted->si;
+  if (field.nominal != 0.0) {
+    return fmt::format("{:.10g}", std::abs(field.scale * field.nominal));
+  }
   std::string words = fmt::format("{:.10g}{}{}", field.scale / factor, own->name.empty() ? "" : " ", own->name);
   if (field.offset != 0.0) {
     words += fmt::format(", plus {:.10g}", field.offset / factor);
@@ -111,6 +118,28 @@ std::string address_words(const Bus& bus) {
       "all. All else stands one byte later, and a frame has room for one byte less. Frames with another address are "
       "not meant.",
       *bus.request_byte, *bus.response_byte, *bus.functional_byte);
+}
+
+// What the 24 mean, with f and w the truth and fs and ws what the sensors say.
+std::string form_words(SetForm form) {
+  switch (form) {
+    case SetForm::correction:
+      return "The 24 are what the INS corrects with. With u = fs - bias: f = u + K+ max(u, 0) + K- max(-u, 0) per "
+             "axis, "
+             "then f_y += A_yx u_x, f_z += A_zx u_x + A_zy u_y. With v = ws - drift: w = v + K_G v per axis, then w_x "
+             "+= "
+             "G_xy v_y + G_xz v_z and so on. fs and ws are what the sensors say, f and w the truth.";
+    case SetForm::correction_first:
+      return "The 24 are what the INS corrects with, the bias last: f = fs + K+ max(fs, 0) + K- max(-fs, 0) - bias per "
+             "axis, then f_y += A_yx fs_x, f_z += A_zx fs_x + A_zy fs_y; w = ws + K_G ws - drift per axis, then w_x += "
+             "G_xy ws_y + G_xz ws_z and so on. fs and ws are what the sensors say, f and w the truth.";
+    default:
+      return "The 24 are the errors of the sensors. Sensor output = truth + error: df = bias + K+ max(f, 0) + K- "
+             "max(-f, "
+             "0) per axis, then df_y += A_yx f_x, df_z += A_zx f_x + A_zy f_y; dw = drift + K_G w per axis, then dw_x "
+             "+= "
+             "G_xy w_y + G_xz w_z and so on.";
+  }
 }
 
 class Document {
@@ -251,12 +280,10 @@ class Document {
 
   void write_set() {
     out_.heading("Record coefficients: a set of the 24");
+    out_.say(form_words(p_.set_form));
     out_.say(
-        "Sensor output = truth + error, in selfcal's axes (below). df = bias + K+ max(f, 0) + K- max(-f, 0) per axis, "
-        "then df_y += "
-        "A_yx f_x, df_z += A_zx f_x + A_zy f_y; dw = drift + K_G w per axis, then dw_x += G_xy w_y + G_xz w_z and so "
-        "on. Of the "
-        "fields, values is all 24: bias xyz, drift xyz, K+ xyz, K- xyz, A yx zx zy, K_G xyz, G xy xz yx yz zx zy.");
+        "Of the fields, values is all 24: bias xyz, drift xyz, K+ xyz, K- xyz, A yx zx zy, K_G xyz, G xy xz yx yz zx "
+        "zy. Axes are selfcal's (below).");
     if (!p_.slots) {
       out_.say(
           "There is one set: what is written stands over the one before, is told as written, and is used from the next "

@@ -41,7 +41,8 @@ struct Field {
   unsigned first_bit = 0, bits = 0;  // part of an unsigned integer, bit 0 the lowest; bits 0: all of it
   // Value in the role's unit = raw * scale + offset.
   double scale = 1.0, offset = 0.0;
-  std::string unit;                              // as the profile writes it
+  double nominal = 0.0;  // the field tells this times (1 + value), as scale and offset say; 0: none
+  std::string unit;      // as the profile writes it
   std::map<std::uint64_t, std::uint64_t> codes;  // the role's number to the INS's; empty: they are the same
   std::optional<long double> constant;           // always this
   std::optional<std::uint16_t> did;              // of a set that is told field by field: the field's own identifier

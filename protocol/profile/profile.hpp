@@ -12,6 +12,7 @@
 #include "protocol/key_program/key_program.hpp"
 #include "protocol/profile/frames.hpp"
 #include "protocol/profile/layout.hpp"
+#include "protocol/profile/set_form.hpp"
 
 namespace selfcal::profile {
 
@@ -84,6 +85,7 @@ struct Profile {
   bool field_by_field = false;  // each field of a set has an identifier of its own (Field::did), in the order of `set`
   std::optional<std::uint16_t> set_in_force, set_inactive, set_factory;
   Layout set;
+  SetForm set_form = SetForm::errors;
   Routine rotate, erase, commit, navigation_check;
   Raw raw;
   StatusFrames status;  // where `bus` has their identifier

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/profile/coefficient_fields.hpp"
 #include "protocol/profile/frames.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
 
@@ -90,6 +91,28 @@ void read_codes(Section& section, const RoleField& role, Field& field) {
   codes.only_these();
 }
 
+// The field tells nominal * (1 + value), of K- nominal * (1 - value): its number is of any unit.
+void read_nominal(Section& section, const RoleField& role, Field& field) {
+  const Factor kind = factor_of(role.name);
+  const auto nominal = section.number("nominal", -1e30, 1e30);
+  if (!nominal) {
+    return;
+  }
+  if (kind == Factor::none) {
+    return section.fault("nominal", fmt::format("{} is no scale factor", role.name));
+  }
+  if (section.has("unit")) {
+    section.fault("unit", "the number has the unit of nominal: leave it out");
+  }
+  if (*nominal == 0.0) {
+    return section.fault("nominal", "is 0");
+  }
+  const double sign = kind == Factor::negative_slope ? -1.0 : 1.0;
+  field.nominal = *nominal;
+  field.scale = sign * field.scale / *nominal;
+  field.offset = sign * (field.offset / *nominal - 1.0);
+}
+
 void read_value(Section& section, const RoleField& role, Field& field) {
   const auto scale = section.number("scale", -1e30, 1e30);
   const auto offset = section.number("offset", -1e30, 1e30);
@@ -117,6 +140,7 @@ void read_value(Section& section, const RoleField& role, Field& field) {
   }
   field.scale = scale.value_or(1.0) * factor;
   field.offset = offset.value_or(0.0) * factor;
+  read_nominal(section, role, field);
 }
 
 bool check_constant(Section& section, const Field& field, double value) {

@@ -184,6 +184,9 @@ class ProfileReader {
   }
 
   void read_set_layout(Section& section, std::string_view numbered_by) {
+    if (const auto form = section.word("form", set_forms)) {
+      profile_.set_form = static_cast<SetForm>(std::ranges::find(set_forms, *form) - set_forms.begin());
+    }
     Record record;
     read_layout(section, set_role(), order_, record, numbered_by);
     for (const Field& field : record.layout.fields) {

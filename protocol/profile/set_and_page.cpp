@@ -33,6 +33,10 @@ constexpr std::size_t from_plus_to_minus = 3;
 }  // namespace
 
 Expected<Bytes> encode(const Profile& profile, const ins::Coefficients& set) {
+  const auto told = to_write(profile.set_form, set.value);
+  if (!told) {
+    return fail(ErrorKind::bad_input, fmt::format("{} record: {}", profile.set.record, told.error().message));
+  }
   Values v;
   v.numbers["version"] = {static_cast<long double>(set.version)};
   v.numbers["date"] = {static_cast<long double>(set.date_s)};
@@ -41,7 +45,7 @@ Expected<Bytes> encode(const Profile& profile, const ins::Coefficients& set) {
     if (const auto span = span_of(field.name)) {
       std::vector<long double>& values = v.numbers[field.name];
       for (std::size_t k = span->first; k < span->first + span->count; ++k) {
-        values.push_back(span->one_factor ? (set.value[k] - set.value[k + from_plus_to_minus]) / 2 : set.value[k]);
+        values.push_back(span->one_factor ? ((*told)[k] - (*told)[k + from_plus_to_minus]) / 2 : (*told)[k]);
       }
     }
   }
@@ -71,6 +75,11 @@ Expected<ins::Coefficients> decode_coefficients(const Profile& profile, ByteView
       }
     }
   }
+  const auto errors = converted(profile.set_form, set.value);
+  if (!errors) {
+    return fail(ErrorKind::bad_input, fmt::format("{} record: {}", profile.set.record, errors.error().message));
+  }
+  set.value = *errors;
   return set;
 }
 

@@ -191,7 +191,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
 | `identity` | `serial`, `software`: data identifiers of ASCII |
 | `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
-| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at` |
+| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at`. `form`: what the 24 mean, errors where it is left out, correction or correction-first ([Your INS](your-ins.md)) |
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
 | `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
@@ -247,7 +247,8 @@ own INS's.
 
 A field: `at` (byte, from 0), `type` (u8 u16 u24 u32 u64 i8 i16 i24 i32 i64 f32 f64, ascii with `length`), `count` (elements, one behind
 the other), `byte_order`, `first_bit` and `bits` (part of an unsigned integer, 0 the lowest), `scale`, `offset` (value = number times
-`scale` plus `offset`, in `unit`), `codes` (words to numbers), `constant` (always this; then any name will do).
+`scale` plus `offset`, in `unit`), `codes` (words to numbers), `constant` (always this; then any name will do). Of a scale factor
+`nominal` in place of `unit`: the field tells nominal (1 + value), of K⁻ nominal (1 - value), in a unit of its own.
 
 )";
   std::string known;
