@@ -46,7 +46,8 @@ class DeviceCheck(unittest.TestCase):
         time.sleep(2.0)
         pool = concurrent.futures.ThreadPoolExecutor(len(checks))
         cls.addClassCleanup(pool.shutdown)
-        cls.found = {name: pool.submit(cls.check, interface, profile) for name, interface, profile in checks}
+        cls.where = {name: (interface, profile) for name, interface, profile in checks}
+        cls.found = {name: pool.submit(cls.check, *where) for name, where in cls.where.items()}
 
     @classmethod
     def path_of(cls, profile):
@@ -90,9 +91,18 @@ class DeviceCheck(unittest.TestCase):
             raise AssertionError(f"status {done.returncode}: {faults}")
         return document
 
+    def judged_of_sound(self, name):
+        """All at once on two processors and one disk, a sound INS may be late. Alone it must be in time."""
+        document = self.found[name].result()
+        if any(r["id"] == "timing.p2" and r["verdict"] == "fails" for r in document["requirements"]):
+            concurrent.futures.wait(self.found.values())
+            print(f"{name or 'the sound server'}: late beside {len(self.found) - 1} others; alone:", flush=True)
+            document = self.check(*self.where[name])
+        return document
+
     def test_deviations(self):
         found = {name: self.found[name] for name in deviating_ins.DEVIATIONS}
-        sound = self.found[None].result()
+        sound = self.judged_of_sound(None)
         self.assertEqual([r for r in sound["requirements"] if r["verdict"] != "holds"], [])
         named = 0
         for name, future in found.items():
@@ -110,7 +120,7 @@ class DeviceCheck(unittest.TestCase):
     def test_the_virtual_ins_is_sound(self):
         """It shares no line with the server in Python; without a run it has no raw data to upload."""
         for profile in VIRTUAL:
-            document = self.found[profile].result()
+            document = self.judged_of_sound(profile)
             rest = [r for r in document["requirements"] if r["verdict"] != "holds"]
             self.assertEqual([(r["id"], r["verdict"]) for r in rest], [("memory.page" if profile == "memory.toml" else "upload.begin", "not tried")], rest)
             self.assertEqual("isotp.address" in {r["id"] for r in document["requirements"]}, profile in VIRTUAL[3:])
