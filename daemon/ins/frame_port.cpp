@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/ins/can_port.hpp"
+#include "daemon/ins/stream_port.hpp"
 #include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
@@ -376,7 +377,11 @@ std::unique_ptr<InsPort> open_port(EventLoop& loop, const InsConfig& config) {
   if (config.profile->frames) {
     return std::make_unique<FramePort>(loop, config);
   }
-  return std::make_unique<CanPort>(loop, config);
+  auto port = std::make_unique<CanPort>(loop, config);
+  if (!config.profile->stream.empty()) {
+    return std::make_unique<StreamPort>(loop, std::move(port), config);
+  }
+  return port;
 }
 
 }  // namespace selfcal

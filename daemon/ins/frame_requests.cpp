@@ -159,14 +159,7 @@ void FramePort::read_memory(std::span<const std::uint8_t> payload) {
     return refuse(Nrc::request_out_of_range);
   }
   Bytes data;
-  for (std::uint64_t at = address; at < address + size; at = (at / flash::page_bytes + 1) * flash::page_bytes) {
-    const Bytes page =
-        stream_.page(static_cast<std::uint32_t>(at / flash::page_bytes), run_id_, sequence_.phase() == Phase::over);
-    const std::size_t from = at % flash::page_bytes;
-    const std::size_t count = std::min<std::size_t>(page.size() - from, address + size - at);
-    data.insert(data.end(), page.begin() + static_cast<std::ptrdiff_t>(from),
-                page.begin() + static_cast<std::ptrdiff_t>(from + count));
-  }
+  stream_.append_bytes(address, size, run_id_, sequence_.phase() == Phase::over, data);
   positive(std::move(data));
 }
 

@@ -1,4 +1,4 @@
-// The raw data of an INS: RequestUpload, ReadMemoryByAddress, or RequestFileTransfer, page by page.
+// The raw data of an INS: RequestUpload, ReadMemoryByAddress, RequestFileTransfer, or what is kept of a stream, page by page.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -39,6 +39,7 @@ Task<Answer<Bytes>> InsClient::next_block(std::uint8_t block, std::uint32_t long
 
 Task<Answer<Done>> InsClient::upload(std::uint32_t first, std::uint32_t count, OnPage on_page) {
   switch (profile_->raw.way) {
+    case profile::Raw::Way::stream:  // from what is kept of it (stream_port)
     case profile::Raw::Way::memory: return read_memory(first, count, std::move(on_page));
     case profile::Raw::Way::file: return read_files(first, count, std::move(on_page));
     default: return upload_pages(first, count, std::move(on_page));

@@ -23,7 +23,7 @@ void SampleStream::begin() {
   taking_ = true;
   samples_.clear();
   temperatures_.clear();
-  parts_.assign(profile_->frames->samples.size(), false);
+  parts_.assign(profile::sample_frames(*profile_).size(), false);
   counter_.reset();
   trouble_.clear();
 }
@@ -34,7 +34,7 @@ void SampleStream::break_off(std::string why) {
 }
 
 bool SampleStream::take(const can::CanFrame& frame) {
-  const auto& kinds = profile_->frames->samples;
+  const auto& kinds = profile::sample_frames(*profile_);
   const auto kind = std::ranges::find(kinds, frame.id, &profile::Frame::id);
   if (!taking_ || kind == kinds.end()) {
     return false;
@@ -84,7 +84,7 @@ bool SampleStream::fits(std::size_t which, const can::CanFrame& frame, std::uint
   if (begun) {
     const auto missing = static_cast<std::size_t>(std::ranges::find(parts_, false) - parts_.begin());
     break_off(fmt::format("frame {:#x} of sample {} did not come (counter {}, then {})",
-                          profile_->frames->samples[missing].id, samples_.size(), *counter_, counter));
+                          profile::sample_frames(*profile_)[missing].id, samples_.size(), *counter_, counter));
   } else {
     break_off(fmt::format("samples are missing behind sample {}: counter {} came, {} was to come", samples_.size() - 1,
                           counter, *counter_));
@@ -93,7 +93,7 @@ bool SampleStream::fits(std::size_t which, const can::CanFrame& frame, std::uint
 }
 
 void SampleStream::take_part(std::size_t which, const can::CanFrame& frame) {
-  for (const profile::Signal& signal : profile_->frames->samples[which].signals) {
+  for (const profile::Signal& signal : profile::sample_frames(*profile_)[which].signals) {
     const std::uint64_t raw = profile::raw_of(signal, frame.payload());
     const auto axis = static_cast<std::size_t>(signal.name.back() - 'x');
     if (signal.name.starts_with("delta_theta_")) {
@@ -125,6 +125,17 @@ std::vector<std::uint8_t> SampleStream::page(std::uint32_t number, std::uint32_t
   std::vector<std::uint8_t> bytes(flash::page_bytes);
   flash::encode_page(page, std::span<std::uint8_t, flash::page_bytes>(bytes));
   return bytes;
+}
+
+void SampleStream::append_bytes(std::uint64_t address, std::uint64_t size, std::uint32_t run_id, bool whole,
+                                std::vector<std::uint8_t>& into) const {
+  for (std::uint64_t at = address; at < address + size; at = (at / flash::page_bytes + 1) * flash::page_bytes) {
+    const auto bytes = page(static_cast<std::uint32_t>(at / flash::page_bytes), run_id, whole);
+    const std::size_t from = at % flash::page_bytes;
+    const std::size_t count = std::min<std::size_t>(bytes.size() - from, address + size - at);
+    into.insert(into.end(), bytes.begin() + static_cast<std::ptrdiff_t>(from),
+                bytes.begin() + static_cast<std::ptrdiff_t>(from + count));
+  }
 }
 
 }  // namespace selfcal

@@ -31,6 +31,9 @@ class SampleStream {
   // A page of them, as our own INS has pages; the INS's axes.
   std::vector<std::uint8_t> page(std::uint32_t number, std::uint32_t run_id, bool last) const;
   std::uint32_t pages_begun() const;
+  // Bytes of the pages one behind the other; those pages are begun.
+  void append_bytes(std::uint64_t address, std::uint64_t size, std::uint32_t run_id, bool whole,
+                    std::vector<std::uint8_t>& into) const;
 
  private:
   void take_part(std::size_t which, const can::CanFrame& frame);

@@ -44,7 +44,9 @@ void tell_lost(const Profile& p, std::vector<std::string>& lost) {
       lost.push_back(fmt::format("{}: {} is {:.12g}, which the INS does not tell", name, field, value));
     }
   }
-  lost.emplace_back("page: where the samples stand, for a page comes in several blocks");
+  lost.emplace_back(p.stream.empty()
+                        ? "page: where the samples stand, for a page comes in several blocks"
+                        : "stream: the frames of the samples, which answer no request (selfcal device dbc)");
   lost.push_back(axes_words(p.raw));
   if (p.set_form != profile::SetForm::errors) {
     lost.push_back(fmt::format("coefficients: the 24 are those of the {}, not of the errors",

@@ -125,7 +125,7 @@ class Services {
     for (const auto& [name, record] :
          {std::pair("state", &p_.state), std::pair("schedule", &p_.schedule), std::pair("site", &p_.site),
           std::pair("directory", &p_.directory), std::pair("sample_format", &p_.sample_format)}) {
-      if (record->did) {
+      if (record->did && record->did != profile::kept_directory) {
         const std::string id = dictionary_.structure(name, record->layout, profile::record_role(name));
         write_identifier(name, *record->did, id, record == &p_.schedule);
       }
@@ -191,6 +191,7 @@ class Services {
   void write_raw_data() {
     switch (p_.raw.way) {
       case profile::Raw::Way::memory: return write_memory();
+      case profile::Raw::Way::stream: return;  // no service
       case profile::Raw::Way::file: write_file(); break;
       default: write_upload();
     }

@@ -246,7 +246,7 @@ class Document {
     add(p_.state.did, "state", "read");
     add(p_.schedule.did, "schedule", "read, write");
     add(p_.site.did, "site", "read");
-    add(p_.directory.did, "directory", "read");
+    add(told_directory(p_), "directory", "read");
     add(p_.sample_format.did, "sample format", "read");
     add(p_.set_in_force,
         p_.slots ? "coefficients in force, as taken at power-on" : "coefficients, used from the next power-on on",
@@ -265,7 +265,7 @@ class Document {
          {std::pair("state", &p_.state), std::pair("schedule", &p_.schedule), std::pair("site", &p_.site),
           std::pair("directory", &p_.directory), std::pair("sample_format", &p_.sample_format)}) {
       const RecordRole& role = record_role(table);
-      if (!record->did && record->given.empty()) {
+      if ((!record->did && record->given.empty()) || record->did == kept_directory) {
         continue;
       }
       out_.heading(fmt::format("Record {}: {}", record->layout.record, role.meaning));
@@ -337,6 +337,9 @@ class Document {
   void write_upload() {
     const Raw& raw = p_.raw;
     out_.heading("Raw data");
+    if (raw.way == Raw::Way::stream) {
+      return describe_stream(out_, p_);
+    }
     if (raw.way == Raw::Way::memory) {
       out_.say(
           fmt::format("23 {:X}{:X} ADDRESS SIZE, big-endian, {} and {} bytes, in the session: the response is 63 and "

@@ -116,6 +116,21 @@ void describe_status(Writer& out, const Profile& profile) {
   }
 }
 
+void describe_stream(Writer& out, const Profile& profile) {
+  out.say(
+      "While the INS rotates it streams its samples, from the first one of the rotation on, each once and as it is "
+      "made. "
+      "Every frame of a sample has the counter of that sample; the next sample has the next counter, and after the "
+      "highest comes 0. A sample of which a frame is lost ends the calibration. The last sample is sent before the "
+      "state "
+      "is told as another than rotating. Bit b of a frame is bit b % 8 of byte b / 8, bit 0 the lowest. A signal in "
+      "little-endian order starts at its lowest bit and goes on upwards; one in big-endian order starts at its highest "
+      "bit, goes down to bit 0 of the byte, and on at bit 7 of the next byte: as in a DBC.");
+  for (const Frame& frame : profile.stream) {
+    write_frame(out, frame, frame_role("sample"), profile.bus.extended_ids);
+  }
+}
+
 void describe_frames(Writer& out, const Profile& profile) {
   const Frames& frames = *profile.frames;
   const bool extended = profile.bus.extended_ids;

@@ -8,6 +8,8 @@ namespace selfcal::profile {
 
 // The state frame and the gimbal frame of an INS that speaks UDS.
 void describe_status(Writer& out, const Profile& profile);
+// What an INS streams beside UDS.
+void describe_stream(Writer& out, const Profile& profile);
 void describe_frames(Writer& out, const Profile& profile);
 
 }  // namespace selfcal::profile

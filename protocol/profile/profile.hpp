@@ -54,11 +54,15 @@ struct Routine {
   Layout result;  // of requestRoutineResults
 };
 
+// An INS that streams its samples keeps none. The service then keeps them as pages, and their directory, which it asks for by an
+// identifier that ISO 14229-1 (table C.1) reserves, so that no INS has it.
+inline constexpr std::uint16_t kept_directory = 0xFFFF;
+
 // The raw data: how their pages are asked for, and what they hold.
 struct Raw {
   Layout page;
-  enum class Way : std::uint8_t { upload, memory, file };
-  Way way = Way::upload;            // RequestUpload, ReadMemoryByAddress, or RequestFileTransfer
+  enum class Way : std::uint8_t { upload, memory, file, stream };
+  Way way = Way::upload;            // RequestUpload, ReadMemoryByAddress, RequestFileTransfer, or frames while it turns
   bool by_page = true;              // RequestUpload's address counts pages; else bytes
   std::uint32_t first_address = 0;  // of ReadMemoryByAddress: where page 0 of the run begins
   std::uint32_t longest_read = 0;   // bytes that it tells at once
@@ -91,8 +95,19 @@ struct Profile {
   StatusFrames status;  // where `bus` has their identifier
   // An INS that speaks no UDS. All the rest is then what the service asks itself in its place (daemon/ins/frame_port).
   std::optional<Frames> frames;
+  std::vector<Frame> stream;  // Raw::Way::stream: the frames of a sample, beside UDS
 };
 using ProfilePtr = std::shared_ptr<const Profile>;
+
+// The frames of a sample, where samples are streamed.
+inline const std::vector<Frame>& sample_frames(const Profile& profile) {
+  return profile.frames ? profile.frames->samples : profile.stream;
+}
+
+// The directory's identifier, where the INS tells one.
+inline std::optional<std::uint16_t> told_directory(const Profile& profile) {
+  return profile.directory.did == kept_directory ? std::nullopt : profile.directory.did;
+}
 
 // Our own INS: config/profiles/selfcal.toml, as compiled in.
 const ProfilePtr& built_in();

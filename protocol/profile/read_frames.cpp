@@ -44,6 +44,25 @@ class FramesReader {
     return frames;
   }
 
+  std::vector<Frame> read_stream() {
+    const Bus& bus = profile_.bus;
+    for (const auto& [path, id] :
+         {std::pair("bus.request", std::optional(bus.request)), std::pair("bus.response", std::optional(bus.response)),
+          std::pair("bus.functional", std::optional(bus.functional)), std::pair("bus.status", bus.status),
+          std::pair("bus.status + 1", bus.status ? std::optional(*bus.status + 1) : std::nullopt)}) {
+      Frame of_bus;
+      of_bus.id = id.value_or(0);
+      if (id) {
+        taken_.emplace_back(path, true, of_bus);
+      }
+    }
+    Frames frames;
+    read_dbc();
+    read_samples(frames);
+    section_.only_these();
+    return std::move(frames.samples);
+  }
+
   Frames read() {
     Frames frames;
     if (!section_.there()) {
@@ -91,8 +110,8 @@ class FramesReader {
     }
     const auto found = dbc_.find(*name);
     if (found == dbc_.end()) {
-      section.fault("message",
-                    dbc_.empty() ? "no DBC is named: frames.dbc" : fmt::format("the DBC has no message {}", *name));
+      section.fault("message", dbc_.empty() ? fmt::format("no DBC is named: {}", section_.path_of("dbc"))
+                                            : fmt::format("the DBC has no message {}", *name));
       return nullptr;
     }
     if (found->second.extended != profile_.bus.extended_ids) {
@@ -401,6 +420,10 @@ class FramesReader {
 
 Frames read_frames(Section& root, const Profile& profile, ByteOrder order) {
   return FramesReader(root.table("frames", true), profile, order).read();
+}
+
+std::vector<Frame> read_stream(Section& stream, const Profile& profile, ByteOrder order) {
+  return FramesReader(stream, profile, order).read_stream();
 }
 
 StatusFrames read_status_frames(Section& status, const Profile& profile, ByteOrder order) {

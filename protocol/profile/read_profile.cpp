@@ -159,8 +159,40 @@ class ProfileReader {
     read_record("state", profile_.state, true);
     read_record("schedule", profile_.schedule, true);
     read_record("site", profile_.site, true);
-    read_record("directory", profile_.directory, true);
+    root_.has("stream") ? keep_directory() : read_record("directory", profile_.directory, true);
     read_record("sample_format", profile_.sample_format, false);
+  }
+
+  // Samples that are streamed are kept here, as our own INS keeps them.
+  void keep_directory() {
+    profile_.directory.did = kept_directory;
+    dids_.take(faults_, root_.line_of("stream"), "stream", kept_directory);
+    profile_.directory.layout = built_in()->directory.layout;
+    Section told = root_.table("directory");
+    if (told.there()) {
+      root_.fault("directory", "the samples are streamed: the INS tells none");
+    }
+  }
+
+  void read_stream_of_samples(Section& stream) {
+    profile_.stream = read_stream(stream, profile_, order_);
+    Raw& raw = profile_.raw;
+    raw.way = Raw::Way::stream;
+    raw.by_page = false;
+    raw.longest_read = longest_message;
+    raw.page = built_in()->raw.page;
+    if (root_.has("page")) {
+      root_.fault("page", "the samples are streamed: there are none");
+      root_.table("page");
+    }
+    for (const std::string_view name : {"gimbal_per_count", "page_bytes", "samples_per_page"}) {
+      const Field* field = profile_.sample_format.layout.find(name);
+      if (field != nullptr || profile_.sample_format.given.contains(name)) {
+        faults_.add(field != nullptr ? field->line : root_.line_of("sample_format"),
+                    fmt::format("sample_format.{}{}", field != nullptr ? "fields." : "given.", name),
+                    "the samples are streamed: there are no pages, and the gimbal is told as an angle");
+      }
+    }
   }
 
   void read_set() {
@@ -291,9 +323,13 @@ class ProfileReader {
     if (file.there()) {
       read_file(file);
     }
-    Section upload = root_.table("upload", !memory.there() && !file.there());
-    if (int{upload.there()} + int{memory.there()} + int{file.there()} > 1) {
-      (upload.there() ? upload : file).fault("", "and another: the raw data are asked for in one way");
+    Section stream = root_.table("stream");
+    Section upload = root_.table("upload", !memory.there() && !file.there() && !stream.there());
+    if (int{upload.there()} + int{memory.there()} + int{file.there()} + int{stream.there()} > 1) {
+      (upload.there() ? upload : file.there() ? file : stream).fault("", "and another: the raw data come in one way");
+    }
+    if (stream.there()) {
+      return read_stream_of_samples(stream);
     }
     if (upload.there()) {
       profile_.raw.by_page = upload.word("address", address_units, true).value_or("page") == "page";

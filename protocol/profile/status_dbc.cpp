@@ -14,7 +14,8 @@ constexpr std::uint32_t extended_bit = 0x80000000U;  // of an identifier of 29 b
 
 struct Message {
   std::uint32_t id = 0;
-  std::string_view name, sender, comment;
+  std::string name;
+  std::string_view sender, comment;
   const Frame* frame = nullptr;  // whose signals it has
 };
 
@@ -27,6 +28,10 @@ std::vector<Message> messages_of(const Profile& profile) {
     messages.push_back({*bus.status, "InsState", "INS", "periodic", &profile.status.state});
     messages.push_back({*bus.status + 1, "InsGimbal", "INS", "periodic", &profile.status.gimbal});
   }
+  for (const Frame& frame : profile.stream) {
+    messages.push_back(
+        {frame.id, fmt::format("Sample_{}", frame.name), "INS", "of each sample, while it rotates", &frame});
+  }
   for (Message& message : messages) {
     message.id |= bus.extended_ids ? extended_bit : 0U;
   }
@@ -34,7 +39,8 @@ std::vector<Message> messages_of(const Profile& profile) {
 }
 
 const RoleField* field_of(const Message& message, const Signal& signal) {
-  const auto& fields = frame_role(message.frame->name).signals;
+  const bool status = message.frame->name == "status.state" || message.frame->name == "status.gimbal";
+  const auto& fields = frame_role(status ? std::string_view(message.frame->name) : "sample").signals;
   const auto field = std::ranges::find(fields, signal.name, &RoleField::name);
   return field == fields.end() ? nullptr : &*field;
 }

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "protocol/profile/status_frames.hpp"
+#include "sim_ins/device/sample_frames.hpp"
 
 namespace selfcal::sim {
 namespace {
@@ -85,7 +87,11 @@ BusNode::BusNode(const NodeOptions& options, Instrument& instrument, can::Socket
       socket_(std::move(socket)),
       bus_(options.rates),
       turnaround_(options.turnaround_ms),
-      faulty_(options.scenario) {}
+      faulty_(options.scenario) {
+  if (!options.diagnostics.profile->stream.empty()) {
+    instrument_.keep_stream();
+  }
+}
 
 Time BusNode::ins_time() const { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(now_s_)); }
 
@@ -273,6 +279,19 @@ void BusNode::transmit(Time now) {
     if (!send_all(spoilt_)) {
       return;
     }
+  }
+  // Before any answer of this turn: it may say that the rotation is over.
+  for (const ImuSample& sample : instrument_.take_stream()) {
+    const std::uint64_t counter = stream_counter_++;
+    if (!sample.missing && !acts(FaultKind::bus_off)) {
+      append_sample(*options_.diagnostics.profile, sample, counter, stream_frames_);
+    }
+  }
+  for (const can::CanFrame& frame : stream_frames_) {
+    bus_.transmit(frame, until);
+  }
+  if (!stream_frames_.empty() && !put_on_bus(std::exchange(stream_frames_, {}))) {
+    return;
   }
   for (const can::CanFrame& frame : status_frames_) {
     bus_.transmit(frame, until);

@@ -83,7 +83,8 @@ class BusNode {
   bool more_to_send_ = false;
   double next_status_s_ = 0.0;
   std::uint8_t alive_ = 0;
-  std::vector<can::CanFrame> status_frames_;
+  std::vector<can::CanFrame> status_frames_, stream_frames_;
+  std::uint64_t stream_counter_ = 0;
   bool stop_told_ = true, upload_told_ = true;
   bool reset_pending_ = false;
 };

@@ -120,7 +120,7 @@ bool Diagnostics::profile_has(std::uint8_t id) const {
     case service::request_upload: return way == Way::upload;
     case service::file_transfer: return way == Way::file;
     case service::transfer_data:
-    case service::transfer_exit: return way != Way::memory;
+    case service::transfer_exit: return way == Way::upload || way == Way::file;
     default: return true;
   }
 }
@@ -216,8 +216,8 @@ Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
 bool Diagnostics::knows(std::uint16_t did) const {
   const profile::Profile& p = *profile_;
   const std::array dids{
-      std::optional(p.serial), std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
-      p.directory.did,         p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
+      std::optional(p.serial),    std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
+      profile::told_directory(p), p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
   return std::ranges::find(dids, std::optional(did)) != dids.end() || field_of(did) != nullptr;
 }
 

@@ -10,6 +10,7 @@
 #include "estimator/geometry/units.hpp"
 #include "protocol/profile/frame_values.hpp"
 #include "protocol/uds/messages.hpp"
+#include "sim_ins/device/sample_frames.hpp"
 
 namespace selfcal::sim {
 namespace {
@@ -84,29 +85,6 @@ void FrameNode::reset(Time now) {
 
 // --- frames to the tester
 
-can::CanFrame FrameNode::begin(const Frame& kind) const {
-  can::CanFrame frame;
-  frame.id = kind.id;
-  frame.extended = profile().bus.extended_ids;
-  frame.fd = frame.bit_rate_switch = profile().bus.fd;
-  frame.size = static_cast<std::uint8_t>(kind.bytes);
-  for (const Signal& signal : kind.signals) {
-    if (signal.constant) {
-      profile::put_raw(signal, *signal.constant, std::span(frame.data).first(kind.bytes));
-    }
-  }
-  return frame;
-}
-
-// Of a signal that is not there, nothing; a value that it cannot hold stays 0.
-void FrameNode::put_value(const Frame& kind, std::string_view name, double value, can::CanFrame& frame) const {
-  const Signal* signal = kind.find(name);
-  const auto raw = signal == nullptr ? std::nullopt : profile::raw_for(*signal, value);
-  if (raw) {
-    profile::put_raw(*signal, *raw, std::span(frame.data).first(kind.bytes));
-  }
-}
-
 void FrameNode::send(can::CanFrame frame) {
   if (acts(FaultKind::bus_off)) {
     return;
@@ -127,7 +105,7 @@ void FrameNode::tell_state() {
     return;
   }
   next_status_s_ = now_s_ + std::max(status_interval_s, least_real_interval_s * options_.speed);
-  can::CanFrame identity = begin(frames().identity);
+  can::CanFrame identity = begin_frame(profile(), frames().identity);
   put_value(frames().identity, "serial", number_of(instrument_.serial()), identity);
   put_value(frames().identity, "software", software_number, identity);
   send(identity);
@@ -143,7 +121,7 @@ void FrameNode::tell_state() {
   }
   const Frame& kind = frames().state;
   const profile::Raw& axes = profile().raw;
-  can::CanFrame frame = begin(kind);
+  can::CanFrame frame = begin_frame(profile(), kind);
   const Signal& signal = *kind.find("state");
   const auto code = signal.codes.find(static_cast<std::uint64_t>(state));
   profile::put_raw(signal, code == signal.codes.end() ? static_cast<std::uint64_t>(state) : code->second,
@@ -159,28 +137,13 @@ void FrameNode::tell_state() {
 }
 
 void FrameNode::tell_sample(const ImuSample& sample) {
-  const profile::Raw& axes = profile().raw;
-  constexpr std::string_view letters[] = {"x", "y", "z"}, gimbal[] = {"outer", "inner"};
-  const std::array<double, 2> read_out{sample.outer, sample.inner};
   const std::uint64_t counter = counter_++;
   if (sample.missing) {
     return;
   }
-  for (const Frame& kind : frames().samples) {
-    can::CanFrame frame = begin(kind);
-    const Signal& count = *kind.find("counter");
-    profile::put_raw(count, counter & ((std::uint64_t{1} << count.length) - 1),
-                     std::span(frame.data).first(kind.bytes));
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::string_view axis = letters[axes.axis[k]];
-      put_value(kind, fmt::format("delta_theta_{}", axis), axes.sign[k] * sample.delta_theta[k], frame);
-      put_value(kind, fmt::format("delta_v_{}", axis), axes.sign[k] * sample.delta_v[k], frame);
-    }
-    for (std::size_t k = 0; k < 2; ++k) {
-      const double angle = std::remainder(axes.gimbal_sign[k] * read_out[k], 360.0 * units::degree);
-      put_value(kind, gimbal[axes.gimbal[k]], angle, frame);
-    }
-    put_value(kind, "temperature", sample.temperature_c, frame);
+  std::vector<can::CanFrame> frames;
+  append_sample(profile(), sample, counter, frames);
+  for (const can::CanFrame& frame : frames) {
     send(frame);
   }
 }
@@ -217,7 +180,7 @@ void FrameNode::tell_coefficient(std::span<const std::uint8_t> answer) {
     return tell_coefficient(read);
   }
   const Frame& kind = frames().told;
-  can::CanFrame frame = begin(kind);
+  can::CanFrame frame = begin_frame(profile(), kind);
   const auto data = std::span(frame.data).first(kind.bytes);
   profile::put_raw(*kind.find("index"), asked_did_ - profile::first_index_did, data);
   const profile::Field& field = *profile::field_of(profile(), asked_did_);

@@ -41,8 +41,6 @@ class FrameNode {
   void tell_coefficient(std::span<const std::uint8_t> answer);
   void tell_state();
   void tell_sample(const ImuSample& sample);
-  can::CanFrame begin(const profile::Frame& kind) const;
-  void put_value(const profile::Frame& kind, std::string_view name, double value, can::CanFrame& frame) const;
   void send(can::CanFrame frame);
   bool acts(FaultKind kind) const { return options_.scenario.active(kind, now_s_) != nullptr; }
   const profile::Profile& profile() const { return *options_.diagnostics.profile; }

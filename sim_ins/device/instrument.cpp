@@ -179,6 +179,9 @@ void Instrument::take_sample() {
   apply_faults(sample, t);
   last_sample_ = sample;
   ++samples_;
+  if (keeps_stream_) {
+    stream_.push_back(sample);
+  }
   if (!sample.missing) {
     page_.samples.push_back(
         {sample.delta_theta, sample.delta_v, gimbal_counts(sample.outer), gimbal_counts(sample.inner)});

@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "estimator/geometry/schedule.hpp"
 #include "protocol/error.hpp"
@@ -55,6 +57,10 @@ class Instrument {
   RawStore& raw() { return raw_; }
   FlashMemory& flash() { return flash_; }
 
+  // The samples since it was asked last, missing ones among them; kept once `keep_stream` was called.
+  void keep_stream() { keeps_stream_ = true; }
+  std::vector<ImuSample> take_stream() { return std::exchange(stream_, {}); }
+
   std::optional<double> gimbal_stopped_at_s() const { return stopped_at_s_; }
 
  private:
@@ -91,6 +97,8 @@ class Instrument {
   std::uint32_t run_id_ = 0;
   flash::Page page_;
   ImuSample last_sample_;
+  bool keeps_stream_ = false;
+  std::vector<ImuSample> stream_;
   std::optional<double> stopped_at_s_;
   std::optional<double> gimbal_noticed_s_;  // when the INS notices that the gimbal goes wrong, in the rotation
 

@@ -3,12 +3,44 @@ from the description of that profile alone. On the same sensor data the 24 are t
 import concurrent.futures
 import json
 import math
+import re
 import tempfile
 import unittest
 from pathlib import Path
 
 import case
 import profile_case
+
+STREAM = """[stream.sample.one]
+id = 0x18FF1001
+bytes = 8
+signals.counter = { start = 0, length = 8 }
+signals.delta_theta_x = { start = 8, length = 24, type = "signed" }
+signals.delta_theta_y = { start = 32, length = 24, type = "signed" }
+signals.temperature = { start = 56, length = 8, scale = 0.5, offset = -40.0, unit = "degC" }
+
+[stream.sample.two]
+id = 0x18FF1002
+bytes = 7
+signals.counter = { start = 7, length = 8, byte_order = "big" }
+signals.delta_theta_z = { start = 15, length = 24, byte_order = "big", type = "signed" }
+signals.delta_v_x = { start = 39, length = 24, byte_order = "big", type = "signed" }
+
+[stream.sample.three]
+id = 0x18FF1003
+bytes = 7
+signals.counter = { start = 0, length = 8 }
+signals.delta_v_y = { start = 8, length = 24, type = "signed" }
+signals.delta_v_z = { start = 32, length = 24, type = "signed" }
+
+[stream.sample.gimbal]
+id = 0x18FF1004
+bytes = 7
+signals.counter = { start = 0, length = 8 }
+signals.outer = { start = 8, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
+signals.inner = { start = 32, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
+
+"""
 
 
 class Profiles(profile_case.UnderProfile):
@@ -35,9 +67,43 @@ class Profiles(profile_case.UnderProfile):
         self.assert_corrects(held["values"], {p["name"]: p["value"] if p["determined"] and p["plausible"] else 0.0
                                               for p in run["result"]["parameters"]})
         print("the INS in Python holds what the run says, version", held["version"], flush=True)
+        unit = self.bench_of(self.streaming(), interface="vcan2").start()
+        self.assert_same(self.calibrate(unit), own, "samples streamed beside UDS")
+        unit.stop()
         done = checked.result()
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertRegex(done.stdout, r"holds +transfer\.page: .*\n(.*\n)*.* 0 fail")
+
+    def streaming(self):
+        """example.toml, its samples in frames while it turns: no pages, and no directory of them."""
+        text = (profile_case.PROFILES / "example.toml").read_text(encoding="utf-8")
+        kept = "\n".join(t for t in re.split(r"(?m)^(?=\[)", text) if not re.match(r"\[(upload|page|directory)\]", t))
+        folder = tempfile.TemporaryDirectory(prefix="selfcal_profile.")
+        self.addCleanup(folder.cleanup)
+        path = Path(folder.name) / "streaming.toml"
+        path.write_text(kept + STREAM, encoding="utf-8")
+        return path
+
+    def test_what_ends_a_stream(self):
+        """A lost frame, and a restart of the service, which kept what came before: the run ends as failed, and the gimbal rests."""
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory(prefix="selfcal_faults.")))
+        scenario = folder / "drop.toml"
+        scenario.write_text("seed = 1\n[[fault]]\nkind = 'drop'\nprobability = 0.001\nstate = 'rotating'\n", encoding="ascii")
+        for options, words in ((["--scenario", scenario], "of no use: .*(did not come|are missing)"),
+                               ([], "kept none: it was started after the rotation began")):
+            unit = self.bench_of(self.streaming(), interface="vcan3")
+            unit.sim_options += options
+            unit.start()
+            run = unit.start_run("--schedule", "horizontal", "--force", "short dwell")
+            if not options:
+                unit.wait_until(lambda seen: seen["state"] == "rotating" and seen["pages_pulled"] >= 1, "rotation")
+                unit.kill_daemon()
+                unit.start_daemon()
+            failed = unit.wait_for_end(run)
+            self.assertEqual((failed["state"], failed["exit_status"]), ("failed", case.DEVICE_TROUBLE), failed["reason"])
+            self.assert_one_line(failed["reason"], words)
+            unit.wait_until(lambda _: "gimbal stopped at" in unit.log("sim_ins"), "the gimbal rests")
+            unit.stop()
 
     def assert_corrects(self, held, errors):
         """One after the other, the sensors' errors and what the INS holds to correct them leave what was there: f and w of any size.

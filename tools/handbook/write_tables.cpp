@@ -196,6 +196,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
 | `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
 | `file` | RequestFileTransfer in its place, each page a file: `name`, with `{page}` and perhaps `{run}`; `{page:6}` has six digits at least |
+| `stream` | the samples in CAN frames while it rotates, in its place: `dbc` and `sample.NAME` as of [plain frames](#plain-frames); then there are no `directory` and no `page` |
 | `frames` | of an INS without UDS, [below](#plain-frames) |
 | `page` | a record |
 | `axes` | `imu`, `gimbal`: ours, in the INS's words, `-` for the other way round |

@@ -201,6 +201,53 @@ TEST(Profile, TellsEveryFaultAtOnceEachWithItsLine) {
                              testing::HasSubstr(": axis: no such key; did you mean axes?")));
 }
 
+// An INS that streams its samples has no pages and no directory of them, and no frame of a sample is one of the bus.
+TEST(Profile, SamplesAreStreamedOrKept) {
+  const std::string stream = R"(
+[stream.sample.all]
+id = 0x123
+bytes = 8
+signals.counter = { start = 0, byte_order = "little", length = 4 }
+signals.delta_theta_x = { start = 4, byte_order = "little", length = 8, type = "signed" }
+signals.delta_theta_y = { start = 12, byte_order = "little", length = 8, type = "signed" }
+signals.delta_theta_z = { start = 20, byte_order = "little", length = 8, type = "signed" }
+signals.delta_v_x = { start = 28, byte_order = "little", length = 8, type = "signed" }
+signals.delta_v_y = { start = 36, byte_order = "little", length = 8, type = "signed" }
+signals.delta_v_z = { start = 44, byte_order = "little", length = 8, type = "signed" }
+signals.outer = { start = 52, byte_order = "little", length = 6, scale = 6.0, unit = "deg" }
+signals.inner = { start = 58, byte_order = "little", length = 6, scale = 6.0, unit = "deg" }
+)";
+  std::string text = own_text();
+  for (const std::string_view table : {"[directory]", "[upload]", "[page]"}) {
+    const std::size_t from = text.find(table), to = text.find("\n[", from);
+    ASSERT_NE(from, std::string::npos) << table;
+    text.erase(from, to - from);
+  }
+  const std::string format = "\n[sample_format]";
+  const std::size_t from = text.find(format), to = text.find("\n[", from + 1);
+  text.replace(
+      from, to - from,
+      "\n[sample_format]\ngiven.sample_rate = 100\ngiven.angle_per_count = 1e-6\ngiven.velocity_per_count = 1e-5\n");
+  const auto profile = parse_profile(text + stream, "p.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  EXPECT_EQ((*profile)->raw.way, Raw::Way::stream);
+  EXPECT_EQ(sample_frames(**profile).size(), 1U);
+  EXPECT_FALSE(told_directory(**profile));
+  EXPECT_THAT(describe(**profile, Markup::markdown), testing::Not(testing::HasSubstr("0xFFFF |")));
+
+  EXPECT_THAT(complaint(own_text() + stream),
+              testing::AllOf(testing::HasSubstr(": directory: the samples are streamed: the INS tells none"),
+                             testing::HasSubstr(": page: the samples are streamed: there are none"),
+                             testing::HasSubstr("the raw data come in one way")));
+  EXPECT_THAT(complaint(text + with(stream, "id = 0x123", "id = 0x648")),
+              testing::HasSubstr("stream.sample.all.id: 0x648 is that of bus.response already"));
+  EXPECT_THAT(complaint(text + with(stream, "signals.inner", "# signals.inner")),
+              testing::HasSubstr("inner is told by no frame"));
+  EXPECT_THAT(
+      complaint(with(text, "given.sample_rate = 100", "given.sample_rate = 100\ngiven.page_bytes = 4096") + stream),
+      testing::HasSubstr("sample_format.given.page_bytes: the samples are streamed"));
+}
+
 // Another INS's: what it writes it reads, to half of what its fields resolve.
 class ExampleProfile : public testing::Test {
  protected:
@@ -401,8 +448,7 @@ TEST(MemoryProfile, WhatDoesNotFitTogetherIsRefused) {
   EXPECT_THAT(fault("did = 0x4102", "did = 0x4101"),
               testing::HasSubstr("0x4101 is that of coefficients.fields.accel_bias_x.did already"));
   EXPECT_THAT(fault("did = 0x4102, ", ""), testing::HasSubstr("coefficients.fields.accel_bias_y.did: missing"));
-  EXPECT_THAT(fault("[memory]", "[upload]\naddress = \"page\"\n\n[memory]"),
-              testing::HasSubstr("asked for in one way"));
+  EXPECT_THAT(fault("[memory]", "[upload]\naddress = \"page\"\n\n[memory]"), testing::HasSubstr("come in one way"));
   EXPECT_THAT(fault("longest = 512", "longest = 70000"), testing::HasSubstr("memory.longest"));
   EXPECT_THAT(fault("[memory]", "[erase]\nroutine = 0x4202\n\n[memory]"), testing::HasSubstr("without slots"));
 }

@@ -212,6 +212,10 @@ void try_raw_data(Conformance& c) {
   if (p.raw.way == profile::Raw::Way::memory) {
     return try_memory(c);
   }
+  if (p.raw.way == profile::Raw::Way::stream) {
+    return c.not_tried({"stream.samples", "profile, stream", "Samples come while it rotates, each once.", Mode::open},
+                       "nothing is turned by a check");
+  }
   c.refused({"transfer.none", transfer, "Without an upload there is no block.", Mode::open}, uds::transfer_request(1),
             {Nrc::request_sequence_error});
   c.refused({"transfer.no_exit", leave, "Without an upload there is none to end.", Mode::open},

@@ -77,7 +77,7 @@ void try_records(Conformance& c) {
   try_record(c, "schedule", p.schedule.did, May::be_absent,
              [&](ByteView b) { return fault_of(profile::decode_schedule(p, b)); });
   try_record(c, "site", p.site.did, May::be_there, [&](ByteView b) { return fault_of(profile::decode_site(p, b)); });
-  try_record(c, "directory", p.directory.did, May::be_there,
+  try_record(c, "directory", profile::told_directory(p), May::be_there,
              [&](ByteView b) { return fault_of(profile::decode_directory(p, b)); });
   try_record(c, "sample_format", p.sample_format.did, May::be_there,
              [&](ByteView b) { return fault_of(profile::decode_sample_format(p, b)); });

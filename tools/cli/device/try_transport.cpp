@@ -124,8 +124,8 @@ void try_long_requests(Conformance& c) {
 // A record that takes several frames to tell, read only.
 std::optional<Bytes> long_read(Conformance& c) {
   const profile::Profile& p = c.profile();
-  for (const auto& did :
-       {p.set_in_force, p.sample_format.did, p.directory.did, p.site.did, p.state.did, std::optional(p.serial)}) {
+  for (const auto& did : {p.set_in_force, p.sample_format.did, profile::told_directory(p), p.site.did, p.state.did,
+                          std::optional(p.serial)}) {
     const Bytes request = did ? uds::read_request(*did) : Bytes{};
     const Exchange told = did ? c.tester().ask(request) : Exchange{};
     if (told.kind == Exchange::Kind::broken || told.response.size() > 2 * can::max_classic_bytes) {

@@ -1,0 +1,304 @@
+#include "daemon/ins/stream_port.hpp"
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include <cmath>
+#include <utility>
+
+#include "protocol/profile/records.hpp"
+#include "protocol/uds/services.hpp"
+
+namespace selfcal {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto silence_limit = 5s;  // of the stream, while it is to come
+constexpr auto first_limit = 60s;   // before its first sample: the gimbal goes to the first position
+constexpr int batches_per_turn = 16;
+
+std::uint16_t number_in(std::span<const std::uint8_t> payload, std::size_t at) {
+  return static_cast<std::uint16_t>(payload.size() >= at + 2 ? payload[at] << 8U | payload[at + 1] : 0);
+}
+
+}  // namespace
+
+StreamPort::StreamPort(EventLoop& loop, std::unique_ptr<InsPort> ins, const InsConfig& config)
+    : loop_(loop), ins_(std::move(ins)), config_(config), stream_(config.profile) {
+  ins_->on_bus_event = [this](can::BusEvent event) {
+    if (on_bus_event) {
+      on_bus_event(event);
+    }
+  };
+  ins_->on_status = [this](const ins::Status& status) {
+    if (on_status) {
+      on_status(status);
+    }
+  };
+  const auto& given = config_.profile->sample_format.given;
+  if (const auto rate = given.find("sample_rate"); rate != given.end()) {
+    sample_rate_hz_ = rate->second;
+  }
+  open();
+}
+
+StreamPort::~StreamPort() {
+  loop_.cancel(answer_timer_);
+  loop_.cancel(stream_timer_);
+}
+
+void StreamPort::open() {
+  can::SocketOptions options;
+  options.interface = config_.interface;
+  options.fd = config_.profile->bus.fd;
+  for (const profile::Frame& frame : config_.profile->stream) {
+    options.filters.push_back({frame.id, 0x1FFFFFFF, config_.profile->bus.extended_ids});
+  }
+  auto socket = can::Socket::open(options);
+  if (!socket) {
+    trouble_ = socket.error().message;
+    return;
+  }
+  socket_ = std::move(*socket);
+  trouble_.clear();
+  io_ = std::make_unique<EventLoop::Io>(loop_, socket_->fd(), EPOLLIN, [this](unsigned) { on_readable(); });
+}
+
+void StreamPort::reopen() {
+  io_.reset();
+  lost_before_ += socket_ ? socket_->lost_frames() : 0;
+  socket_.reset();
+  if (turning_ && broken_.empty()) {
+    broken_ = "the connection was opened anew";
+    stream_.end();
+  }
+  ins_->reopen();
+  open();
+}
+
+std::uint64_t StreamPort::lost_frames() const {
+  return ins_->lost_frames() + lost_before_ + (socket_ ? socket_->lost_frames() : 0);
+}
+
+// --- the stream
+
+void StreamPort::on_readable() {
+  for (int batch = 0; batch < batches_per_turn && socket_; ++batch) {
+    const auto received = socket_->receive();
+    if (!received) {
+      trouble_ = received.error().message;
+      io_->want(0);  // the watch goes with the next reopening: it may be what called us
+      return;
+    }
+    for (const can::ReceivedFrame& one : *received) {
+      const bool wide = one.frame.extended;
+      if (!one.event && !one.frame.remote && wide == config_.profile->bus.extended_ids) {
+        stream_.take(one.frame);
+      }
+    }
+    if (received->empty()) {
+      break;
+    }
+  }
+  if (turning_ && broken_.empty()) {
+    broken_ = stream_.trouble();
+  }
+}
+
+// What came before the answer in hand belongs before it. The kernel's queue has an end, and so has this.
+void StreamPort::drain() {
+  constexpr int turns = 64;
+  for (int turn = 0; turn < turns && socket_ && trouble_.empty(); ++turn) {
+    const std::uint64_t before = stream_.samples();
+    on_readable();
+    if (stream_.samples() == before) {
+      return;
+    }
+  }
+}
+
+void StreamPort::begin(std::span<const std::uint8_t> option) {
+  const auto run_id = profile::read_rotation_start(*config_.profile, option);
+  run_id_ = run_id.value_or(0);
+  turning_ = run_id_ != 0;
+  broken_.clear();
+  stream_.begin();
+  watch();
+}
+
+void StreamPort::watch() {
+  samples_seen_ = stream_.samples();
+  const auto limit = samples_seen_ == 0 ? first_limit : silence_limit;
+  loop_.cancel(stream_timer_);
+  stream_timer_ = loop_.after(limit, [this, limit] {
+    stream_timer_ = 0;
+    if (!turning_ || !broken_.empty()) {
+      return;
+    }
+    if (stream_.samples() == samples_seen_) {
+      broken_ = fmt::format("no sample came for {} s behind sample {}", std::chrono::duration<double>(limit).count(),
+                            samples_seen_);
+      return stream_.end();
+    }
+    watch();
+  });
+}
+
+// --- requests
+
+void StreamPort::request(std::span<const std::uint8_t> payload, std::size_t longest_answer,
+                         std::function<void(Answer<Bytes>)> done) {
+  done_ = std::move(done);
+  request_.assign(payload.begin(), payload.end());
+  const profile::Profile& p = *config_.profile;
+  const std::uint8_t service = payload.front();
+  if (!trouble_.empty()) {
+    return answer(trouble(PortError::Kind::link, trouble_));
+  }
+  if (service == uds::service::read_data && number_in(payload, 1) == p.directory.did) {
+    return answer(directory());
+  }
+  if (service == uds::service::read_memory) {
+    return answer(memory(payload));
+  }
+  const bool starts = service == uds::service::routine_control && number_in(payload, 2) == p.rotate.id &&
+                      payload[1] == static_cast<std::uint8_t>(uds::RoutineAction::start);
+  if (starts) {
+    begin(payload.subspan(4));  // its first sample may come before its answer
+  }
+  ins_->request(payload, longest_answer, [this](Answer<Bytes> told) {
+    Answer<Bytes> passed = seen(std::move(told));
+    if (const auto done_now = std::exchange(done_, {})) {
+      done_now(std::move(passed));
+    }
+  });
+}
+
+void StreamPort::cancel() {
+  done_ = {};
+  loop_.cancel(std::exchange(answer_timer_, 0));
+  ins_->cancel();
+}
+
+Answer<Bytes> StreamPort::seen(Answer<Bytes> told) {
+  const profile::Profile& p = *config_.profile;
+  const std::uint8_t service = request_.front();
+  const std::uint16_t number = number_in(request_, 1);
+  if (service == uds::service::read_data && number == p.state.did) {
+    return state_seen(std::move(told));
+  }
+  if (!told) {
+    const bool started = service == uds::service::routine_control && number_in(request_, 2) == p.rotate.id &&
+                         request_[1] == static_cast<std::uint8_t>(uds::RoutineAction::start);
+    if (started && told.error().kind == PortError::Kind::negative) {  // without an answer nobody knows
+      turning_ = false;
+      run_id_ = 0;
+    }
+    return told;
+  }
+  const auto record = std::span(std::as_const(*told)).subspan(std::min<std::size_t>(3, told->size()));
+  if (service == uds::service::read_data && number == p.sample_format.did) {
+    const auto format = profile::decode_sample_format(p, record);
+    sample_rate_hz_ = format ? format->sample_rate_hz : sample_rate_hz_;
+  } else if (service == uds::service::write_data && number == p.schedule.did) {
+    const auto schedule = profile::decode_schedule(p, std::span(std::as_const(request_)).subspan(3));
+    schedule_ = schedule ? std::optional(*schedule) : std::nullopt;
+  }
+  return told;
+}
+
+// The state is believed when all samples before it are taken.
+Answer<Bytes> StreamPort::state_seen(Answer<Bytes> told) {
+  if (!told || told->size() < 3) {
+    return told;
+  }
+  drain();
+  const auto state = profile::decode_state(*config_.profile, std::span(std::as_const(*told)).subspan(3));
+  if (!state) {
+    return told;
+  }
+  if (turning_ && state->run_id == run_id_ && state->state != ins::State::rotating) {
+    turning_ = false;
+    stream_.end();
+  }
+  return told;
+}
+
+std::uint32_t StreamPort::pages_written() const {  // the page that is being filled does not count
+  return turning_ ? static_cast<std::uint32_t>(stream_.samples() / flash::samples_per_page) : stream_.pages_begun();
+}
+
+std::uint32_t StreamPort::pages_expected() const {
+  if (!schedule_) {
+    return pages_written();
+  }
+  double duration_s = schedule_->rotation_ms * 1e-3 * static_cast<double>(schedule_->positions.size() - 1);
+  for (const auto& position : schedule_->positions) {
+    duration_s += position.dwell_ms * 1e-3;
+  }
+  return static_cast<std::uint32_t>(std::ceil(duration_s * sample_rate_hz_ / flash::samples_per_page));
+}
+
+Answer<Bytes> StreamPort::directory() {
+  drain();
+  if (run_id_ == 0) {
+    return trouble(PortError::Kind::protocol,
+                   "the INS streams its samples, and the service kept none: it was started "
+                   "after the rotation began");
+  }
+  if (!broken_.empty()) {  // the state goes through as it is, so that the gimbal is stopped
+    return trouble(PortError::Kind::protocol, fmt::format("the samples are of no use: {}", broken_));
+  }
+  ins::DirectoryRecord record;
+  record.run_id = run_id_;
+  record.pages_written = pages_written();
+  record.pages_expected = pages_expected();
+  record.complete = !turning_;
+  record.samples = record.complete ? stream_.samples() : std::uint64_t{record.pages_written} * flash::samples_per_page;
+  Bytes response{uds::service::read_data + uds::positive_offset, request_[1], request_[2]};
+  const Bytes bytes = *profile::encode(*config_.profile, record);
+  response.insert(response.end(), bytes.begin(), bytes.end());
+  return response;
+}
+
+Answer<Bytes> StreamPort::memory(std::span<const std::uint8_t> payload) const {
+  const profile::Raw& raw = config_.profile->raw;
+  const auto refused = [this](uds::Nrc nrc) {
+    return tl::unexpected(PortError{
+        PortError::Kind::negative, static_cast<std::uint8_t>(nrc),
+        fmt::format("{}: kept samples: {}", config_.interface, uds::describe_nrc(static_cast<std::uint8_t>(nrc)))});
+  };
+  if (payload.size() != 2 + raw.address_bytes + raw.size_bytes) {
+    return refused(uds::Nrc::incorrect_message_length);
+  }
+  std::uint64_t address = 0, size = 0;
+  for (std::size_t k = 2; k < payload.size(); ++k) {
+    std::uint64_t& into = k < 2 + raw.address_bytes ? address : size;
+    into = into << 8U | payload[k];
+  }
+  if (size == 0 || address + size > std::uint64_t{pages_written()} * flash::page_bytes) {
+    return refused(uds::Nrc::request_out_of_range);
+  }
+  Bytes response{uds::service::read_memory + uds::positive_offset};
+  stream_.append_bytes(address, size, run_id_, !turning_, response);
+  return response;
+}
+
+// From the loop, never from inside request().
+void StreamPort::answer(Answer<Bytes> result) {
+  loop_.cancel(answer_timer_);
+  answer_timer_ = loop_.after(0ns, [this, result = std::move(result)]() mutable {
+    answer_timer_ = 0;
+    if (const auto done = std::exchange(done_, {})) {
+      done(std::move(result));
+    }
+  });
+}
+
+tl::unexpected<PortError> StreamPort::trouble(PortError::Kind kind, const std::string& what) const {
+  const bool named = what.find(config_.interface) != std::string::npos;
+  return tl::unexpected<PortError>(PortError{kind, 0, named ? what : fmt::format("{}: {}", config_.interface, what)});
+}
+
+}  // namespace selfcal
