@@ -1,9 +1,11 @@
 #include "daemon/estimate/summary.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
@@ -92,16 +94,29 @@ std::string largest_correction(const Diagnosis& d) {
   return fmt::format("{} is {} {}, not {}", p.name, with.value, p.unit, without.value);
 }
 
+// Every kind of finding once, with how many there are of one that is there several times.
+std::vector<std::string> kinds_of(const Diagnosis& d) {
+  std::vector<std::string> effects, words;
+  for (const Finding& f : d.findings) {
+    if (std::ranges::find(effects, f.effect) == effects.end()) {
+      const auto same = std::ranges::count(d.findings, f.effect, &Finding::effect);
+      const bool lines = f.effect == "vibration_line" && same > 1;
+      effects.push_back(f.effect);
+      words.push_back(effect_words(f.effect) + (lines ? fmt::format(", {} of them", same) : std::string()));
+    }
+  }
+  return words;
+}
+
 std::string named(const Diagnosis& d) {
-  std::string text;
-  const std::size_t most = 2;
-  for (std::size_t i = 0; i < std::min(most, d.findings.size()); ++i) {
-    text += fmt::format("{}{}", i == 0 ? "" : "; and ", effect_words(d.findings[i].effect));
+  constexpr std::size_t most = 2;
+  const std::vector<std::string> kinds = kinds_of(d);
+  const auto told = std::span(kinds).first(std::min(most, kinds.size()));
+  std::string text = fmt::format("{}", fmt::join(told, "; and "));
+  if (kinds.size() > most) {
+    text += fmt::format("; and {} more", kinds.size() - most);
   }
-  if (d.findings.size() > most) {
-    text += fmt::format("; and {} more", d.findings.size() - most);
-  }
-  return text;
+  return text + (d.unexplained ? "; and what none of these explains" : "");
 }
 
 // What shows it: the strongest coefficient, what the fit makes of the misfit, and what it does to the 24.
@@ -113,7 +128,11 @@ std::string named_cause(const Diagnosis& d) {
                        d.before.nis, d.after.nis);
   }
   const std::string moved = largest_correction(d);
-  return text + (moved.empty() ? "." : fmt::format("; {}.", moved));
+  text += moved.empty() ? std::string() : fmt::format("; {}", moved);
+  if (d.unexplained && !d.remaining.empty()) {
+    text += fmt::format("; {:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
+  }
+  return text + ".";
 }
 
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
@@ -298,28 +317,14 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
   }
 }
 
-namespace {
-
-// Every kind of finding once.
-std::string kinds(const Diagnosis& d) {
-  std::string text;
-  std::vector<std::string> told;
-  for (const Finding& f : d.findings) {
-    if (std::find(told.begin(), told.end(), f.effect) == told.end()) {
-      text += fmt::format("{}{}", told.empty() ? "" : ", ", effect_words(f.effect));
-      told.push_back(f.effect);
-    }
-  }
-  return text;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (d.nothing_turned && d.verdict != DiagnosisVerdict::data_fault) {
     return {SummaryStanding::open,
-            d.findings.empty() ? std::string("Nothing turned: no sensor effect can be told from motion of the base.")
-                               : fmt::format("Nothing turned, so only the noise was judged: {}.", kinds(d)),
+            d.findings.empty()
+                ? std::string("Nothing turned: no sensor effect can be told from motion of the base.")
+                : fmt::format("Nothing turned, so only the noise was judged: {}.", fmt::join(kinds_of(d), ", ")),
             fmt::format("NIS {:.3g}{}.", d.before.nis,
                         d.calibration.noise.disturbed.empty()
                             ? std::string()

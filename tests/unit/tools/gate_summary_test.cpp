@@ -222,5 +222,25 @@ TEST(EffectWords, DefineEachSymbolOnce) {
   EXPECT_EQ(symbols_of("d = a sin(2 pi f t)")[2].meaning, "frequency, fitted");
 }
 
+// A parked vehicle has a hundred vibration lines: they are one kind. And what is named may leave something.
+TEST(Summary, NamesEachKindOnceAndWhatIsLeft) {
+  diagnosis::Diagnosis d = creep();
+  diagnosis::Finding line = d.findings.front(), quantum = line;
+  line.effect = "vibration_line";
+  quantum.effect = "quantisation";
+  d.findings = {line, line, quantum, line, quantum, d.findings.front()};
+  const Subject subject{"real.csv", 0};
+  const std::string whole = summary_of(d, subject, nullptr).verdict;
+  EXPECT_THAT(whole, HasSubstr("3 of them; and "));
+  EXPECT_THAT(whole, HasSubstr("; and 1 more."));
+  d.unexplained = true;
+  d.remaining.emplace_back();
+  d.remaining.back().significance = 6.4;
+  d.remaining.back().words = "accelerometer z, minutes 10 to 12";
+  const Summary left = summary_of(d, subject, nullptr);
+  EXPECT_THAT(left.verdict, HasSubstr("; and 1 more; and what none of these explains."));
+  EXPECT_THAT(left.cause, HasSubstr("6.4 sigma remain in accelerometer z, minutes 10 to 12."));
+}
+
 }  // namespace
 }  // namespace selfcal
