@@ -148,7 +148,7 @@ void FramePort::take_state(const can::CanFrame& frame) {
   const auto state = static_cast<FrameState>(code->first);
   const auto outer = value(frames().state, "outer", frame), inner = value(frames().state, "inner", frame);
   const std::array angles{outer.value_or(0.0), inner.value_or(0.0)};
-  sequence_.on_state(stream_.samples(), state, outer && inner ? &angles : nullptr);
+  sequence_.on_state(stream_s(), state, outer && inner ? &angles : nullptr);
   if (sequence_.phase() == Phase::failed && unsaid_.empty() && run_id_ != 0) {
     break_off(sequence_.why());
   }
@@ -181,7 +181,8 @@ void FramePort::take_told(const can::CanFrame& frame) {
 // --- the rotation
 
 void FramePort::after_sample() {
-  if (sequence_.on_sample(stream_.samples(), stream_.gimbal())) {
+  const std::array<double, 2> gimbal = stream_.gimbal();
+  if (sequence_.on_time(stream_s(), &gimbal)) {
     return command_move();
   }
   if (sequence_.phase() == Phase::over) {
@@ -238,6 +239,11 @@ void FramePort::command_move() {
                                  target[0], target[1]));
   }
   command(frames().move, {{"outer", *raw_outer}, {"inner", *raw_inner}});
+}
+
+// The INS's clock: its samples.
+double FramePort::stream_s() const {
+  return static_cast<double>(stream_.samples()) / config_.profile->sample_format.given.at("sample_rate");
 }
 
 std::uint32_t FramePort::pages_written() const {

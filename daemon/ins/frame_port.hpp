@@ -53,6 +53,7 @@ class FramePort : public InsPort {
   Bytes state_record(profile::FrameState told, const can::CanFrame& frame) const;
   ins::State run_state(profile::FrameState told) const;
   std::uint32_t pages_written() const;
+  double stream_s() const;
   bool turning() const { return sequence_.active() || sequence_.phase() == MoveSequence::Phase::approaching; }
 
   void command(const profile::Frame& frame, std::initializer_list<std::pair<std::string_view, std::uint64_t>> raw = {});

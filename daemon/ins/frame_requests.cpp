@@ -137,11 +137,10 @@ void FramePort::start_rotation(std::span<const std::uint8_t> option) {
     duration_s += position.dwell_ms * 1e-3;
   }
   pages_expected_ = static_cast<std::uint32_t>(std::ceil(duration_s * rate / flash::samples_per_page));
-  sequence_.begin(*schedule_,
-                  {frames().there_by_angle, frames().tolerance_rad, frames().rest_rad, frames().longest_move_s, rate});
+  sequence_.begin(*schedule_, frames().turning);
   command_move();
   if (turning()) {
-    wait_for(Wait::first_position, "rest at the first position", frames().longest_move_s);
+    wait_for(Wait::first_position, "rest at the first position", frames().turning.longest_move_s);
   }
 }
 

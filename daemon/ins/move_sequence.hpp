@@ -1,5 +1,5 @@
-// A schedule turned move by move: which position is commanded when, and whether the INS is there. It counts the INS's time in
-// samples and knows no clock.
+// A schedule turned move by move: which position is commanded when, and whether the INS is there. It is told the time, in seconds
+// of the INS's clock, and knows none itself.
 #pragma once
 
 #include <array>
@@ -8,49 +8,48 @@
 
 #include "protocol/ins_interface/records.hpp"
 #include "protocol/profile/frames.hpp"
+#include "protocol/profile/turning.hpp"
 
 namespace selfcal {
 
 class MoveSequence {
  public:
-  struct Rule {
-    bool by_angle = true;  // else by the state
-    double tolerance_rad = 0.0;
-    double rest_rad = 0.0;  // it rests while its angles stay so near to each other
-    double longest_move_s = 60.0;
-    double sample_rate_hz = 0.0;
-  };
   enum class Phase : std::uint8_t { none, approaching, dwelling, moving, over, failed };
 
-  // The first position is to be commanded, before the stream begins. Angles are the INS's.
-  void begin(ins::ScheduleRecord schedule, const Rule& rule);
+  // The first position is to be commanded now, before any data are taken.
+  void begin(ins::ScheduleRecord schedule, const profile::Turning& turning, double now_s = 0.0);
+  // The data begin: the first dwell counts from here on.
+  void data_begin(double now_s) { arrive(now_s); }
   void stop() { phase_ = phase_ == Phase::over || phase_ == Phase::failed ? phase_ : Phase::none; }
   void fail(std::string why);
 
-  // A sample came, so many there are now. True: target() is to be commanded.
-  bool on_sample(std::uint64_t samples, std::array<double, 2> gimbal_rad);
-  // A state frame came; its gimbal angles, where it has them.
-  void on_state(std::uint64_t samples, profile::FrameState state, const std::array<double, 2>* gimbal_rad);
+  // Time went by; the gimbal's angles, where they are told. True: target() is to be commanded.
+  bool on_time(double now_s, const std::array<double, 2>* gimbal_rad);
+  // The INS told its state; its gimbal angles, where it told them with it.
+  void on_state(double now_s, profile::FrameState state, const std::array<double, 2>* gimbal_rad);
 
   Phase phase() const { return phase_; }
   bool active() const { return phase_ == Phase::dwelling || phase_ == Phase::moving; }
   std::array<double, 2> target() const;             // radians
   std::size_t position() const { return at_ + 1; }  // a move belongs to the position that it leads to
   const std::string& why() const { return why_; }
+  double dwell_end_s() const { return dwell_end_s_; }
+  // The angles have stayed where they are, as they were told.
+  bool rests(double now_s) const;
 
  private:
   bool near(std::array<double, 2> gimbal_rad) const;
-  void watch_rest(std::uint64_t samples, std::array<double, 2> gimbal_rad);
-  void arrive(std::uint64_t samples);
+  void watch_rest(double now_s, std::array<double, 2> gimbal_rad);
+  void arrive(double now_s);
 
   ins::ScheduleRecord schedule_;
-  Rule rule_;
+  profile::Turning turning_;
   Phase phase_ = Phase::none;
   std::size_t at_ = 0;
-  std::uint64_t commanded_ = 0, dwell_end_ = 0;  // samples
-  std::uint64_t rest_from_ = 0;                  // samples; the gimbal stays since then about
+  double commanded_s_ = 0.0, dwell_end_s_ = 0.0;
+  double rest_from_s_ = 0.0;  // the gimbal stays since then about
   std::array<double, 2> rest_at_{};
-  int rests_ = 0;  // state frames in a row that say so, since the command
+  int rests_ = 0;  // states in a row that say so, since the command
   std::string why_;
 };
 

@@ -83,15 +83,15 @@ void say_how(Writer& out, const Profile& profile) {
       "s. "
       "After the last dwell{}.",
       profile.timing.request_timeout_s, 2,
-      frames.state.find("outer") != nullptr && frames.there_by_angle ? " there" : "",
+      frames.state.find("outer") != nullptr && frames.turning.by_angle ? " there" : "",
       frames.start ? ", upon frame start," : "", profile.sample_format.given.at("sample_rate"),
-      frames.there_by_angle
+      frames.turning.by_angle
           ? fmt::format(
                 "both gimbal angles of the samples are within {:g} deg of the position and stay within {:g} deg "
                 "for 0.2 s, which are part of the dwell",
-                frames.tolerance_rad * degrees_per_radian, frames.rest_rad * degrees_per_radian)
+                frames.turning.tolerance_rad * degrees_per_radian, frames.turning.rest_rad * degrees_per_radian)
           : std::string("two state frames in a row say idle"),
-      frames.longest_move_s, frames.stop ? " frame stop ends the stream" : " the tester listens no more"));
+      frames.turning.longest_move_s, frames.stop ? " frame stop ends the stream" : " the tester listens no more"));
   out.say(
       "Every frame of a sample has the counter of that sample; the next sample has the next counter, and after the "
       "highest "

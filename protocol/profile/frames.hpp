@@ -12,6 +12,7 @@
 
 #include "protocol/profile/roles.hpp"
 #include "protocol/profile/signals.hpp"
+#include "protocol/profile/turning.hpp"
 
 namespace selfcal::profile {
 
@@ -33,10 +34,7 @@ struct Frames {
   Frame move, read, write, reset;    // to it
   std::optional<Frame> start, stop;  // of the stream, of all motion
   std::vector<Frame> samples;        // each sample is told by one frame of each, all with its counter
-  bool there_by_angle = false;       // else by the state: idle
-  double rest_rad = 0.0;             // by angle: at rest while the angles stay so near to each other
-  double tolerance_rad = 0.0;        // by angle
-  double longest_move_s = 60.0;      // of the INS's clock
+  Turning turning;
 };
 
 // What an INS tells again and again beside UDS. Its identifiers are those of the bus; the ones here are not used.

@@ -16,8 +16,6 @@ namespace {
 
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
 constexpr std::array<std::string_view, 3> kinds{"unsigned", "signed", "float"};
-constexpr std::array<std::string_view, 2> ends{"angle", "state"};
-constexpr double radians_per_degree = 3.14159265358979323846 / 180.0;
 constexpr std::array<std::string_view, 8> of_a_sample{"delta_theta_x", "delta_theta_y", "delta_theta_z", "delta_v_x",
                                                       "delta_v_y",     "delta_v_z",     "outer",         "inner"};
 
@@ -83,7 +81,7 @@ class FramesReader {
       }
     }
     read_samples(frames);
-    read_turning(frames);
+    read_turning_table(frames);
     check_values(frames);
     section_.only_these();
     return frames;
@@ -373,14 +371,9 @@ class FramesReader {
     }
   }
 
-  void read_turning(Frames& frames) {
+  void read_turning_table(Frames& frames) {
     Section turning = section_.table("turning", true);
-    frames.there_by_angle = turning.word("there", ends, turning.there()).value_or("angle") == "angle";
-    frames.tolerance_rad =
-        turning.number("tolerance_deg", 0.001, 10.0, turning.there() && frames.there_by_angle).value_or(1.0) *
-        radians_per_degree;
-    frames.rest_rad = turning.number("rest_deg", 0.001, 5.0).value_or(0.05) * radians_per_degree;
-    frames.longest_move_s = turning.number("longest_s", 0.1, 3600.0).value_or(frames.longest_move_s);
+    frames.turning = read_turning(turning);
     turning.only_these();
   }
 

@@ -120,20 +120,28 @@ TEST_F(Stream, AFrameThatIsTooShortEndsIt) {
 class Moves : public testing::Test {
  protected:
   static ins::ScheduleRecord schedule() { return {{{0, 0, 2000}, {90000, 0, 2000}}, 1000}; }
+  static profile::Turning turning(bool by_angle) { return {by_angle, 1.0 * degree, 0.05 * degree, 3.0}; }
   void begin(bool by_angle) {
-    moves_.begin(schedule(), {by_angle, 1.0 * degree, 0.05 * degree, 3.0, 10.0});
-    moves_.on_state(0, FrameState::idle, nullptr);
+    moves_.begin(schedule(), turning(by_angle));
+    tell(0, FrameState::idle);
     EXPECT_EQ(moves_.phase(), Phase::approaching);  // it may have been on its way when the move was commanded
-    moves_.on_state(0, FrameState::idle, nullptr);
+    tell(0, FrameState::idle);
     EXPECT_EQ(moves_.phase(), Phase::dwelling);
   }
-  bool at(std::uint64_t samples, double outer_deg) { return moves_.on_sample(samples, {outer_deg * degree, 0.0}); }
+  // Samples come at 10 Hz.
+  bool at(int samples, double outer_deg) {
+    const std::array<double, 2> gimbal{outer_deg * degree, 0.0};
+    return moves_.on_time(samples / 10.0, &gimbal);
+  }
+  void tell(int samples, FrameState state, const std::array<double, 2>* gimbal = nullptr) {
+    moves_.on_state(samples / 10.0, state, gimbal);
+  }
   MoveSequence moves_;
 };
 
 TEST_F(Moves, OneAfterTheOtherByAngle) {
   begin(true);
-  for (std::uint64_t k = 1; k < 20; ++k) {
+  for (int k = 1; k < 20; ++k) {
     EXPECT_FALSE(at(k, 0.0));
   }
   EXPECT_TRUE(at(20, 0.0));  // 2 s at 10 Hz
@@ -156,11 +164,11 @@ TEST_F(Moves, OneAfterTheOtherByAngle) {
 TEST_F(Moves, OneAfterTheOtherByState) {
   begin(false);
   EXPECT_TRUE(at(20, 0.0));
-  moves_.on_state(21, FrameState::idle, nullptr);
-  moves_.on_state(22, FrameState::moving, nullptr);
-  moves_.on_state(23, FrameState::idle, nullptr);
+  tell(21, FrameState::idle);
+  tell(22, FrameState::moving);
+  tell(23, FrameState::idle);
   EXPECT_EQ(moves_.phase(), Phase::moving);
-  moves_.on_state(25, FrameState::idle, nullptr);
+  tell(25, FrameState::idle);
   EXPECT_EQ(moves_.phase(), Phase::dwelling);
   EXPECT_FALSE(at(44, 0.0));
   EXPECT_EQ(moves_.phase(), Phase::dwelling);
@@ -186,7 +194,7 @@ TEST_F(Moves, WhatIsLeftIsTold) {
 
 TEST_F(Moves, AnInsThatFailsIsTold) {
   begin(true);
-  moves_.on_state(3, FrameState::failed, nullptr);
+  tell(3, FrameState::failed);
   EXPECT_EQ(moves_.phase(), Phase::failed);
   EXPECT_THAT(moves_.why(), HasSubstr("at position 1 the INS says that it failed"));
 }
@@ -194,16 +202,40 @@ TEST_F(Moves, AnInsThatFailsIsTold) {
 // Angles are looked at where the state frame has them, and a state before any schedule means nothing.
 TEST_F(Moves, TheFirstPositionIsWaitedFor) {
   const std::array away{20.0 * degree, 0.0}, there{0.0, 0.0};
-  moves_.on_state(0, FrameState::idle, &there);
+  tell(0, FrameState::idle, &there);
   EXPECT_EQ(moves_.phase(), Phase::none);
-  moves_.begin(schedule(), {true, 1.0 * degree, 0.05 * degree, 3.0, 10.0});
+  moves_.begin(schedule(), turning(true));
   for (int k = 0; k < 5; ++k) {
-    moves_.on_state(0, FrameState::idle, &away);
+    tell(0, FrameState::idle, &away);
   }
   EXPECT_EQ(moves_.phase(), Phase::approaching);
-  moves_.on_state(0, FrameState::idle, &there);
-  moves_.on_state(0, FrameState::idle, &there);
+  tell(0, FrameState::idle, &there);
+  tell(0, FrameState::idle, &there);
   EXPECT_EQ(moves_.phase(), Phase::dwelling);
+}
+
+// A position may be where the gimbal is already.
+TEST_F(Moves, AMoveThatIsNoneIsOverWhenTheGimbalRests) {
+  moves_.begin({{{0, 0, 2000}, {0, 0, 2000}}, 1000}, turning(true), 1.0);
+  at(11, 0.0);
+  EXPECT_EQ(moves_.phase(), Phase::approaching);
+  at(12, 0.0);
+  EXPECT_EQ(moves_.phase(), Phase::dwelling);
+  moves_.data_begin(3.0);
+  EXPECT_FALSE(at(49, 0.0));
+  EXPECT_TRUE(at(50, 0.0));
+  at(51, 0.0);
+  EXPECT_EQ(moves_.phase(), Phase::moving);
+  at(52, 0.0);
+  EXPECT_EQ(moves_.phase(), Phase::dwelling);
+}
+
+// By state, where no angles are told at all.
+TEST_F(Moves, WhatIsNotReachedIsToldWithoutAngles) {
+  begin(false);
+  EXPECT_TRUE(moves_.on_time(2.0, nullptr));
+  EXPECT_FALSE(moves_.on_time(5.1, nullptr));
+  EXPECT_EQ(moves_.why(), "position 2 is not reached within 3 s");
 }
 
 }  // namespace
