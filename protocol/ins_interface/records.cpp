@@ -60,6 +60,26 @@ std::array<FieldRange, 6> sample_format_ranges(const SampleFormatRecord& r) {
 
 }  // namespace
 
+// Written so that NaN fails too.
+Expected<void> check(const StateRecord& r) {
+  constexpr double two_turns_deg = 720.0;
+  for (const double angle : {r.outer_deg, r.inner_deg}) {
+    if (!(std::abs(angle) <= two_turns_deg)) {
+      return wrong("state", "gimbal angle in degrees", angle);
+    }
+  }
+  return {};
+}
+
+Expected<void> check(const MoveRecord& r) {
+  for (const std::int32_t angle : {r.outer_mdeg, r.inner_mdeg}) {
+    if (angle < -full_turn_mdeg || angle > full_turn_mdeg) {
+      return wrong("move", "angle in millidegrees", angle);
+    }
+  }
+  return {};
+}
+
 Expected<void> check(const ScheduleRecord& r) {
   if (r.positions.empty() || r.positions.size() > max_positions) {
     return wrong("schedule", "number of positions", r.positions.size());

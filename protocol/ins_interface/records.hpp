@@ -27,7 +27,11 @@ struct StateRecord {
   std::uint32_t coefficients_crc = 0;      // of the record in force
   std::uint32_t run_id = 0;                // latest self-calibration, 0: none
   std::uint32_t power_cycles = 0;
+  // Of an INS whose gimbal is told each move by itself, as far as its profile has them.
+  bool moving = false;
+  double outer_deg = 0.0, inner_deg = 0.0;
 };
+[[nodiscard]] Expected<void> check(const StateRecord& record);
 
 inline constexpr std::size_t max_positions = 255;
 struct ScheduleRecord {
@@ -43,6 +47,14 @@ struct ScheduleRecord {
 };
 [[nodiscard]] Expected<void> check(const ScheduleRecord& record);
 
+// A position that the gimbal is told by itself.
+struct MoveRecord {
+  std::int32_t outer_mdeg = 0;  // |angle| <= 360000
+  std::int32_t inner_mdeg = 0;
+  bool operator==(const MoveRecord&) const = default;
+};
+[[nodiscard]] Expected<void> check(const MoveRecord& record);
+
 struct SiteRecord {
   double latitude_deg = 0.0;  // WGS-84
   double longitude_deg = 0.0;
@@ -57,7 +69,7 @@ struct DirectoryRecord {
   std::uint32_t run_id = 0;
   std::uint32_t first_page = 0;      // older ones were overwritten by the ring
   std::uint32_t pages_written = 0;   // pages first_page .. pages_written-1 can be uploaded
-  std::uint32_t pages_expected = 0;  // of the whole schedule
+  std::uint32_t pages_expected = 0;  // of the whole schedule; of an INS that knows none, 0
   std::uint64_t samples = 0;         // written so far
   bool complete = false;             // no more will come
 

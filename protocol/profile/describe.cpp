@@ -160,6 +160,7 @@ class Document {
       write_services();
       write_identifiers();
       write_records();
+      write_moves();
       write_set();
       write_routines();
       write_upload();
@@ -245,6 +246,7 @@ class Document {
     add(p_.software, "software version, ASCII", "read");
     add(p_.state.did, "state", "read");
     add(p_.schedule.did, "schedule", "read, write");
+    add(p_.move ? p_.move->did : std::nullopt, "move", "write");
     add(p_.site.did, "site", "read");
     add(told_directory(p_), "directory", "read");
     add(p_.sample_format.did, "sample format", "read");
@@ -276,6 +278,46 @@ class Document {
         out_.say(fmt::format("Not told, always the same: {} {:.12g}.", name, value));
       }
     }
+  }
+
+  void write_moves() {
+    if (!p_.move) {
+      return;
+    }
+    const Move& move = *p_.move;
+    constexpr double degrees_per_radian = 180.0 / 3.14159265358979323846;
+    out_.heading("Moves: the gimbal is told each position by itself");
+    out_.say(fmt::format(
+        "The INS takes no schedule. A position is commanded by {}; the response comes at once, and the gimbal turns to "
+        "it "
+        "whether routine 0x{:04X} (rotate) was started or not. The tester commands the first position, waits until the "
+        "gimbal is there, and starts rotate. From then on the INS records raw data, at rest and while it turns, and "
+        "its "
+        "state is rotating, until rotate is stopped. After each dwell the tester commands the next position, and after "
+        "the last one it stops rotate: the directory is then complete with the last page, which need not be full, and "
+        "the "
+        "state is another one, complete for example. A stop before that ends the recording in the same way, and the "
+        "gimbal stands. A move is not commanded while another one is under way; such a one may be refused (0x22), and "
+        "a "
+        "position that the gimbal cannot have is refused (0x31).",
+        move.did ? fmt::format("writing identifier 0x{:04X}", *move.did)
+                 : fmt::format("the start of routine 0x{:04X}, which is not stopped and has no result",
+                               move.routine.value_or(0)),
+        p_.rotate.id.value_or(0)));
+    out_.say(fmt::format(
+        "The tester reads the state up to ten times a second while it waits. The gimbal is there when {}. It may take "
+        "{:g} s. How many pages there will be the INS does not know; in the result of rotate, position is 0.",
+        move.turning.by_angle
+            ? fmt::format(
+                  "both its angles in the state are within {:g} deg of the position and stay within {:g} deg for "
+                  "0.2 s, which are part of the dwell",
+                  move.turning.tolerance_rad * degrees_per_radian, move.turning.rest_rad * degrees_per_radian)
+            : std::string(
+                  "gimbal_moving of the state is 0 twice in a row: it is 1 from the response to a move on, until "
+                  "the gimbal rests, and then 0 until the next move"),
+        move.turning.longest_move_s));
+    out_.say(move.did ? "Record move:" : "Option of the start:");
+    write_record(out_, move.layout, record_role("move"));
   }
 
   void write_set() {
@@ -328,7 +370,9 @@ class Document {
 
   void write_routines() {
     write_routine(p_.rotate, "rotate",
-                  "rotate by the schedule and store raw data; it can be stopped, the state is then aborted", true);
+                  p_.move ? "store raw data until it is stopped"
+                          : "rotate by the schedule and store raw data; it can be stopped, the state is then aborted",
+                  true);
     write_routine(p_.erase, "erase", "erase the inactive slot", false);
     write_routine(p_.commit, "commit", "make the inactive set the one in force from the next power-on on", false);
     write_routine(p_.navigation_check, "navigation_check", "navigate free-inertially at rest; it can be stopped", true);

@@ -18,7 +18,8 @@ std::vector<std::pair<std::uint16_t, std::string>> dids_of(const Profile& p) {
   for (const auto& [name, did] :
        {std::pair("identity.serial", std::optional(p.serial)),
         std::pair("identity.software", std::optional(p.software)), std::pair("state", p.state.did),
-        std::pair("schedule", p.schedule.did), std::pair("site", p.site.did), std::pair("directory", p.directory.did),
+        std::pair("schedule", p.schedule.did), std::pair("move", p.move ? p.move->did : std::nullopt),
+        std::pair("site", p.site.did), std::pair("directory", p.directory.did),
         std::pair("sample_format", p.sample_format.did), std::pair("coefficients.in_force", p.set_in_force),
         std::pair("coefficients.inactive", p.set_inactive), std::pair("coefficients.factory", p.set_factory)}) {
     if (did) {
@@ -33,9 +34,16 @@ std::vector<std::pair<std::uint16_t, std::string>> dids_of(const Profile& p) {
   return dids;
 }
 
-std::array<std::pair<const char*, const Routine*>, 4> routines_of(const Profile& p) {
-  return {
-      {{"rotate", &p.rotate}, {"erase", &p.erase}, {"commit", &p.commit}, {"navigation_check", &p.navigation_check}}};
+std::vector<std::pair<std::uint16_t, std::string>> routines_of(const Profile& p) {
+  std::vector<std::pair<std::uint16_t, std::string>> routines;
+  for (const auto& [name, id] : {std::pair("rotate", p.rotate.id), std::pair("erase", p.erase.id),
+                                 std::pair("commit", p.commit.id), std::pair("navigation_check", p.navigation_check.id),
+                                 std::pair("move", p.move ? p.move->routine : std::nullopt)}) {
+    if (id) {
+      routines.emplace_back(*id, name);
+    }
+  }
+  return routines;
 }
 
 }  // namespace
@@ -47,12 +55,9 @@ std::string did_name(const Profile& p, std::uint16_t did) {
 }
 
 std::string routine_name(const Profile& p, std::uint16_t routine) {
-  for (const auto& [name, own] : routines_of(p)) {
-    if (own->id == routine) {
-      return name;
-    }
-  }
-  return fmt::format("0x{:04X}", routine);
+  const auto routines = routines_of(p);
+  const auto found = std::ranges::find(routines, routine, &std::pair<std::uint16_t, std::string>::first);
+  return found == routines.end() ? fmt::format("0x{:04X}", routine) : found->second;
 }
 
 uds::DecoderOptions decoder_options(const ProfilePtr& profile) {
@@ -68,10 +73,8 @@ uds::DecoderOptions decoder_options(const ProfilePtr& profile) {
   for (auto& [did, name] : dids_of(*profile)) {
     options.names.dids.emplace(did, std::move(name));
   }
-  for (const auto& [name, routine] : routines_of(*profile)) {
-    if (routine->id) {
-      options.names.routines.emplace(*routine->id, name);
-    }
+  for (auto& [routine, name] : routines_of(*profile)) {
+    options.names.routines.emplace(routine, std::move(name));
   }
   options.names.texts = {profile->serial, profile->software};
   options.names.upload_by_page = profile->raw.by_page;

@@ -13,6 +13,7 @@
 #include "protocol/profile/frames.hpp"
 #include "protocol/profile/layout.hpp"
 #include "protocol/profile/set_form.hpp"
+#include "protocol/profile/turning.hpp"
 
 namespace selfcal::profile {
 
@@ -58,6 +59,14 @@ struct Routine {
 // identifier that ISO 14229-1 (table C.1) reserves, so that no INS has it.
 inline constexpr std::uint16_t kept_directory = 0xFFFF;
 
+// An INS that takes no schedule: each position is commanded by itself, by a write or by the start of a routine. The service is
+// answered in its own INS's records all the same (told_as.hpp, daemon/ins/move_port).
+struct Move {
+  std::optional<std::uint16_t> did, routine;  // one of both
+  Layout layout;
+  Turning turning;  // by angle, or by `gimbal_moving` of the state
+};
+
 // The raw data: how their pages are asked for, and what they hold.
 struct Raw {
   Layout page;
@@ -84,6 +93,7 @@ struct Profile {
   Security security;
   std::uint16_t serial = 0, software = 0;
   Record state, schedule, site, directory, sample_format;
+  std::optional<Move> move;  // in place of `schedule`
   // Without slots a set is written over the one in force, and used from the next power-on on.
   bool slots = true;
   bool field_by_field = false;  // each field of a set has an identifier of its own (Field::did), in the order of `set`

@@ -11,6 +11,7 @@
 #include "protocol/profile/read_bus.hpp"
 #include "protocol/profile/read_frames.hpp"
 #include "protocol/profile/read_layout.hpp"
+#include "protocol/profile/read_move.hpp"
 #include "protocol/profile/read_security.hpp"
 
 namespace selfcal::profile {
@@ -155,11 +156,43 @@ class ProfileReader {
     section.only_these();
   }
 
+  // A schedule, or a move in its place.
+  void read_positions() {
+    const bool both = root_.has("schedule") && root_.has("move");
+    read_record("schedule", profile_.schedule, true);
+    Section move = root_.table("move");
+    if (!move.there()) {
+      if (!root_.has("schedule")) {
+        root_.fault("schedule", "missing, and there is no move in its place");
+      }
+      return;
+    }
+    if (both) {
+      move.fault("", fmt::format("and a schedule (line {}): positions are told in one way", root_.line_of("schedule")));
+    }
+    if (root_.has("stream")) {
+      move.fault("", fmt::format("and a stream (line {}): who is told each position by itself keeps its samples",
+                                 root_.line_of("stream")));
+    }
+    profile_.move = read_move(move, root_, profile_, order_);
+    if (profile_.move->did) {
+      dids_.take(move, "did", *profile_.move->did);
+    }
+    if (profile_.move->routine) {
+      routines_.take(move, "routine", *profile_.move->routine);
+    }
+  }
+
   void read_records() {
     read_record("state", profile_.state, true);
-    read_record("schedule", profile_.schedule, true);
+    read_positions();
     read_record("site", profile_.site, true);
     root_.has("stream") ? keep_directory() : read_record("directory", profile_.directory, true);
+    const bool expects = profile_.directory.layout.find("pages_expected") != nullptr ||
+                         profile_.directory.given.contains("pages_expected");
+    if (root_.has("directory") && !profile_.move && !expects) {
+      faults_.add(root_.line_of("directory"), "directory.fields.pages_expected", "missing");
+    }
     read_record("sample_format", profile_.sample_format, false);
   }
 

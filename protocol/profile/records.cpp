@@ -55,6 +55,22 @@ Expected<void> take_all(const Values& values, const Record& record, std::string_
   }
 }
 
+// Gimbal angles, outer and inner: our axes in the INS's words, and back.
+template <typename T>
+std::array<T, 2> in_their_axes(const Profile& profile, const std::array<T, 2>& ours) {
+  std::array<T, 2> theirs{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    theirs[profile.raw.gimbal[k]] = static_cast<T>(profile.raw.gimbal_sign[k] * ours[k]);
+  }
+  return theirs;
+}
+
+template <typename T>
+std::array<T, 2> in_our_axes(const Profile& profile, const std::array<T, 2>& theirs) {
+  return {static_cast<T>(profile.raw.gimbal_sign[0] * theirs[profile.raw.gimbal[0]]),
+          static_cast<T>(profile.raw.gimbal_sign[1] * theirs[profile.raw.gimbal[1]])};
+}
+
 void put(Values& values, std::string_view name, long double number) {
   values.numbers[std::string(name)].push_back(number);
 }
@@ -80,6 +96,10 @@ Expected<Bytes> encode(const Profile& profile, const ins::StateRecord& r) {
   put(v, "coefficients_crc", r.coefficients_crc);
   put(v, "run_id", r.run_id);
   put(v, "power_cycles", r.power_cycles);
+  put(v, "gimbal_moving", r.moving ? 1 : 0);
+  const auto theirs = in_their_axes<double>(profile, {r.outer_deg, r.inner_deg});
+  put(v, "outer", theirs[0]);
+  put(v, "inner", theirs[1]);
   return write_fields(profile.state.layout, v);
 }
 
@@ -91,22 +111,22 @@ Expected<ins::StateRecord> decode_state(const Profile& profile, ByteView bytes) 
   ins::StateRecord r;
   r.state = static_cast<ins::State>(v->number("state"));
   r.in_force = static_cast<ins::Slot>(v->number("in_force"));
+  r.moving = v->number("gimbal_moving") != 0;
+  const auto ours =
+      in_our_axes<double>(profile, {static_cast<double>(v->number("outer")), static_cast<double>(v->number("inner"))});
+  r.outer_deg = ours[0];
+  r.inner_deg = ours[1];
   return checked(take_all(*v, profile.state, "faults", r.faults, "coefficients_version", r.coefficients_version,
                           "coefficients_crc", r.coefficients_crc, "run_id", r.run_id, "power_cycles", r.power_cycles),
                  r);
 }
 
 Expected<Bytes> encode(const Profile& profile, const ins::ScheduleRecord& r) {
-  const Raw& raw = profile.raw;
   Values v;
   put(v, "positions", static_cast<long double>(r.positions.size()));
   put(v, "rotation", r.rotation_ms);
   for (const auto& position : r.positions) {
-    const std::array<std::int32_t, 2> ours{position.outer_mdeg, position.inner_mdeg};
-    std::array<std::int32_t, 2> theirs{};
-    for (std::size_t k = 0; k < 2; ++k) {
-      theirs[raw.gimbal[k]] = raw.gimbal_sign[k] * ours[k];
-    }
+    const auto theirs = in_their_axes<std::int32_t>(profile, {position.outer_mdeg, position.inner_mdeg});
     put(v, "outer", theirs[0]);
     put(v, "inner", theirs[1]);
     put(v, "dwell", position.dwell_ms);
@@ -123,14 +143,30 @@ Expected<ins::ScheduleRecord> decode_schedule(const Profile& profile, ByteView b
   const auto taken = take_whole(*v, profile.schedule, "rotation", r.rotation_ms);
   const auto count = static_cast<std::size_t>(v->number("positions"));
   for (std::size_t i = 0; taken && i < count; ++i) {
-    const std::array theirs{element<std::int32_t>(*v, "outer", i), element<std::int32_t>(*v, "inner", i)};
-    ins::ScheduleRecord::Position position;
-    position.outer_mdeg = profile.raw.gimbal_sign[0] * theirs[profile.raw.gimbal[0]];
-    position.inner_mdeg = profile.raw.gimbal_sign[1] * theirs[profile.raw.gimbal[1]];
-    position.dwell_ms = element<std::uint32_t>(*v, "dwell", i);
-    r.positions.push_back(position);
+    const auto ours = in_our_axes<std::int32_t>(
+        profile, {element<std::int32_t>(*v, "outer", i), element<std::int32_t>(*v, "inner", i)});
+    r.positions.push_back({ours[0], ours[1], element<std::uint32_t>(*v, "dwell", i)});
   }
   return checked(taken, r);
+}
+
+Expected<Bytes> encode(const Profile& profile, const ins::MoveRecord& r) {
+  const auto theirs = in_their_axes<std::int32_t>(profile, {r.outer_mdeg, r.inner_mdeg});
+  Values v;
+  put(v, "outer", theirs[0]);
+  put(v, "inner", theirs[1]);
+  return write_fields(profile.move->layout, v);
+}
+
+Expected<ins::MoveRecord> decode_move(const Profile& profile, ByteView bytes) {
+  const auto v = read_fields(profile.move->layout, bytes);
+  if (!v) {
+    return tl::unexpected(v.error());
+  }
+  std::array<std::int32_t, 2> theirs{};
+  const auto taken = take_all(*v, none, "outer", theirs[0], "inner", theirs[1]);
+  const auto ours = in_our_axes(profile, theirs);
+  return checked(taken, ins::MoveRecord{ours[0], ours[1]});
 }
 
 Expected<Bytes> encode(const Profile& profile, const ins::SiteRecord& r) {

@@ -11,6 +11,7 @@ namespace selfcal::profile {
 
 [[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::StateRecord& record);
 [[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::ScheduleRecord& record);
+[[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::MoveRecord& record);  // where it has moves
 [[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::SiteRecord& record);
 [[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::DirectoryRecord& record);
 [[nodiscard]] Expected<Bytes> encode(const Profile& profile, const ins::SampleFormatRecord& record);
@@ -21,6 +22,7 @@ namespace selfcal::profile {
 
 [[nodiscard]] Expected<ins::StateRecord> decode_state(const Profile& profile, ByteView bytes);
 [[nodiscard]] Expected<ins::ScheduleRecord> decode_schedule(const Profile& profile, ByteView bytes);
+[[nodiscard]] Expected<ins::MoveRecord> decode_move(const Profile& profile, ByteView bytes);
 [[nodiscard]] Expected<ins::SiteRecord> decode_site(const Profile& profile, ByteView bytes);
 [[nodiscard]] Expected<ins::DirectoryRecord> decode_directory(const Profile& profile, ByteView bytes);
 // Of what the profile gives where the INS tells nothing: `bytes` may then be empty.
