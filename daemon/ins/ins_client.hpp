@@ -13,7 +13,7 @@
 #include "daemon/ins/unlock_key.hpp"
 #include "protocol/ins_interface/coefficients.hpp"
 #include "protocol/ins_interface/records.hpp"
-#include "protocol/profile/profile.hpp"
+#include "protocol/profile/told_as.hpp"
 #include "protocol/uds/services.hpp"
 
 namespace selfcal {
@@ -21,7 +21,7 @@ namespace selfcal {
 class InsClient {
  public:
   InsClient(Timers& timers, InsPort& port, profile::ProfilePtr profile = profile::built_in())
-      : timers_(timers), port_(port), profile_(std::move(profile)), tally_(profile_) {}
+      : timers_(timers), port_(port), profile_(profile::told_as(profile)), tally_(profile_) {}
 
   // Whether a session other than the default one was asked for: it is to be ended (session_end.hpp).
   bool session_asked_for() const { return session_asked_for_; }

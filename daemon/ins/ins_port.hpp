@@ -24,6 +24,7 @@ struct PortError {
     negative,  // the INS refused, with nrc
     protocol,  // it answered something that makes no sense
     local,     // not the INS's fault: disk or database of this machine
+    ended,     // what the port did in the INS's place is over before its time: asking again tells no more
   };
   Kind kind = Kind::link;
   std::uint8_t nrc = 0;

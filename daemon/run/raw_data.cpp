@@ -22,9 +22,12 @@ constexpr int completion_looks = 25;  // the last page is programmed in far less
 
 // Of this run's rotation, and in agreement with format and schedule.
 Task<Answer<ins::DirectoryRecord>> RawData::read_directory() {
-  const auto directory = co_await client_.read_directory();
+  auto directory = co_await client_.read_directory();
   if (!directory) {
     co_return tl::unexpected(directory.error());
+  }
+  if (data_.config.profile->move && directory->pages_expected == 0) {
+    directory->pages_expected = pages_due(*directory);
   }
   if (directory->run_id != journal_.record.rotation) {
     co_return protocol_error(
@@ -41,6 +44,13 @@ Task<Answer<ins::DirectoryRecord>> RawData::read_directory() {
     pages_->learn_samples(directory->samples);
   }
   co_return *directory;
+}
+
+// An INS that is turned move by move knows no schedule. In this state its rotation is known to be over, and whole if it was not to
+// end early.
+std::uint32_t RawData::pages_due(const ins::DirectoryRecord& directory) const {
+  const bool whole = journal_.record.state == State::draining && directory.complete && journal_.record.early_end_s < 0;
+  return whole ? directory.pages_written : static_cast<std::uint32_t>(pages_of(data_.schedule, data_.format));
 }
 
 // The ring of the INS may have lost what was not pulled yet.

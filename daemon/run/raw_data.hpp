@@ -35,6 +35,7 @@ class RawData : public RunSteps {
   void close();
 
  private:
+  std::uint32_t pages_due(const ins::DirectoryRecord& directory) const;
   Answer<Done> check_ring(const ins::DirectoryRecord& directory);
   void note_bad_page(std::uint32_t page, const std::string& why);
 

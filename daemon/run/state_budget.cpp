@@ -22,6 +22,12 @@ constexpr double check_margin_s = 60.0;
 // every second.
 constexpr double estimator_s = 600.0;
 
+// Of an INS that is turned move by move the start is answered when its gimbal rests at the first position.
+double first_move_s(const InsConfig& config) {
+  const profile::Profile& p = *config.profile;
+  return p.move ? p.move->turning.longest_move_s : p.frames ? p.frames->turning.longest_move_s : 0.0;
+}
+
 // What the state waits for, on the operator's clock, the link being up. Each request may be asked twice.
 double work_s(State state, const InsConfig& config, double page_s) {
   const auto requests = [&](int count) { return 2.0 * count * config.request_timeout_s; };
@@ -31,7 +37,7 @@ double work_s(State state, const InsConfig& config, double page_s) {
     case State::connecting: return requests(5);
     case State::unlocking: return requests(8) + ins_s(stop_s);
     case State::scheduling: return requests(4);
-    case State::starting: return requests(4) + make_room_s;
+    case State::starting: return requests(4) + make_room_s + ins_s(first_move_s(config));
     case State::rotating: return requests(8) + page_due_s;
     case State::draining: return requests(8) + page_transfer_s;
     case State::ending_early:
