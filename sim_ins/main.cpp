@@ -202,6 +202,9 @@ Expected<std::function<void()>> open_node(const Arguments& a, const SimConfig& c
   if (a.node.diagnostics.profile->frames) {
     return serving(FrameNode::open(a.node, instrument, CommandedGimbal(config, a.seed, physics, a.node.scenario)));
   }
+  if (a.node.diagnostics.profile->move) {
+    instrument.turn_by_moves(CommandedGimbal(config, a.seed, physics, a.node.scenario));
+  }
   return serving(BusNode::open(a.node, instrument));
 }
 

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "protocol/byte_order.hpp"
+#include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 
 namespace selfcal::sim {
@@ -218,14 +219,7 @@ bool Diagnostics::knows(std::uint16_t did) const {
   const std::array dids{
       std::optional(p.serial),    std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
       profile::told_directory(p), p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
-  return std::ranges::find(dids, std::optional(did)) != dids.end() || field_of(did) != nullptr;
-}
-
-// Of a set that is told field by field.
-const profile::Field* Diagnostics::field_of(std::uint16_t did) const {
-  const auto& fields = profile_->set.fields;
-  const auto found = std::ranges::find(fields, std::optional(did), &profile::Field::did);
-  return found == fields.end() ? nullptr : &*found;
+  return std::ranges::find(dids, std::optional(did)) != dids.end() || profile::field_of(p, did) != nullptr;
 }
 
 // nullopt: nothing is there yet, or the profile's fields do not hold it.
@@ -251,7 +245,7 @@ std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
   if (id == p.site.did) {
     return told(instrument_.site());
   }
-  if (const profile::Field* field = field_of(id)) {
+  if (const profile::Field* field = profile::field_of(p, id)) {
     const auto set = told(instrument_.coefficients().stored());
     return set ? std::optional(uds::Bytes(set->begin() + static_cast<std::ptrdiff_t>(field->at),
                                           set->begin() + static_cast<std::ptrdiff_t>(field->end())))
@@ -285,18 +279,20 @@ Diagnostics::Reply Diagnostics::read_data(View request) {
 Diagnostics::Reply Diagnostics::write_data(View request) {
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
   const profile::Profile& p = *profile_;
-  const bool of_set = p.slots ? id == p.set_inactive : id == p.set_in_force || field_of(id) != nullptr;
-  if (id != p.schedule.did && id != p.site.did && !of_set) {
+  const bool of_set = p.slots ? id == p.set_inactive : id == p.set_in_force || profile::field_of(p, id) != nullptr;
+  const bool of_move = p.move && id == p.move->did;
+  if (id != p.schedule.did && id != p.site.did && !of_move && !of_set) {
     return no(Nrc::request_out_of_range);
   }
   if (!unlocked()) {
     return no(Nrc::security_access_denied);
   }
   const View record = request.subspan(3);
-  const Reply written = id == p.schedule.did ? write_schedule(record)
-                        : id == p.site.did   ? write_site(record)
-                        : p.slots            ? write_coefficients(record)
-                                             : write_over_set(id, record);
+  const Reply written = of_move                ? move(record)
+                        : id == p.schedule.did ? write_schedule(record)
+                        : id == p.site.did     ? write_site(record)
+                        : p.slots              ? write_coefficients(record)
+                                               : write_over_set(id, record);
   return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
 }
 
@@ -313,6 +309,18 @@ Diagnostics::Reply Diagnostics::write_schedule(View record) {
   }
   instrument_.set_schedule(*schedule);
   return uds::Bytes{};
+}
+
+// By a write or by a routine: length, position, conditions.
+Diagnostics::Reply Diagnostics::move(View record) {
+  if (!profile::length_fits(profile_->move->layout, record)) {
+    return no(Nrc::incorrect_message_length);
+  }
+  const auto position = profile::decode_move(*profile_, record);
+  if (!position) {
+    return no(Nrc::request_out_of_range);
+  }
+  return instrument_.move_to(*position, now_s_) ? Reply(uds::Bytes{}) : Reply(no(Nrc::conditions_not_correct));
 }
 
 Diagnostics::Reply Diagnostics::write_site(View record) {
@@ -349,7 +357,7 @@ Diagnostics::Reply Diagnostics::write_coefficients(View record) {
 
 // Without slots: the whole set, or the field that has this identifier.
 Diagnostics::Reply Diagnostics::write_over_set(std::uint16_t id, View record) {
-  const profile::Field* field = field_of(id);
+  const profile::Field* field = profile::field_of(*profile_, id);
   const std::size_t bytes = field != nullptr ? field->end() - field->at : profile_->set.bytes;
   if (record.size() != bytes) {
     return no(Nrc::incorrect_message_length);
@@ -381,7 +389,8 @@ Diagnostics::Reply Diagnostics::routine(View request) {
   const bool calibration = call->routine == p.rotate.id;
   const bool lasts =
       calibration || call->routine == p.navigation_check.id;  // others have nothing to stop and no result
-  if (!lasts && call->routine != p.erase.id && call->routine != p.commit.id) {
+  const bool of_move = p.move && call->routine == p.move->routine;
+  if (!lasts && !of_move && call->routine != p.erase.id && call->routine != p.commit.id) {
     return no(Nrc::request_out_of_range);
   }
   if (!unlocked()) {
@@ -415,6 +424,9 @@ Diagnostics::Reply Diagnostics::routine_result(const uds::RoutineCall& call) {
 Diagnostics::Reply Diagnostics::start_routine(const uds::RoutineCall& call) {
   if (call.routine == profile_->rotate.id) {
     return start_calibration(call);
+  }
+  if (profile_->move && call.routine == profile_->move->routine) {
+    return move(call.option).map([&](const uds::Bytes&) { return uds::routine_response(call); });
   }
   if (call.routine == profile_->commit.id) {
     return commit(call);

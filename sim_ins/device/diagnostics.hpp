@@ -58,10 +58,10 @@ class Diagnostics : public uds::RequestHandler {
   Reply security_access(View request, Time now);
   Reply read_data(View request);
   bool knows(std::uint16_t did) const;
-  const profile::Field* field_of(std::uint16_t did) const;
   std::optional<uds::Bytes> record(std::uint16_t id);
   Reply write_data(View request);
   Reply write_schedule(View record);
+  Reply move(View record);
   Reply write_site(View record);
   Reply write_coefficients(View record);
   Reply write_over_set(std::uint16_t id, View record);

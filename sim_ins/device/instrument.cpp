@@ -81,6 +81,10 @@ Expected<std::unique_ptr<ImuSimulator>> Instrument::make_imu(const Schedule& sch
 void Instrument::power_on(double now_s) {
   flash_.cut_power(now_s);  // the line that resets the processor resets the chip
   imu_.reset();
+  if (gimbal_) {
+    gimbal_->power_on(now_s);
+  }
+  now_s_ = now_s;
   navigation_.reset();
   check_ = {};
   schedule_.reset();
@@ -100,9 +104,30 @@ Expected<void> Instrument::check_schedule(const ins::ScheduleRecord& schedule) c
   return sim::check_schedule(config_.gimbal, as_schedule(schedule));
 }
 
+Expected<void> Instrument::move_to(const ins::MoveRecord& position, double now_s) {
+  constexpr double radians_per_mdeg = units::degree / 1000.0;
+  if (!ready() || state_ == ins::State::checking || gimbal_->turning(now_s)) {
+    return fail(ErrorKind::device, fmt::format("state {}", ins::name(state_)));
+  }
+  gimbal_->turn_to({position.outer_mdeg * radians_per_mdeg, position.inner_mdeg * radians_per_mdeg}, now_s);
+  return {};
+}
+
+Expected<void> Instrument::begin_recording(std::uint32_t run_id, double now_s) {
+  if (auto started = gimbal_->start(now_s); !started) {
+    return started;
+  }
+  samples_wanted_ = 0;  // nobody knows
+  raw_.begin(run_id, 0);
+  return {};
+}
+
 Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   if (!ready() || busy()) {
     return fail(ErrorKind::device, fmt::format("state {}", ins::name(state_)));
+  }
+  if (gimbal_) {
+    return begin_recording(run_id, now_s).map([&] { rotate(run_id, now_s, std::nullopt); });
   }
   if (!schedule_) {
     return fail(ErrorKind::device, "no schedule");
@@ -113,12 +138,17 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
     return tl::unexpected(imu.error());
   }
   imu_ = std::move(*imu);
-  epoch_s_ = now_s;
-  samples_ = 0;
   samples_wanted_ = static_cast<std::uint64_t>(std::llround(schedule.duration_s() * config_.sample_rate_hz));
-  run_id_ = run_id;
   const std::uint64_t pages = (samples_wanted_ + samples_per_page_ - 1) / samples_per_page_;
   raw_.begin(run_id, static_cast<std::uint32_t>(pages));
+  rotate(run_id, now_s, gimbal_failure_time(scenario_, schedule));
+  return {};
+}
+
+void Instrument::rotate(std::uint32_t run_id, double now_s, std::optional<double> gimbal_noticed_s) {
+  epoch_s_ = now_s;
+  samples_ = 0;
+  run_id_ = run_id;
   for (const Fault& fault : scenario_.faults) {
     if (fault.kind == FaultKind::spoilt_page) {
       raw_.spoil(static_cast<std::uint32_t>(fault.value), std::max(1, static_cast<int>(fault.amount)));
@@ -126,15 +156,17 @@ Expected<void> Instrument::start_rotation(std::uint32_t run_id, double now_s) {
   }
   page_ = {};
   stopped_at_s_.reset();
-  gimbal_noticed_s_ = gimbal_failure_time(scenario_, schedule);
+  gimbal_noticed_s_ = gimbal_noticed_s;
   faults_ = 0;
   state_ = ins::State::rotating;
-  return {};
 }
 
 void Instrument::stop_rotation() {
   if (state_ == ins::State::rotating) {
-    finish_rotation(ins::State::aborted);
+    finish_rotation(gimbal_ ? ins::State::complete : ins::State::aborted);
+  }
+  if (gimbal_) {
+    gimbal_->stop(now_s_);
   }
 }
 
@@ -167,16 +199,7 @@ void Instrument::flush_page(bool last) {
   page_.flags = 0;
 }
 
-void Instrument::apply_faults(ImuSample& sample, double t) {
-  if (spoil_sample(scenario_, t, last_sample_, sample)) {
-    page_.flags |= flash::page_flag::sensor_saturated;
-  }
-}
-
-void Instrument::take_sample() {
-  ImuSample sample = imu_->next();
-  const double t = static_cast<double>(samples_ + 1) / config_.sample_rate_hz;
-  apply_faults(sample, t);
+void Instrument::keep_sample(const ImuSample& sample) {
   last_sample_ = sample;
   ++samples_;
   if (keeps_stream_) {
@@ -189,6 +212,22 @@ void Instrument::take_sample() {
   if (page_.samples.size() == samples_per_page_) {
     flush_page(samples_ == samples_wanted_);
   }
+}
+
+// Faults of the sensors are in the samples already.
+void Instrument::record_moves(double now_s) {
+  for (const ImuSample& sample : gimbal_->take(now_s)) {
+    keep_sample(sample);
+  }
+}
+
+void Instrument::take_sample() {
+  ImuSample sample = imu_->next();
+  const double t = static_cast<double>(samples_ + 1) / config_.sample_rate_hz;
+  if (spoil_sample(scenario_, t, last_sample_, sample)) {
+    page_.flags |= flash::page_flag::sensor_saturated;
+  }
+  keep_sample(sample);
   if (gimbal_noticed_s_ && t > *gimbal_noticed_s_) {
     faults_ |= ins::fault::gimbal;
     finish_rotation(ins::State::failed);
@@ -201,7 +240,11 @@ void Instrument::advance(double now_s) {
   if (state_ == ins::State::starting && now_s >= ready_at_s_) {
     state_ = ins::State::idle;
   }
-  while (state_ == ins::State::rotating &&
+  now_s_ = now_s;
+  if (gimbal_ && state_ == ins::State::rotating) {
+    record_moves(now_s);
+  }
+  while (!gimbal_ && state_ == ins::State::rotating &&
          epoch_s_ + static_cast<double>(samples_ + 1) / config_.sample_rate_hz <= now_s) {
     take_sample();
   }
@@ -262,7 +305,12 @@ ins::Status Instrument::status() const {
   status.state = state_;
   status.faults = faults_;
   status.pages_written = raw_.pages_written();
-  if (imu_) {
+  if (gimbal_) {
+    const auto angles = gimbal_->angles(now_s_);
+    status.outer_deg = degrees_in_turn(angles[0]);
+    status.inner_deg = degrees_in_turn(angles[1]);
+    status.moving = gimbal_->turning(now_s_);
+  } else if (imu_) {
     const double t = static_cast<double>(samples_) / config_.sample_rate_hz;
     const GimbalMotion& gimbal = imu_->motion().gimbal();
     const GimbalState now = gimbal.at(t);
@@ -279,13 +327,18 @@ ins::Status Instrument::status() const {
 }
 
 ins::StateRecord Instrument::state_record() const {
+  constexpr double turn_deg = 360.0;
+  const ins::Status now = status();
   return {state_,
           faults_,
           coefficients_.in_force_slot(),
           coefficients_.in_force().version,
           coefficients_.in_force_crc(),
           run_id_,
-          counters_.get().power_cycles};
+          counters_.get().power_cycles,
+          now.moving,
+          std::remainder(now.outer_deg, turn_deg),
+          std::remainder(now.inner_deg, turn_deg)};
 }
 
 ins::RunRecord Instrument::run_record() const {

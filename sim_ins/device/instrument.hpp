@@ -13,6 +13,7 @@
 #include "protocol/ins_interface/records.hpp"
 #include "protocol/ins_interface/status.hpp"
 #include "sim_ins/config.hpp"
+#include "sim_ins/device/commanded_gimbal.hpp"
 #include "sim_ins/device/navigation.hpp"
 #include "sim_ins/device/scenario.hpp"
 #include "sim_ins/device/stores.hpp"
@@ -37,6 +38,11 @@ class Instrument {
   bool busy() const { return state_ == ins::State::rotating || state_ == ins::State::checking; }
   bool ready() const { return state_ != ins::State::starting; }
   [[nodiscard]] Expected<void> start_rotation(std::uint32_t run_id, double now_s);
+  // An INS that takes no schedule: its gimbal is told each position by itself, and it records from the start on until it is
+  // stopped.
+  void turn_by_moves(CommandedGimbal gimbal) { gimbal_.emplace(std::move(gimbal)); }
+  // Refused while the gimbal turns, and while the INS checks its navigation.
+  [[nodiscard]] Expected<void> move_to(const ins::MoveRecord& position, double now_s);
   void stop_rotation();
 
   [[nodiscard]] Expected<void> start_navigation_check(const ins::NavigationCheckRequest& request, double now_s);
@@ -68,7 +74,10 @@ class Instrument {
              const Scenario& scenario, std::size_t samples_per_page);
 
   void take_sample();
-  void apply_faults(ImuSample& sample, double t);
+  void record_moves(double now_s);
+  void keep_sample(const ImuSample& sample);
+  void rotate(std::uint32_t run_id, double now_s, std::optional<double> gimbal_noticed_s);
+  [[nodiscard]] Expected<void> begin_recording(std::uint32_t run_id, double now_s);
   void flush_page(bool last);
   void finish_rotation(ins::State state);
   void navigate_until(double now_s);
@@ -92,6 +101,8 @@ class Instrument {
   std::optional<ins::ScheduleRecord> schedule_;
 
   std::unique_ptr<ImuSimulator> imu_;
+  std::optional<CommandedGimbal> gimbal_;  // turned move by move
+  double now_s_ = 0.0;
   double epoch_s_ = 0.0;  // INS time of the rotation's or check's first sample interval
   std::uint64_t samples_ = 0, samples_wanted_ = 0;
   std::uint32_t run_id_ = 0;
