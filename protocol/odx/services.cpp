@@ -109,14 +109,37 @@ class Services {
   }
 
   void write_identifier(const std::string& name, std::uint16_t did, const std::string& content, bool written) {
+    read_identifier(name, did, content);
+    if (written) {
+      write_to_identifier(name, did, content);
+    }
+  }
+
+  void read_identifier(const std::string& name, std::uint16_t did, const std::string& content) {
     const Messages read = begin("read_" + name, "CURRENTDATA", service::read_data, {});
     both(read, "identifier", "ID", 1, did_bits, did);
     value(read.response, "record", record_at, content);
-    if (written) {
-      const Messages write = begin("write_" + name, "STOREDDATA", service::write_data, {});
-      both(write, "identifier", "ID", 1, did_bits, did);
-      value(write.request, "record", record_at, content);
+  }
+
+  void write_to_identifier(const std::string& name, std::uint16_t did, const std::string& content) {
+    const Messages write = begin("write_" + name, "STOREDDATA", service::write_data, {});
+    both(write, "identifier", "ID", 1, did_bits, did);
+    value(write.request, "record", record_at, content);
+  }
+
+  // A position, by a write or as the option of a routine.
+  void write_move() {
+    if (!p_.move) {
+      return;
     }
+    const auto& role = profile::record_role("move");
+    if (p_.move->did) {
+      return write_to_identifier("move", *p_.move->did, dictionary_.structure("move", p_.move->layout, role));
+    }
+    const Messages m = begin("start_move", "ROUTINE", service::routine_control, "turns the gimbal to a position");
+    both(m, "action", "SUBFUNCTION", 1, byte_bits, static_cast<std::uint64_t>(uds::RoutineAction::start));
+    both(m, "routine", "ID", 2, did_bits, *p_.move->routine);
+    value(m.request, "option", result_at, dictionary_.structure("move_option", p_.move->layout, role));
   }
 
   void write_identifiers() {
@@ -130,6 +153,7 @@ class Services {
         write_identifier(name, *record->did, id, record == &p_.schedule);
       }
     }
+    write_move();
     if (p_.field_by_field) {
       return write_fields();
     }

@@ -180,7 +180,7 @@ std::string profile_page() {
   std::string text = "# Profile\n\n" + made_from("protocol/profile/roles");
   text +=
       R"(What an INS speaks, in TOML. [Your INS in an hour](your-ins.md) shows how one is made, `selfcal device lint` tells what is wrong with
-it, and `config/profiles` holds four. Unknown keys are faults.
+it, and `config/profiles` holds five. Unknown keys are faults.
 
 | table | keys |
 |---|---|
@@ -191,6 +191,7 @@ it, and `config/profiles` holds four. Unknown keys are faults.
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
 | `identity` | `serial`, `software`: data identifiers of ASCII |
 | `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
+| `move` | in place of `schedule`, where the INS is told each position by itself: `did` or `routine`, a record; `there` angle (with `tolerance_deg`, and `rest_deg`: it rests while `outer` and `inner` of the state stay so near, 0.05 where it is left out) or state (`gimbal_moving` of the state); `longest_s` of a move, 60 where it is left out. `rotate` then records from its start to its stop |
 | `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at`. `form`: what the 24 mean, errors where it is left out, correction or correction-first ([Your INS](your-ins.md)) |
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |

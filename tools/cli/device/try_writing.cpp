@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
@@ -52,13 +53,9 @@ void try_write(Conformance& c, const Requirement& requirement, std::uint16_t did
            written.kind == Exchange::Kind::positive && same);
 }
 
-void try_schedule(Conformance& c) {
+// What is refused whatever is written.
+void try_refusals_of_writing(Conformance& c, const Bytes& request) {
   const profile::Profile& p = c.profile();
-  if (!p.schedule.did || !c.permission().write) {
-    return c.not_tried({"write.schedule", writing, "The schedule is written."}, "needs --write");
-  }
-  const Bytes schedule = schedule_of(c);
-  const Bytes request = uds::write_request(*p.schedule.did, schedule);
   if (p.security.needed) {
     c.refused({"write.locked", writing, "While the lock is closed nothing is written.", Mode::session, true}, request,
               {Nrc::security_access_denied});
@@ -71,8 +68,50 @@ void try_schedule(Conformance& c) {
             uds::write_request(unused_did, Bytes{0}), {Nrc::request_out_of_range});
   c.refused({"write.read_only", writing, "A record that is only read is not written.", Mode::open, true},
             uds::write_request(*p.state.did, Bytes(p.state.layout.bytes, 0)), {Nrc::request_out_of_range});
+}
+
+void try_schedule(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  if (!p.schedule.did || !c.permission().write) {
+    return c.not_tried({"write.schedule", writing, "The schedule is written."}, "needs --write");
+  }
+  const Bytes schedule = schedule_of(c);
+  try_refusals_of_writing(c, uds::write_request(*p.schedule.did, schedule));
   try_write(c, {"write.schedule", writing, "The schedule is written, and read back as written.", Mode::open, true},
             *p.schedule.did, schedule);
+}
+
+// A move that is none: to where the gimbal stands.
+std::optional<ins::MoveRecord> standing(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  const bool tells = p.state.layout.find("outer") != nullptr && p.state.layout.find("inner") != nullptr;
+  const Exchange told = c.tester().ask(uds::read_request(*p.state.did));
+  const auto record = uds::read_read_response(told.response, *p.state.did);
+  const auto state = record && tells ? profile::decode_state(p, *record) : tl::unexpected(Error{});
+  if (!state) {
+    return std::nullopt;
+  }
+  const auto mdeg = [](double degrees) { return static_cast<std::int32_t>(std::lround(degrees * 1e3)); };
+  return ins::MoveRecord{mdeg(state->outer_deg), mdeg(state->inner_deg)};
+}
+
+// The gimbal is not turned: what is refused, and what is commanded where it stands already.
+void try_move(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  constexpr Requirement taken{"move.taken", "profile, move", "A move to where the gimbal stands is taken.", Mode::open,
+                              true};
+  if (!c.permission().write) {
+    return c.not_tried(taken, "needs --write");
+  }
+  const auto here = standing(c);
+  const Bytes record = profile::encode(p, here.value_or(ins::MoveRecord{})).value_or(Bytes(p.move->layout.bytes, 0));
+  const Bytes request = p.move->did ? uds::write_request(*p.move->did, record)
+                                    : uds::routine_request(RoutineAction::start, *p.move->routine, record);
+  try_refusals_of_writing(c, request);
+  if (!here) {
+    return c.not_tried(taken, "where it stands is not told");
+  }
+  c.answered(taken, request, p.move->did ? 2 : 3);
 }
 
 bool erased(Conformance& c) {
@@ -194,7 +233,7 @@ void try_reset(Conformance& c) {
 }  // namespace
 
 void try_writing(Conformance& c) {
-  try_schedule(c);
+  c.profile().move ? try_move(c) : try_schedule(c);
   c.profile().slots ? try_set(c) : try_writing_over(c);
   try_reset(c);
 }
