@@ -30,7 +30,7 @@ class Archives(unittest.TestCase):
         return pdx, done.stdout
 
     def test_every_reference_leads_somewhere(self):
-        for name in ("selfcal", "example", "memory"):
+        for name in ("selfcal", "example", "memory", "moves"):
             with self.subTest(name):
                 self.read(ROOT / "config" / "profiles" / f"{name}.toml")
 

@@ -150,6 +150,10 @@ const std::vector<Way>& ways() {
       {"coefficient of another width", R"re((index = \d+, type = )"\w+")re", {"$1\"u16\"", "$1\"f64\""}},
       {"index twice", R"(\bindex = \d+, type)", {"index = 0, type"}, true},
       {"end of a move that is none", R"(^there = "\w+")", {"there = \"time\""}},
+      {"no angles where a move is over by angle",
+       R"(^fields\.(outer|inner) = \{ at = 1[02], type = "i16", scale.*)",
+       {"# left out"},
+       true},
       {"unknown section", R"(^\[(\w+)\])", {"[$1s]", "[my_$1]"}},
       {"broken TOML", R"( \}$)", {""}, false, R"(^#)"},
       {"broken text", R"re(= "(\w[^"]*)")re", {"= \"$1"}, false, R"(\{)"}};
@@ -285,6 +289,7 @@ int trial(std::size_t count, std::uint64_t seed) {
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/frames.toml"),
+                                    read(SELFCAL_SOURCE_DIR "/config/profiles/moves.toml"),
                                     with_files(read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"))};
   Random random(seed);
   std::set<std::string> seen;

@@ -436,6 +436,12 @@ TEST(Profile, ALockMayBeOpenedByAProgram) {
               testing::HasSubstr("security.program: no such key"));
 }
 
+// An INS that knows its schedule says how many pages there will be.
+TEST(Profile, PagesExpectedAreNeededBesideASchedule) {
+  EXPECT_THAT(complaint(with(own_text(), "fields.pages_expected", "# fields.pages_expected")),
+              testing::HasSubstr("directory.fields.pages_expected: missing"));
+}
+
 // Each fault is told with its line; what cannot be together is.
 TEST(MemoryProfile, WhatDoesNotFitTogetherIsRefused) {
   std::ifstream in(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml");
