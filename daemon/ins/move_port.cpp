@@ -266,9 +266,14 @@ Answer<Bytes> MovePort::result_as_told(const Bytes& response) const {
   return uds::routine_response(call, profile::encode(*told_, *run).value());
 }
 
+// Without the interface, which begins the whole message.
+std::string MovePort::words_of(const PortError& error) const {
+  const std::string prefix = fmt::format("{}: ", interface());
+  return error.message.starts_with(prefix) ? error.message.substr(prefix.size()) : error.message;
+}
+
 PortError MovePort::trouble(const std::string& what) const {
-  const bool named = what.find(interface()) != std::string::npos;
-  return {PortError::Kind::protocol, 0, named ? what : fmt::format("{}: {}", interface(), what)};
+  return {PortError::Kind::protocol, 0, fmt::format("{}: {}", interface(), what)};
 }
 
 // --- our own requests
@@ -306,7 +311,6 @@ Bytes MovePort::payload_of(Own what) const {
 
 void MovePort::send(Own what) {
   own_ = what;
-  moved_ = moved_ || what == Own::move;
   ins_->request(payload_of(what), longest_answer_to_own, [this, what](const Answer<Bytes>& response) {
     own_ = Own::nothing;
     take_own(what, response);
@@ -329,6 +333,8 @@ void MovePort::take_own(Own what, const Answer<Bytes>& response) {
   if (what == Own::look) {
     return take_look(response);
   }
+  const bool refused = !response && response.error().kind == PortError::Kind::negative;
+  moved_ = moved_ || (what == Own::move && !refused);
   if (!response) {
     return not_done(what, response.error());
   }
@@ -365,21 +371,22 @@ void MovePort::not_done(Own what, const PortError& error) {
   if (what == Own::stop_lost) {
     pending_ = false;
     return answer_later(tl::unexpected(PortError{
-        error.kind, error.nrc, fmt::format("the rotation that was under way is not stopped: {}", error.message)}));
+        error.kind, error.nrc,
+        fmt::format("{}: the rotation that was under way is not stopped: {}", interface(), words_of(error))}));
   }
   const bool away = error.kind == PortError::Kind::link;
   const bool locked = is(error, {Nrc::security_access_denied, Nrc::service_not_supported_in_session,
                                  Nrc::sub_function_not_supported_in_session});
   const bool in_time = waits() || now_s() - sequence_.dwell_end_s() <= move().turning.longest_move_s;
   if ((away || locked) && recording_ && in_time && what != Own::start) {
-    not_taken_ = error.message;
+    not_taken_ = words_of(error);
     wanted_ = what;
     return try_again(retry_interval);
   }
   if (what == Own::move) {
     const auto target = sequence_.target();
     return break_off(fmt::format("the move to {:.3f} and {:.3f} deg is not taken: {}", target[0] / radians_per_degree,
-                                 target[1] / radians_per_degree, error.message),
+                                 target[1] / radians_per_degree, words_of(error)),
                      error);
   }
   if (what == Own::start) {
@@ -387,7 +394,7 @@ void MovePort::not_done(Own what, const PortError& error) {
     sequence_.stop();
     return answer_later(tl::unexpected(error));
   }
-  break_off(fmt::format("the recording is not ended: {}", error.message));
+  break_off(fmt::format("the recording is not ended: {}", words_of(error)));
 }
 
 void MovePort::try_again(std::chrono::nanoseconds after) {
@@ -407,24 +414,22 @@ void MovePort::watch() {
   }
   const double wait_s = dwells ? std::max(0.0, sequence_.dwell_end_s() - now_s()) : look_interval_s;
   const auto real = std::chrono::nanoseconds(std::llround(wait_s / config_.time_scale * 1e9));
-  watch_timer_ =
-      timers_.after(dwells ? real : std::max<std::chrono::nanoseconds>(real, shortest_look_interval), [this] {
-        watch_timer_ = 0;
-        look_due_ = true;
-        next();
-      });
+  watch_timer_ = timers_.after(std::max<std::chrono::nanoseconds>(real, shortest_look_interval), [this] {
+    watch_timer_ = 0;
+    look_due_ = true;
+    next();
+  });
 }
 
+// An answer that makes no sense may be the one to another tester's question: the service, which asks too, judges that.
 void MovePort::take_look(const Answer<Bytes>& response) {
-  const auto state = response ? state_in(*response) : tl::unexpected(Error{});
+  const auto state = response ? state_in(*response) : tl::unexpected(Error{ErrorKind::device, {}});
   if (state) {
     observe(*state);
-  } else if (response) {
-    break_off(state.error().message);
-  } else if (!start_.empty() && response.error().kind == PortError::Kind::link) {  // the service finds the INS again
-    break_off(response.error().message, response.error());
+  } else if (!response && !start_.empty() && response.error().kind == PortError::Kind::link) {
+    break_off(words_of(response.error()), response.error());  // the service finds the INS again
   } else if (waits()) {
-    not_taken_ = response.error().message;
+    not_taken_ = response ? state.error().message : words_of(response.error());
     const Phase before = sequence_.phase();
     sequence_.on_time(now_s(), nullptr);
     take_phase(before);

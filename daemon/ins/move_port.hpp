@@ -69,6 +69,7 @@ class MovePort : public InsPort {
   bool lost(const ins::StateRecord& state) const;
   void break_off(std::string why, std::optional<PortError> error = std::nullopt);
   PortError trouble(const std::string& what) const;
+  std::string words_of(const PortError& error) const;
   bool turning() const { return sequence_.active() || sequence_.phase() == Phase::approaching; }
   bool waits() const { return sequence_.phase() == Phase::approaching || sequence_.phase() == Phase::moving; }
   double now_s() const;  // of the INS's clock

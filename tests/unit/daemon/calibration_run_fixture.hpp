@@ -97,9 +97,11 @@ class CalibrationRunTest : public testing::Test {
     key_ = ins_.key;
   }
 
+  // A fresh one for each service.
+  virtual InsPort& port() { return ins_; }
   void make(const RunRecord& record) {
     run_.reset();
-    run_ = std::make_unique<CalibrationRun>(RunContext{timers_, *store_, ins_, estimators_, observer_}, config_,
+    run_ = std::make_unique<CalibrationRun>(RunContext{timers_, *store_, port(), estimators_, observer_}, config_,
                                             schedule_, key_, record, folder_);
   }
   void begin(RunRecord record = {}) {
