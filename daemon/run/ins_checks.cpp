@@ -53,9 +53,10 @@ bool holds_whole_rotation(const ins::DirectoryRecord& directory) {
 }
 
 Complaint check_directory(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
-                          const Schedule& schedule) {
+                          const Schedule& schedule, double longer_s) {
   const double pages = pages_of(schedule, format);
-  const double most = pages * (1.0 + pages_slack) + pages_rounding;
+  const double longer = longer_s * format.sample_rate_hz / format.samples_per_page;
+  const double most = (pages + longer) * (1.0 + pages_slack) + pages_rounding;
   const double least = pages * (1.0 - pages_slack) - pages_rounding;
   const std::string of_schedule = fmt::format("the schedule of {:.0f} s at {:g} Hz has {:.0f}", schedule.duration_s(),
                                               format.sample_rate_hz, pages);

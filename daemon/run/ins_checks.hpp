@@ -24,9 +24,10 @@ double pages_of(const Schedule& schedule, const ins::SampleFormatRecord& format)
 // Everything of the rotation lies in the FLASH.
 bool holds_whole_rotation(const ins::DirectoryRecord& directory);
 
-// Samples against pages, pages against the schedule.
+// Samples against pages, pages against the schedule, which may take `longer_s` longer: where the moves are commanded one by one, each
+// may take its time.
 Complaint check_directory(const ins::DirectoryRecord& directory, const ins::SampleFormatRecord& format,
-                          const Schedule& schedule);
+                          const Schedule& schedule, double longer_s = 0.0);
 
 // The data of a rotation that is over, samples over rate, against the time that the rotation took on the operator's clock.
 // Neither clock is wrong by more than a quartz is, and an answer is as old as a request may wait. The clock of a virtual INS

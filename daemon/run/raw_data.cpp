@@ -33,7 +33,10 @@ Task<Answer<ins::DirectoryRecord>> RawData::read_directory() {
     co_return protocol_error(
         fmt::format("the INS holds data of rotation {}, not {}", directory->run_id, journal_.record.rotation));
   }
-  if (const Complaint complaint = check_directory(*directory, data_.format, data_.schedule)) {
+  const auto& move = data_.config.profile->move;
+  const double longer_s =
+      move ? static_cast<double>(data_.schedule.positions.size()) * move->turning.longest_move_s : 0.0;
+  if (const Complaint complaint = check_directory(*directory, data_.format, data_.schedule, longer_s)) {
     co_return protocol_error(*complaint);
   }
   if (auto all_there = check_ring(*directory); !all_there) {
