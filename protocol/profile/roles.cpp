@@ -22,9 +22,9 @@ constexpr std::array state_fields{
     F{"coefficients_crc", "", false, "checksum of the set in force"},
     F{"run_id", "", true, "latest self-calibration; 0: none"},
     F{"power_cycles", "", true, "counts every power-on"},
-    F{"gimbal_moving", "", false, "1: the gimbal turns; needed where a move is over by state"},
-    F{"outer", "deg", false, "gimbal angle; needed where a move is over by angle"},
-    F{"inner", "deg", false, "gimbal angle; needed where a move is over by angle"}};
+    F{"gimbal_moving", "", false, "1: the gimbal turns"},
+    F{"outer", "deg", false, "gimbal angle"},
+    F{"inner", "deg", false, "gimbal angle"}};
 constexpr std::array move_fields{F{"outer", "mdeg", true, "of the position"},
                                  F{"inner", "mdeg", true, "of the position"}};
 constexpr std::array schedule_fields{
@@ -37,7 +37,7 @@ constexpr std::array directory_fields{
     F{"run_id", "", true, "latest run"},
     F{"first_page", "", false, "older ones were overwritten by the ring"},
     F{"pages_written", "", true, "pages first_page to pages_written - 1 can be uploaded"},
-    F{"pages_expected", "", false, "of the whole schedule; an INS without a schedule knows it not, all others tell it"},
+    F{"pages_expected", "", false, "of the whole schedule"},
     F{"samples", "", true, "written so far"},
     F{"complete", "", true, "no more will come", answers}};
 constexpr std::array sample_format_fields{
@@ -75,8 +75,8 @@ constexpr std::array page_fields{F{"samples", "", true, "in this page"},
 
 constexpr std::array roles{
     RecordRole{"state", "what the INS is doing", state_fields},
-    RecordRole{"schedule", "the rotation, in place of a move", schedule_fields, false},
-    RecordRole{"move", "one position that the gimbal is told, in place of a schedule", move_fields, false},
+    RecordRole{"schedule", "the rotation", schedule_fields, false},
+    RecordRole{"move", "a position that the gimbal is told by itself", move_fields, false},
     RecordRole{"site", "where the INS is", site_fields, false},
     RecordRole{"directory", "the raw-data pages of the latest run", directory_fields},
     RecordRole{"sample_format", "what the counts of the raw data are worth", sample_format_fields},
