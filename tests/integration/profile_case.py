@@ -9,7 +9,7 @@ PROFILES = case.ROOT / "config" / "profiles"
 FOREIGN = case.ROOT / "tests" / "foreign"
 SPEED, DWELL_S = 60.0, 20.0
 SLOW = 25.0  # what Python streams in frames beside everything else on one processor
-SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml and frames.toml do not tell
+SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml, frames.toml and moves.toml do not tell
 # The addressing of selfcal.toml, and others in its place.
 NORMAL = """addressing = "normal"      # identifiers of 11 bits
 request = 0x640
@@ -47,7 +47,7 @@ class UnderProfile(case.OnBench):
         return run
 
     def bench_of(self, profile, speed=SPEED, interface="vcan0", sim=None, **ins):
-        site = SITE if profile in ("memory.toml", "frames.toml") else {}
+        site = SITE if profile in ("memory.toml", "frames.toml", "moves.toml") else {}
         return self.bench(speed=speed, interface=interface, sim=sim or {}, sim_options=["--profile", PROFILES / profile],
                           ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins)
 
