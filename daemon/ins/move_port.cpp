@@ -131,9 +131,10 @@ void MovePort::keep_schedule(std::span<const std::uint8_t> record) {
 }
 
 void MovePort::begin_rotation() {
-  if (!schedule_ || turning()) {
-    return answer_later(tl::unexpected(
-        trouble(schedule_ ? "a rotation is under way already" : "the rotation has no schedule: none was written")));
+  if (!schedule_ || turning() || !session_open_) {
+    return answer_later(tl::unexpected(trouble(!schedule_  ? "the rotation has no schedule: none was written"
+                                               : turning() ? "a rotation is under way already"
+                                                           : "no move is commanded without a session")));
   }
   sequence_.begin(*schedule_, move().turning, now_s());
   recording_ = ended_ = stopped_ = false;
@@ -206,7 +207,8 @@ Answer<Bytes> MovePort::as_told(Answer<Bytes> response) {
   const profile::Profile& p = *config_.profile;
   if (!response) {
     const bool ends = request_ == uds::routine_request(RoutineAction::stop, *p.rotate.id);
-    if (ends && !recording_ && response.error().kind == PortError::Kind::negative) {  // it has none to end
+    const bool none = is(response.error(), {Nrc::request_sequence_error, Nrc::conditions_not_correct});
+    if (ends && !recording_ && none) {  // it has none to end
       return uds::routine_response({RoutineAction::stop, *p.rotate.id, {}});
     }
     return response;

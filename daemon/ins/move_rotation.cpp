@@ -108,13 +108,16 @@ ins::State MovePort::as_rotation(ins::State told) const {
     return ins::State::rotating;
   }
   const bool rests = told != ins::State::rotating && !moved_;
+  if (rests && told == ins::State::failed) {
+    return told;
+  }
   if (sequence_.phase() == Phase::over) {
     return ended_ && rests ? ins::State::complete : ins::State::rotating;
   }
   if (!rests) {
     return ins::State::rotating;
   }
-  if (sequence_.phase() == Phase::failed || told == ins::State::failed) {
+  if (sequence_.phase() == Phase::failed) {
     return ins::State::failed;
   }
   // Of a recording that is whole by the INS's word, and of which nothing is known here, the moves may be missing.
