@@ -371,7 +371,9 @@ class Document {
   void write_routines() {
     write_routine(p_.rotate, "rotate",
                   p_.move ? "store raw data until it is stopped"
-                          : "rotate by the schedule and store raw data; it can be stopped, the state is then aborted",
+                  : p_.stream.empty()
+                      ? "rotate by the schedule and store raw data; it can be stopped, the state is then aborted"
+                      : "rotate by the schedule and stream the samples; it can be stopped, the state is then aborted",
                   true);
     write_routine(p_.erase, "erase", "erase the inactive slot", false);
     write_routine(p_.commit, "commit", "make the inactive set the one in force from the next power-on on", false);
