@@ -40,6 +40,8 @@ uds::ClientTimings timings(const InsConfig& config) {
   const auto seconds = [](double s) { return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9)); };
   timings.p2_star = seconds(config.profile->timing.p2_star_s);
   timings.tester_present = seconds(config.profile->timing.tester_present_s);
+  const profile::Timing& may = config.profile->timing;  // what takes longer is told by response-pending
+  timings.pending_limit = std::max(timings.pending_limit, seconds(std::max({may.erase_s, may.write_s, may.commit_s})));
   return timings;
 }
 

@@ -12,8 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double reset_limit_s = 60.0;  // of the INS's clock
-constexpr auto reset_patience = 5s;     // of ours, beyond that
+constexpr auto reset_patience = 5s;  // of ours, beyond that
 
 }  // namespace
 
@@ -147,7 +146,8 @@ Task<Step> CoefficientSteps::reset_ins() {
     co_return tl::unexpected(asked.error());
   }
   std::uint32_t after = 0;
-  const SteadyTime end = timers_.now() + ins_time(reset_limit_s) + reset_patience;
+  const double limit_s = data_.config.profile->timing.restart_s;
+  const SteadyTime end = timers_.now() + ins_time(limit_s) + reset_patience;
   while (true) {
     co_await Sleep(timers_, 20ms);
     const auto state = co_await client_.read_state();
@@ -162,7 +162,7 @@ Task<Step> CoefficientSteps::reset_ins() {
     if (!state) {
       co_return tl::unexpected(state.error());
     }
-    co_return protocol_error(fmt::format("the INS did not restart within {} s", reset_limit_s));
+    co_return protocol_error(fmt::format("the INS did not restart within {} s", limit_s));
   }
   if (auto known = co_await connection_.check_serial(); !known) {
     co_return tl::unexpected(known.error());

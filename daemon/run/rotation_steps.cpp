@@ -12,8 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double stop_limit_s = 30.0;  // of the INS's clock
-constexpr auto state_interval = 1s;    // from one question how far the rotation is to the next
+constexpr auto state_interval = 1s;  // from one question how far the rotation is to the next
 
 ins::ScheduleRecord schedule_record(const Schedule& schedule) {
   ins::ScheduleRecord record;
@@ -188,7 +187,7 @@ Task<Answer<Done>> RotationSteps::bring_to_rest() {
       co_return tl::unexpected(stopped.error());
     }
   }
-  co_return co_await await_state(ins::State::rotating, stop_limit_s, "the gimbal turns still");
+  co_return co_await await_state(ins::State::rotating, data_.config.profile->timing.stop_s, "the gimbal turns still");
 }
 
 Task<Step> RotationSteps::stop_gimbal() {

@@ -190,6 +190,13 @@ class Document {
         "DiagnosticSessionControl states longer times; in a session it sends TesterPresent (3E 80) every {:g} s.",
         b.padding, b.block_size, b.st_min, p_.timing.request_timeout_s, p_.timing.p2_star_s,
         p_.timing.tester_present_s));
+    const Timing& t = p_.timing;
+    const std::string slots =
+        p_.slots ? fmt::format("{:g} s to erase a slot, {:g} s to write a set, {:g} s to put it in force", t.erase_s,
+                               t.write_s, t.commit_s)
+                 : fmt::format("{:g} s to write a set", t.write_s);
+    out_.say(fmt::format("The INS may take {}, {:g} s of its own clock to restart and {:g} s to stop its gimbal.",
+                         slots, t.restart_s, t.stop_s));
   }
 
   void write_services() {

@@ -32,6 +32,10 @@ struct Timing {
   double request_timeout_s = 1.0;  // P2 of the client; the INS's own statement lengthens it
   double p2_star_s = 5.0;
   double tester_present_s = 2.0;
+  // How long the INS may take: to erase a slot, to write a set, to put it in force; on its own clock, to restart and to stop its
+  // gimbal. Behind them the service gives up. A sector of serial NOR FLASH is erased in 0.4 s at the most and a page of it programmed
+  // in 3 ms: ten times that, and twice for an erased slot that is tidied up. A gimbal of 90 deg/s stops in a second or two.
+  double erase_s = 8.0, write_s = 4.0, commit_s = 4.0, restart_s = 60.0, stop_s = 30.0;
 };
 
 struct Security {

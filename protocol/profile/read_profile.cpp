@@ -98,6 +98,7 @@ class ProfileReader {
     profile_.security.needed = false;
     Section timing = root_.table("timing");
     profile_.timing.request_timeout_s = timing.number("request_timeout_s", 0.01, 60).value_or(1.0);
+    read_durations(timing);
     timing.only_these();
     read_record("sample_format", profile_.sample_format, false);
     if (profile_.sample_format.did) {
@@ -121,11 +122,22 @@ class ProfileReader {
     return static_cast<std::uint16_t>(*number);
   }
 
+  void read_durations(Section& timing) {
+    constexpr double least_s = 0.1, most_s = 600.0;
+    Timing& t = profile_.timing;
+    for (const auto& [key, into] :
+         {std::pair("erase_s", &t.erase_s), std::pair("write_s", &t.write_s), std::pair("commit_s", &t.commit_s),
+          std::pair("restart_s", &t.restart_s), std::pair("stop_s", &t.stop_s)}) {
+      *into = timing.number(key, least_s, most_s).value_or(*into);
+    }
+  }
+
   void read_timing() {
     Section timing = root_.table("timing");
     profile_.timing.request_timeout_s = timing.number("request_timeout_s", 0.01, 60).value_or(1.0);
     profile_.timing.p2_star_s = timing.number("p2_star_s", 0.1, 60).value_or(5.0);
     profile_.timing.tester_present_s = timing.number("tester_present_s", 0.1, 4.5).value_or(2.0);
+    read_durations(timing);
     timing.only_these();
     Section session = root_.table("session");
     profile_.session = static_cast<std::uint8_t>(session.whole("calibration", 2, 0x7E).value_or(3));

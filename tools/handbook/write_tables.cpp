@@ -186,7 +186,7 @@ it, and `config/profiles` holds five. Unknown keys are faults.
 |---|---|
 | | `name`; `byte_order` big or little, of every number that says nothing else |
 | `bus` | `addressing` normal, normal-29 (with `request`, `response`, `functional`), normal-fixed (with `ins_address`, `tester_address`), extended, extended-29 (with the three identifiers, of which requests to one and to all may be the same, and `ins_address`, `tester_address`, `functional_address`), mixed (with the three identifiers and `address_extension`), mixed-29 (with `ins_address`, `tester_address`, `address_extension`), none (no UDS, with `extended_ids`: see `frames`); `status` of the [state frame](#status-frames), the gimbal frame has the next, none where it is left out; `fd`; `padding`, `block_size`, `st_min` |
-| `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them |
+| `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them. How long the INS may take: `erase_s` (8 s where it is left out), `write_s` a set (4), `commit_s` (4), and on its own clock `restart_s` (60), `stop_s` of the gimbal (30) |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
 | `identity` | `serial`, `software`: data identifiers of ASCII |

@@ -436,6 +436,25 @@ TEST(StateBudget, EveryStateThatIsNotAnEndHasOneAndItBearsWithALostLink) {
   }
 }
 
+TEST(StateBudget, IsAsLongAsTheProfileSaysThatTheInsMayTake) {
+  InsConfig quick, slow;
+  slow.time_scale = quick.time_scale = 2.0;
+  auto profile = std::make_shared<profile::Profile>(*quick.profile);
+  profile->timing.erase_s += 100.0;
+  profile->timing.write_s += 200.0;
+  profile->timing.commit_s += 300.0;
+  profile->timing.restart_s += 400.0;
+  profile->timing.stop_s += 50.0;
+  slow.profile = profile;
+  const auto longer = [&](State state) { return budget_s(state, slow, 1.0) - budget_s(state, quick, 1.0); };
+  EXPECT_DOUBLE_EQ(longer(State::erasing), 100.0);
+  EXPECT_DOUBLE_EQ(longer(State::writing), 200.0);
+  EXPECT_DOUBLE_EQ(longer(State::committing), 300.0);
+  EXPECT_DOUBLE_EQ(longer(State::resetting), 400.0 / 2.0 + 200.0);  // on the INS's clock, and what it writes meanwhile
+  EXPECT_DOUBLE_EQ(longer(State::stopping), 50.0 / 2.0);
+  EXPECT_DOUBLE_EQ(longer(State::verifying), 0.0);
+}
+
 // The INS's clock may run faster (virtual INS): what is waited for on it is shorter, what the bus takes is not.
 TEST(StateBudget, FollowsTheClockOfTheIns) {
   InsConfig config;

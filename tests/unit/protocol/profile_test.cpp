@@ -201,6 +201,19 @@ TEST(Profile, TellsEveryFaultAtOnceEachWithItsLine) {
                              testing::HasSubstr(": axis: no such key; did you mean axes?")));
 }
 
+TEST(Profile, SaysHowLongTheInsMayTake) {
+  const std::string text = own_text();
+  EXPECT_EQ(built_in()->timing.restart_s, 60.0);
+  const auto profile =
+      parse_profile(with(text, "p2_star_s = 5.0", "p2_star_s = 5.0\nerase_s = 25\nrestart_s = 120.0"), "p.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  EXPECT_EQ((*profile)->timing.erase_s, 25.0);
+  EXPECT_EQ((*profile)->timing.restart_s, 120.0);
+  EXPECT_THAT(describe(**profile, Markup::markdown), testing::HasSubstr("25 s to erase a slot, 4 s to write a set"));
+  EXPECT_THAT(complaint(with(text, "p2_star_s = 5.0", "p2_star_s = 5.0\nstop_s = 0")),
+              testing::HasSubstr("timing.stop_s: "));
+}
+
 // An INS that streams its samples has no pages and no directory of them, and no frame of a sample is one of the bus.
 TEST(Profile, SamplesAreStreamedOrKept) {
   const std::string stream = R"(
