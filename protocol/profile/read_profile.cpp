@@ -7,11 +7,11 @@
 #include <sstream>
 
 #include "protocol/profile/coefficient_fields.hpp"
-#include "protocol/profile/raw_file.hpp"
 #include "protocol/profile/read_bus.hpp"
 #include "protocol/profile/read_frames.hpp"
 #include "protocol/profile/read_layout.hpp"
 #include "protocol/profile/read_move.hpp"
+#include "protocol/profile/read_raw.hpp"
 #include "protocol/profile/read_security.hpp"
 
 namespace selfcal::profile {
@@ -19,9 +19,7 @@ namespace {
 
 constexpr std::uint64_t most_did = 0xFFFF;
 constexpr std::uint32_t longest_message = 4094;  // ISO-TP's 12 bits of length, less the service
-constexpr std::uint64_t most_samples = 145;      // of a page, as the service keeps it
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
-constexpr std::array<std::string_view, 2> address_units{"page", "byte"};
 
 // One number must not mean two things.
 class Numbers {
@@ -79,7 +77,7 @@ class ProfileReader {
     read_records();
     read_set();
     read_routines();
-    read_raw();
+    read_raw(root_, profile_, order_);
   }
 
   // What the service asks in the INS's place, it asks as our own INS would be asked.
@@ -219,27 +217,6 @@ class ProfileReader {
     }
   }
 
-  void read_stream_of_samples(Section& stream) {
-    profile_.stream = read_stream(stream, profile_, order_);
-    Raw& raw = profile_.raw;
-    raw.way = Raw::Way::stream;
-    raw.by_page = false;
-    raw.longest_read = longest_message;
-    raw.page = built_in()->raw.page;
-    if (root_.has("page")) {
-      root_.fault("page", "the samples are streamed: there are none");
-      root_.table("page");
-    }
-    for (const std::string_view name : {"gimbal_per_count", "page_bytes", "samples_per_page"}) {
-      const Field* field = profile_.sample_format.layout.find(name);
-      if (field != nullptr || profile_.sample_format.given.contains(name)) {
-        faults_.add(field != nullptr ? field->line : root_.line_of("sample_format"),
-                    fmt::format("sample_format.{}{}", field != nullptr ? "fields." : "given.", name),
-                    "the samples are streamed: there are no pages, and the gimbal is told as an angle");
-      }
-    }
-  }
-
   void read_set() {
     Section section = root_.table("coefficients", true);
     if (!section.there()) {
@@ -329,112 +306,6 @@ class ProfileReader {
         faults_.add(state->line, fmt::format("{}.fields.state.codes.checking", routine->record),
                     "missing, and there is a navigation check");
       }
-    }
-  }
-
-  // ReadMemoryByAddress: pages of the run one behind the other.
-  void read_memory(Section& memory) {
-    Raw& raw = profile_.raw;
-    raw.way = Raw::Way::memory;
-    raw.by_page = false;
-    raw.address_bytes = memory.whole("address_bytes", 1, 4).value_or(4);
-    raw.size_bytes = memory.whole("size_bytes", 1, 4).value_or(2);
-    const auto largest = [](std::size_t bytes) { return (std::uint64_t{1} << (8 * bytes)) - 1; };
-    raw.first_address =
-        static_cast<std::uint32_t>(memory.whole("address", 0, largest(raw.address_bytes), true).value_or(0));
-    constexpr std::uint64_t shortest = 32, longest = longest_message;
-    raw.longest_read = static_cast<std::uint32_t>(
-        memory.whole("longest", shortest, std::min(longest, largest(raw.size_bytes)), true).value_or(shortest));
-    memory.only_these();
-  }
-
-  // RequestFileTransfer: each page is a file.
-  void read_file(Section& file) {
-    profile_.raw.way = Raw::Way::file;
-    profile_.raw.by_page = false;
-    profile_.raw.file = file.text("name", true).value_or("");
-    if (const std::string fault = fault_of_file_pattern(profile_.raw.file); file.has("name") && !fault.empty()) {
-      file.fault("name", fault);
-    }
-    file.only_these();
-  }
-
-  void read_raw() {
-    Section memory = root_.table("memory");
-    if (memory.there()) {
-      read_memory(memory);
-    }
-    Section file = root_.table("file");
-    if (file.there()) {
-      read_file(file);
-    }
-    Section stream = root_.table("stream");
-    Section upload = root_.table("upload", !memory.there() && !file.there() && !stream.there());
-    if (int{upload.there()} + int{memory.there()} + int{file.there()} + int{stream.there()} > 1) {
-      (upload.there() ? upload : file.there() ? file : stream).fault("", "and another: the raw data come in one way");
-    }
-    if (stream.there()) {
-      return read_stream_of_samples(stream);
-    }
-    if (upload.there()) {
-      profile_.raw.by_page = upload.word("address", address_units, true).value_or("page") == "page";
-      profile_.raw.address_bytes = upload.whole("address_bytes", 1, 4).value_or(4);
-      profile_.raw.size_bytes = upload.whole("size_bytes", 1, 4).value_or(4);
-      upload.only_these();
-    }
-    Section page = root_.table("page", true);
-    if (!page.there()) {
-      return;
-    }
-    Record record;
-    if (!page.has("bytes")) {
-      page.missing("bytes");
-    }
-    read_layout(page, record_role("page"), order_, record);
-    page.only_these();
-    if (!record.given.empty()) {
-      page.fault("given", "a page has no such values");
-    }
-    check_page(page, record.layout);
-    check_gimbal(record.layout);
-    profile_.raw.page = std::move(record.layout);
-  }
-
-  void check_page(Section& page, const Layout& layout) {
-    if (layout.each && layout.bytes > 0 && layout.most_repetitions() > most_samples) {
-      page.fault("bytes", fmt::format("{} samples fit, {} are the most", layout.most_repetitions(), most_samples));
-    }
-    for (const std::string_view name : {"delta_theta", "delta_v"}) {
-      const Field* field = layout.find(name);
-      if (field != nullptr && (field->type.kind != Kind::signed_integer || field->type.bytes > 4 ||
-                               field->scale != 1.0 || field->offset != 0.0)) {
-        faults_.add(field->line, fmt::format("page.each.fields.{}", name),
-                    "counts are i8 to i32 without scale, offset and unit: sample_format says what they are worth");
-      }
-    }
-    for (const std::string_view name : {"outer", "inner"}) {
-      const Field* field = layout.find(name);
-      if (field != nullptr && field->unit.empty() && field->type.name != "u16") {
-        faults_.add(field->line, fmt::format("page.each.fields.{}", name),
-                    "counts are u16; with a unit it may be any type");
-      }
-    }
-  }
-
-  void check_gimbal(const Layout& page) {
-    const Field* outer = page.find("outer");
-    const Field* inner = page.find("inner");
-    if (outer == nullptr || inner == nullptr) {
-      return;
-    }
-    const Record& format = profile_.sample_format;
-    const bool told = format.layout.find("gimbal_per_count") != nullptr || format.given.contains("gimbal_per_count");
-    if (outer->unit.empty() != inner->unit.empty()) {
-      faults_.add(std::max(outer->line, inner->line), "page.each.fields",
-                  "outer and inner: both in counts or both with a unit");
-    } else if (outer->unit.empty() != told) {
-      faults_.add(root_.line_of("sample_format"), "sample_format.fields.gimbal_per_count",
-                  told ? "told, and the page has angles with a unit" : "missing, and the page has counts");
     }
   }
 
