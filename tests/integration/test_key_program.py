@@ -67,10 +67,13 @@ class KeyProgram(profile_case.UnderProfile):
 
     def reason(self, unit):
         """Of a run that fails for its lock; meanwhile the service answers."""
+        begin = time.monotonic()
+        unit.selfcal("status", "--json")
+        usual_s = time.monotonic() - begin  # on this machine, with what else it does
         run = unit.start_run("--schedule", "horizontal", "--force", "short dwell")
         begin = time.monotonic()
         unit.selfcal("status", "--json")
-        self.assertLess(time.monotonic() - begin, 1.5, "the service does not answer while the program runs")
+        self.assertLess(time.monotonic() - begin, 1.5 + 5 * usual_s, "the service does not answer while the program runs")
         ended = unit.wait_for_end(run)
         self.assertEqual(ended["state"], "failed", ended)
         self.assertLess(time.monotonic() - begin, 15)
