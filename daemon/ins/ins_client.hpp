@@ -20,7 +20,7 @@ namespace selfcal {
 
 class InsClient {
  public:
-  InsClient(Timers& timers, InsPort& port, profile::ProfilePtr profile = profile::built_in())
+  InsClient(Timers& timers, InsPort& port, const profile::ProfilePtr& profile = profile::built_in())
       : timers_(timers), port_(port), profile_(profile::told_as(profile)), tally_(profile_) {}
 
   // Whether a session other than the default one was asked for: it is to be ended (session_end.hpp).
