@@ -131,12 +131,7 @@ void FramePort::start_rotation(std::span<const std::uint8_t> option) {
   unsaid_.clear();
   stream_.begin();
   stream_.end();
-  const double rate = p.sample_format.given.at("sample_rate");
-  double duration_s = schedule_->rotation_ms * 1e-3 * static_cast<double>(schedule_->positions.size() - 1);
-  for (const auto& position : schedule_->positions) {
-    duration_s += position.dwell_ms * 1e-3;
-  }
-  pages_expected_ = static_cast<std::uint32_t>(std::ceil(duration_s * rate / flash::samples_per_page));
+  pages_expected_ = pages_of(*schedule_, p.sample_format.given.at("sample_rate"));
   sequence_.begin(*schedule_, frames().turning);
   command_move();
   if (turning()) {
@@ -145,21 +140,8 @@ void FramePort::start_rotation(std::span<const std::uint8_t> option) {
 }
 
 void FramePort::read_memory(std::span<const std::uint8_t> payload) {
-  const profile::Raw& memory = config_.profile->raw;
-  if (payload.size() != 2 + memory.address_bytes + memory.size_bytes) {
-    return refuse(Nrc::incorrect_message_length);
-  }
-  std::uint64_t address = 0, size = 0;
-  for (std::size_t k = 2; k < payload.size(); ++k) {
-    std::uint64_t& into = k < 2 + memory.address_bytes ? address : size;
-    into = into << 8U | payload[k];
-  }
-  if (size == 0 || address + size > std::uint64_t{pages_written()} * flash::page_bytes) {
-    return refuse(Nrc::request_out_of_range);
-  }
-  Bytes data;
-  stream_.append_bytes(address, size, run_id_, sequence_.phase() == Phase::over, data);
-  positive(std::move(data));
+  auto told = stream_.memory(payload, pages_written(), run_id_, sequence_.phase() == Phase::over);
+  told ? answer(std::move(*told)) : refuse(told.error());
 }
 
 }  // namespace selfcal

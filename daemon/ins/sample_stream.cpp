@@ -19,6 +19,14 @@ std::uint64_t next(std::uint64_t counter, std::size_t bits) { return (counter + 
 
 }  // namespace
 
+std::uint32_t pages_of(const ins::ScheduleRecord& schedule, double sample_rate_hz) {
+  double duration_s = schedule.rotation_ms * 1e-3 * static_cast<double>(schedule.positions.size() - 1);
+  for (const auto& position : schedule.positions) {
+    duration_s += position.dwell_ms * 1e-3;
+  }
+  return static_cast<std::uint32_t>(std::ceil(duration_s * sample_rate_hz / flash::samples_per_page));
+}
+
 void SampleStream::begin() {
   taking_ = true;
   samples_.clear();
@@ -127,15 +135,24 @@ std::vector<std::uint8_t> SampleStream::page(std::uint32_t number, std::uint32_t
   return bytes;
 }
 
-void SampleStream::append_bytes(std::uint64_t address, std::uint64_t size, std::uint32_t run_id, bool whole,
-                                std::vector<std::uint8_t>& into) const {
-  for (std::uint64_t at = address; at < address + size; at = (at / flash::page_bytes + 1) * flash::page_bytes) {
+uds::Reply SampleStream::memory(uds::ByteView request, std::uint32_t pages, std::uint32_t run_id, bool whole) const {
+  const auto range = uds::parse_memory_request(request, {profile_->raw.address_bytes, profile_->raw.size_bytes});
+  if (!range) {
+    return tl::unexpected(range.error());
+  }
+  const std::uint64_t begin = range->address, end = begin + range->bytes;
+  if (begin == end || end > std::uint64_t{pages} * flash::page_bytes) {
+    return tl::unexpected(uds::Nrc::request_out_of_range);
+  }
+  std::vector<std::uint8_t> data;
+  for (std::uint64_t at = begin; at < end; at = (at / flash::page_bytes + 1) * flash::page_bytes) {
     const auto bytes = page(static_cast<std::uint32_t>(at / flash::page_bytes), run_id, whole);
     const std::size_t from = at % flash::page_bytes;
-    const std::size_t count = std::min<std::size_t>(bytes.size() - from, address + size - at);
-    into.insert(into.end(), bytes.begin() + static_cast<std::ptrdiff_t>(from),
+    const std::size_t count = std::min<std::size_t>(bytes.size() - from, end - at);
+    data.insert(data.end(), bytes.begin() + static_cast<std::ptrdiff_t>(from),
                 bytes.begin() + static_cast<std::ptrdiff_t>(from + count));
   }
+  return uds::memory_response(data);
 }
 
 }  // namespace selfcal

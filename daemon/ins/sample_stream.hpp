@@ -9,9 +9,14 @@
 
 #include "protocol/can/frame.hpp"
 #include "protocol/flash/page.hpp"
+#include "protocol/ins_interface/records.hpp"
 #include "protocol/profile/profile.hpp"
+#include "protocol/uds/messages.hpp"
 
 namespace selfcal {
+
+// Pages of a rotation by the schedule, the last one perhaps not full.
+std::uint32_t pages_of(const ins::ScheduleRecord& schedule, double sample_rate_hz);
 
 class SampleStream {
  public:
@@ -31,9 +36,8 @@ class SampleStream {
   // A page of them, as our own INS has pages; the INS's axes.
   std::vector<std::uint8_t> page(std::uint32_t number, std::uint32_t run_id, bool last) const;
   std::uint32_t pages_begun() const;
-  // Bytes of the pages one behind the other; those pages are begun.
-  void append_bytes(std::uint64_t address, std::uint64_t size, std::uint32_t run_id, bool whole,
-                    std::vector<std::uint8_t>& into) const;
+  // ReadMemoryByAddress of the first `pages`, one behind the other; they are begun.
+  uds::Reply memory(uds::ByteView request, std::uint32_t pages, std::uint32_t run_id, bool whole) const;
 
  private:
   void take_part(std::size_t which, const can::CanFrame& frame);

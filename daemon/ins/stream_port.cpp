@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
-#include <cmath>
 #include <utility>
 
 #include "protocol/profile/records.hpp"
@@ -18,8 +17,9 @@ constexpr auto silence_limit = 5s;  // of the stream, while it is to come
 constexpr auto first_limit = 60s;   // before its first sample: the gimbal goes to the first position
 constexpr int batches_per_turn = 16;
 
-std::uint16_t number_in(std::span<const std::uint8_t> payload, std::size_t at) {
-  return static_cast<std::uint16_t>(payload.size() >= at + 2 ? payload[at] << 8U | payload[at + 1] : 0);
+// The identifier that a record is read or written by.
+std::uint16_t number_in(std::span<const std::uint8_t> payload) {
+  return static_cast<std::uint16_t>(payload.size() >= 3 ? payload[1] << 8U | payload[2] : 0);
 }
 
 }  // namespace
@@ -156,15 +156,13 @@ void StreamPort::request(std::span<const std::uint8_t> payload, std::size_t long
   if (!trouble_.empty()) {
     return answer(trouble(PortError::Kind::link, trouble_));
   }
-  if (service == uds::service::read_data && number_in(payload, 1) == p.directory.did) {
+  if (service == uds::service::read_data && number_in(payload) == p.directory.did) {
     return answer(directory());
   }
   if (service == uds::service::read_memory) {
     return answer(memory(payload));
   }
-  const bool starts = service == uds::service::routine_control && number_in(payload, 2) == p.rotate.id &&
-                      payload[1] == static_cast<std::uint8_t>(uds::RoutineAction::start);
-  if (starts) {
+  if (starts_rotation()) {
     begin(payload.subspan(4));  // its first sample may come before its answer
   }
   ins_->request(payload, longest_answer, [this](Answer<Bytes> told) {
@@ -181,17 +179,21 @@ void StreamPort::cancel() {
   ins_->cancel();
 }
 
+bool StreamPort::starts_rotation() const {
+  const auto call = request_.front() == uds::service::routine_control ? uds::parse_routine_request(request_)
+                                                                      : tl::unexpected(uds::Nrc::none);
+  return call && call->routine == config_.profile->rotate.id && call->action == uds::RoutineAction::start;
+}
+
 Answer<Bytes> StreamPort::seen(Answer<Bytes> told) {
   const profile::Profile& p = *config_.profile;
   const std::uint8_t service = request_.front();
-  const std::uint16_t number = number_in(request_, 1);
+  const std::uint16_t number = number_in(request_);
   if (service == uds::service::read_data && number == p.state.did) {
     return state_seen(std::move(told));
   }
   if (!told) {
-    const bool started = service == uds::service::routine_control && number_in(request_, 2) == p.rotate.id &&
-                         request_[1] == static_cast<std::uint8_t>(uds::RoutineAction::start);
-    if (started && told.error().kind == PortError::Kind::negative) {  // without an answer nobody knows
+    if (starts_rotation() && told.error().kind == PortError::Kind::negative) {  // without an answer nobody knows
       turning_ = false;
       run_id_ = 0;
     }
@@ -229,17 +231,6 @@ std::uint32_t StreamPort::pages_written() const {  // the page that is being fil
   return turning_ ? static_cast<std::uint32_t>(stream_.samples() / flash::samples_per_page) : stream_.pages_begun();
 }
 
-std::uint32_t StreamPort::pages_expected() const {
-  if (!schedule_) {
-    return pages_written();
-  }
-  double duration_s = schedule_->rotation_ms * 1e-3 * static_cast<double>(schedule_->positions.size() - 1);
-  for (const auto& position : schedule_->positions) {
-    duration_s += position.dwell_ms * 1e-3;
-  }
-  return static_cast<std::uint32_t>(std::ceil(duration_s * sample_rate_hz_ / flash::samples_per_page));
-}
-
 Answer<Bytes> StreamPort::directory() {
   drain();
   if (run_id_ == 0) {
@@ -253,36 +244,20 @@ Answer<Bytes> StreamPort::directory() {
   ins::DirectoryRecord record;
   record.run_id = run_id_;
   record.pages_written = pages_written();
-  record.pages_expected = pages_expected();
+  record.pages_expected = schedule_ ? pages_of(*schedule_, sample_rate_hz_) : record.pages_written;
   record.complete = !turning_;
   record.samples = record.complete ? stream_.samples() : std::uint64_t{record.pages_written} * flash::samples_per_page;
-  Bytes response{uds::service::read_data + uds::positive_offset, request_[1], request_[2]};
-  const Bytes bytes = *profile::encode(*config_.profile, record);
-  response.insert(response.end(), bytes.begin(), bytes.end());
-  return response;
+  return uds::read_response(profile::kept_directory, *profile::encode(*config_.profile, record));
 }
 
 Answer<Bytes> StreamPort::memory(std::span<const std::uint8_t> payload) const {
-  const profile::Raw& raw = config_.profile->raw;
-  const auto refused = [this](uds::Nrc nrc) {
-    return tl::unexpected(PortError{
-        PortError::Kind::negative, static_cast<std::uint8_t>(nrc),
-        fmt::format("{}: kept samples: {}", config_.interface, uds::describe_nrc(static_cast<std::uint8_t>(nrc)))});
-  };
-  if (payload.size() != 2 + raw.address_bytes + raw.size_bytes) {
-    return refused(uds::Nrc::incorrect_message_length);
+  auto told = stream_.memory(payload, pages_written(), run_id_, !turning_);
+  if (told) {
+    return std::move(*told);
   }
-  std::uint64_t address = 0, size = 0;
-  for (std::size_t k = 2; k < payload.size(); ++k) {
-    std::uint64_t& into = k < 2 + raw.address_bytes ? address : size;
-    into = into << 8U | payload[k];
-  }
-  if (size == 0 || address + size > std::uint64_t{pages_written()} * flash::page_bytes) {
-    return refused(uds::Nrc::request_out_of_range);
-  }
-  Bytes response{uds::service::read_memory + uds::positive_offset};
-  stream_.append_bytes(address, size, run_id_, !turning_, response);
-  return response;
+  const auto nrc = static_cast<std::uint8_t>(told.error());
+  return tl::unexpected(PortError{PortError::Kind::negative, nrc,
+                                  fmt::format("{}: kept samples: {}", config_.interface, uds::describe_nrc(nrc))});
 }
 
 // From the loop, never from inside request().

@@ -40,11 +40,11 @@ class StreamPort : public InsPort {
   // The INS's answer to the request in hand, before the service has it.
   Answer<Bytes> seen(Answer<Bytes> answer);
   Answer<Bytes> state_seen(Answer<Bytes> answer);
+  bool starts_rotation() const;  // the request in hand
   Answer<Bytes> directory();
   Answer<Bytes> memory(std::span<const std::uint8_t> payload) const;
   void answer(Answer<Bytes> answer);
   std::uint32_t pages_written() const;
-  std::uint32_t pages_expected() const;
   tl::unexpected<PortError> trouble(PortError::Kind kind, const std::string& what) const;
 
   EventLoop& loop_;

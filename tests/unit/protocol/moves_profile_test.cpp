@@ -10,20 +10,10 @@
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/profile/told_as.hpp"
+#include "tests/unit/protocol/profile_text.hpp"
 
 namespace selfcal::profile {
 namespace {
-
-std::string with(std::string text, std::string_view from, std::string_view to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
-std::string complaint(const std::string& text) {
-  const auto profile = parse_profile(text, "p.toml");
-  return profile ? std::string() : profile.error().message;
-}
 
 // A position by itself in place of a schedule.
 TEST(MovesProfile, HasARecordOfAPosition) {

@@ -14,6 +14,7 @@
 #include "protocol/profile/records.hpp"
 #include "tests/own_ins/identifiers.hpp"
 #include "tests/own_ins/records.hpp"
+#include "tests/unit/protocol/profile_text.hpp"
 
 namespace selfcal::profile {
 namespace {
@@ -149,24 +150,6 @@ TEST(BuiltInProfile, HasTheNumbersOfTheTable) {
   EXPECT_EQ(p.erase.id, ins::routine::erase_inactive);
   EXPECT_EQ(p.commit.id, ins::routine::commit_coefficients);
   EXPECT_EQ(p.navigation_check.id, ins::routine::navigation_check);
-}
-
-std::string own_text() {
-  std::ifstream in(SELFCAL_SOURCE_DIR "/config/profiles/selfcal.toml");
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-std::string with(std::string text, std::string_view from, std::string_view to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
-std::string complaint(const std::string& text) {
-  const auto profile = parse_profile(text, "p.toml");
-  return profile ? std::string() : profile.error().message;
 }
 
 // What an INS tells has any length. Nothing is read beyond it, and no shorter record has a right checksum.

@@ -9,12 +9,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "protocol/profile/describe.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "protocol/profile/records.hpp"
+#include "tests/unit/protocol/profile_text.hpp"
 
 namespace selfcal::profile {
 namespace {
@@ -152,18 +152,9 @@ TEST(SetForm, WhatHasNoInverseIsNamed) {
   EXPECT_TRUE(converted(SetForm::errors, held));
 }
 
-std::string with(std::string text, std::string_view from, std::string_view to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
 // Our own INS's profile, its 24 one group behind the other.
 std::string text_of(std::string_view form, std::string_view gyro, std::string_view pos, std::string_view neg,
                     std::string_view of_bias = "") {
-  std::ifstream in(SELFCAL_SOURCE_DIR "/config/profiles/selfcal.toml");
-  std::stringstream text;
-  text << in.rdbuf();
   std::ostringstream fields;
   fields << "form = \"" << form << "\"\nfields.accel_bias = { at = 52, type = \"f64\", count = 3" << of_bias
          << " }\nfields.gyro_drift = { at = 76, type = \"f64\", count = 3 }\nfields.accel_scale_pos = { at = 100, type "
@@ -173,8 +164,7 @@ std::string text_of(std::string_view form, std::string_view gyro, std::string_vi
             "type "
             "= \"f64\", count = 3"
          << gyro << " }\nfields.gyro_misalignment = { at = 196, type = \"f64\", count = 6 }";
-  std::string whole = with(text.str(), "fields.values = { at = 52, type = \"f64\", count = 24 }", fields.str());
-  return whole;
+  return with(own_text(), "fields.values = { at = 52, type = \"f64\", count = 24 }", fields.str());
 }
 
 double f64_at(const Bytes& bytes, std::size_t at) {
@@ -229,10 +219,6 @@ RC_GTEST_PROP(SetForm, WhatIsReadBackIsWrittenTheSame, ()) {
 }
 
 TEST(SetForm, FaultsOfTheProfileAreNamed) {
-  const auto complaint = [](const std::string& text) {
-    const auto profile = parse_profile(text, "p.toml");
-    return profile ? std::string() : profile.error().message;
-  };
   EXPECT_EQ(complaint(text_of("errors", "", "", "")), "");
   EXPECT_THAT(complaint(text_of("inverse", "", "", "")), testing::HasSubstr("coefficients.form: "));
   EXPECT_THAT(complaint(text_of("errors", ", nominal = 0", "", "")), testing::HasSubstr("gyro_scale.nominal: is 0"));
