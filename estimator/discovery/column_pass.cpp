@@ -8,7 +8,7 @@ namespace {
 
 constexpr Eigen::Index batch_rows = 192;
 
-class Carrier : public PassObserver {
+class Carrier {
  public:
   Carrier(const PassInput& input, ColumnSource& source, ColumnSums& sums, RowSink* sink)
       : navigator_(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &source),
@@ -32,7 +32,7 @@ class Carrier : public PassObserver {
     }
   }
 
-  void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override {
+  void propagate() {
     navigator_.next(own_);
     active_ = std::min(n_, source_.active(own_.end_s - start_s_));
     next_.noalias() = transition_.over(own_) * s_.topLeftCorner(dynamic_, active_);
@@ -43,7 +43,7 @@ class Carrier : public PassObserver {
     middle_s_ = 0.5 * (own_.start_s + own_.end_s);
   }
 
-  void updated(int /*axis*/, const VectorX& h, const ScalarInnovation& innovation, const UdFilter& filter) override {
+  void update(const VectorX& h, const ScalarInnovation& innovation, const VectorX& gain) {
     const double scale = 1.0 / std::sqrt(innovation.variance);
     auto s = s_.leftCols(active_);
     nu_.noalias() = h.transpose() * s.topRows(dynamic_);
@@ -57,7 +57,7 @@ class Carrier : public PassObserver {
     }
     ++row_;
     ++filled_;
-    s.noalias() -= filter.gain() * nu_;
+    s.noalias() -= gain * nu_;
     if (filled_ == batch_rows) {
       flush();
     }
@@ -101,13 +101,45 @@ class Carrier : public PassObserver {
   Eigen::Index filled_ = 0, row_ = 0;
 };
 
+class Tracer : public PassObserver {
+ public:
+  explicit Tracer(PassTrace& trace) : trace_(trace) {}
+  void propagated(const Interval& /*interval*/, const UdFilter& /*filter*/) override { trace_.observed.push_back(0); }
+  void updated(int axis, const VectorX& h, const ScalarInnovation& innovation, const UdFilter& filter) override {
+    trace_.h[static_cast<std::size_t>(axis)] = h;
+    trace_.updates.push_back({axis, innovation, filter.gain()});
+    ++trace_.observed.back();
+  }
+
+ private:
+  PassTrace& trace_;
+};
+
 }  // namespace
 
-ColumnSums run_columns(const PassInput& input, ColumnSource& source, const std::stop_token& stop, RowSink* rows) {
+PassTrace trace_pass(const PassInput& input, const std::stop_token& stop) {
+  PassTrace trace;
+  Tracer tracer(trace);
+  trace.pass = run_pass(input, {}, stop, &tracer);
+  return trace;
+}
+
+ColumnSums run_columns(const PassInput& input, const PassTrace& trace, ColumnSource& source,
+                       const std::stop_token& stop, RowSink* rows) {
   ColumnSums sums;
   Carrier carrier(input, source, sums, rows);
-  sums.pass = run_pass(input, {}, stop, &carrier);
+  auto update = trace.updates.begin();
+  for (const int observed : trace.observed) {
+    if (stop.stop_requested()) {
+      break;
+    }
+    carrier.propagate();
+    for (int k = 0; k < observed; ++k, ++update) {
+      carrier.update(trace.h[static_cast<std::size_t>(update->axis)], update->innovation, update->gain);
+    }
+  }
   carrier.finish();
+  sums.pass = trace.pass;
   return sums;
 }
 

@@ -5,7 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
+#include <array>
 #include <stop_token>
 #include <vector>
 
@@ -18,6 +18,20 @@ class ColumnSource : public ExtraSignatures {
   // Columns behind this one have been zero so far, at this time since the start: they need no work yet.
   virtual int active(double time_s) const = 0;
 };
+
+// The filter's side of a pass. It is the same whatever columns are carried, so that passes about one linearisation need it once.
+struct PassTrace {
+  struct Update {
+    int axis = 0;
+    ScalarInnovation innovation;
+    VectorX gain;  // [states]
+  };
+  std::vector<int> observed;  // [intervals] scalar observations behind each
+  std::vector<Update> updates;
+  std::array<VectorX, 3> h;  // observation row of each axis, [dynamic states]
+  PassOutput pass;
+};
+PassTrace trace_pass(const PassInput& input, const std::stop_token& stop = {});
 
 struct ColumnSums {
   Eigen::MatrixXd information;  // [n x n] sum of row^T row, rows of unit noise with the 33 states projected out
@@ -34,7 +48,9 @@ struct RowSink {
   std::vector<double> time_s;  // [rows] middle of the interval, recording's time
 };
 
-// With `rows` the rows are kept too (few columns only).
+// With `rows` the rows are kept too (few columns only). `trace`: of a pass with this input.
+ColumnSums run_columns(const PassInput& input, const PassTrace& trace, ColumnSource& source,
+                       const std::stop_token& stop = {}, RowSink* rows = nullptr);
 ColumnSums run_columns(const PassInput& input, ColumnSource& source, const std::stop_token& stop = {},
                        RowSink* rows = nullptr);
 

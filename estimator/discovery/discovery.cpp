@@ -104,7 +104,7 @@ class Search {
   PieceSums sum_scenes() {
     std::vector<PieceSums> all;
     for (const auto& scene : scenes_) {
-      all.push_back(sum_over_pieces(scene->motion, scene->input, options_.stop, pieces_each()));
+      all.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace, options_.stop, pieces_each()));
       scene->table = all.back();
     }
     return join(std::move(all));
@@ -113,10 +113,13 @@ class Search {
   PieceSums sum_what_is_left() const {
     std::vector<PieceSums> all;
     for (std::size_t r = 0; r < scenes_.size(); ++r) {
-      const diagnosis::CorrectedRecording rest = without_laws(laws_on_[r], state_.terms, state_.fit.coefficient);
+      const Scene& scene = *scenes_[r];
+      const diagnosis::CorrectedRecording rest =
+          without_laws(scene.motion, scene.table, scene.input, state_.terms, state_.fit.coefficient);
       PassInput input = scenes_[r]->input;
       input.data = &rest.data();
-      all.push_back(sum_over_pieces(scenes_[r]->motion, input, options_.stop, pieces_each()));
+      all.push_back(
+          sum_over_pieces(scenes_[r]->motion, input, trace_pass(input, options_.stop), options_.stop, pieces_each()));
     }
     return join(std::move(all));
   }

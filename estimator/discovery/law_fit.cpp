@@ -133,7 +133,7 @@ JointSums sum_jointly(std::span<const LawRecording> recordings, const std::vecto
   for (const LawRecording& r : recordings) {
     LawColumns source(r.motion, r.table, terms, true);
     RowSink sink;
-    ColumnSums sums = run_columns(r.input, source, stop, &sink);
+    ColumnSums sums = run_columns(r.input, r.trace, source, stop, &sink);
     if (all.each.empty()) {
       all.information = Eigen::MatrixXd::Zero(source.count(), source.count());
       all.score = Eigen::VectorXd::Zero(source.count());
@@ -245,7 +245,7 @@ std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const 
   Eigen::VectorXd score;
   for (const LawRecording& r : recordings) {
     LawColumns source(r.motion, r.table, all, free);
-    const ColumnSums sums = run_columns(r.input, source, stop);
+    const ColumnSums sums = run_columns(r.input, r.trace, source, stop);
     information = information.size() == 0 ? sums.information : Eigen::MatrixXd(information + sums.information);
     score = score.size() == 0 ? sums.score : Eigen::VectorXd(score + sums.score);
   }
@@ -296,12 +296,11 @@ class Subtraction : public ExtraSignatures {
 
 }  // namespace
 
-diagnosis::CorrectedRecording without_laws(const LawRecording& recording, const std::vector<LawTerm>& terms,
-                                           const Eigen::VectorXd& coefficient) {
-  const PassInput& input = recording.input;
+diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
   diagnosis::AngleVelocity delta_theta(input.data->delta_theta.begin(), input.data->delta_theta.end());
   diagnosis::AngleVelocity delta_v(input.data->delta_v.begin(), input.data->delta_v.end());
-  LawColumns columns(recording.motion, recording.table, terms, false);
+  LawColumns columns(motion, table, terms, false);
   Subtraction subtraction(columns, coefficient, delta_theta, delta_v);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, &subtraction);
   Interval interval;

@@ -26,12 +26,13 @@ struct LawTerm {
   bool at_its_limit() const { return !constants.empty() && !(constants.front() > least && constants.front() < most); }
 };
 
-// One recording that laws are fitted to. All must outlive it; `table` is that of a pass with this input, a forward pass
-// about the calibrated recording.
+// One recording that laws are fitted to. All must outlive it; `table` and `trace` are those of a pass with this input, a
+// forward pass about the calibrated recording.
 struct LawRecording {
   const LawMotion& motion;
   const NodeTable& table;
   const PassInput& input;
+  const PassTrace& trace;
 };
 
 // The 24 of one recording with the laws, SI.
@@ -94,7 +95,7 @@ std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const 
                                 GivenConstants given_constants = GivenConstants::known);
 
 // The recording less the laws, stretch by stretch, each spread evenly over its samples.
-diagnosis::CorrectedRecording without_laws(const LawRecording& recording, const std::vector<LawTerm>& terms,
-                                           const Eigen::VectorXd& coefficient);
+diagnosis::CorrectedRecording without_laws(const LawMotion& motion, const NodeTable& table, const PassInput& input,
+                                           const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
 
 }  // namespace selfcal::discovery

@@ -138,12 +138,12 @@ Eigen::VectorXd PieceSums::score(int axis) const {
   return sums.score(Eigen::seqN(axis, static_cast<Eigen::Index>(pieces.size()), axis_count));
 }
 
-PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop,
-                          std::size_t most) {
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace,
+                          const std::stop_token& stop, std::size_t most) {
   PieceSums result;
   result.pieces = cut_into_pieces(motion.context(), most);
   PieceSource source(motion, result);
-  result.sums = run_columns(input, source, stop);
+  result.sums = run_columns(input, trace, source, stop);
   source.finish();
   return result;
 }

@@ -44,8 +44,8 @@ struct PieceSums : NodeTable {
 // SI size of one unit of an axis: 1 deg/h, 1 ug.
 double unit_of(int axis);
 
-PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const std::stop_token& stop = {},
-                          std::size_t most = most_pieces);
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace,
+                          const std::stop_token& stop = {}, std::size_t most = most_pieces);
 
 // Recordings one behind the other: what the states of each take up is projected out of each by itself, so that information
 // between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty. One recording

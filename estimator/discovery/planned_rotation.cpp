@@ -55,7 +55,7 @@ Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, cons
   const LawMotion motion(context);
   const NodeTable table = collect_nodes(motion, input);
   LawColumns columns(motion, table, terms, false);
-  return run_columns(input, columns, stop).information;
+  return run_columns(input, trace_pass(input, stop), columns, stop).information;
 }
 
 Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,

@@ -17,13 +17,15 @@ struct Scene {
   explicit Scene(const UnitRecording& recording)
       : context(recording.data),
         motion(context),
-        input(diagnosis::forward_pass(recording.data, recording.calibration)) {}
+        input(diagnosis::forward_pass(recording.data, recording.calibration)),
+        trace(trace_pass(input)) {}
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
   diagnosis::RecordingContext context;
   LawMotion motion;
   PassInput input;
+  PassTrace trace;
   NodeTable table;
 };
 
@@ -39,7 +41,7 @@ inline std::vector<LawRecording> laws_on(const std::vector<std::unique_ptr<Scene
   std::vector<LawRecording> all;
   all.reserve(scenes.size());
   for (const auto& scene : scenes) {
-    all.push_back({scene->motion, scene->table, scene->input});
+    all.push_back({scene->motion, scene->table, scene->input, scene->trace});
   }
   return all;
 }

@@ -47,7 +47,7 @@ struct Session {
   ImuData data = imu_view(session(), temperature);
   CalibrationResult calibration = *or_abort(diagnosis::calibrate_still(data, {}).result);
   Scene scene{{data, calibration}};
-  PieceSums sums = sum_over_pieces(scene.motion, scene.input);
+  PieceSums sums = sum_over_pieces(scene.motion, scene.input, scene.trace);
 };
 
 const Session& prepared() {

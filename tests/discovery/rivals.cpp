@@ -27,7 +27,7 @@ PieceSums with_states_held(const LawMotion& motion, PassInput input) {
   input.prior.velocity *= known;
   input.prior.attitude *= known;
   input.prior.parameter_sigma *= known;
-  return sum_over_pieces(motion, input);
+  return sum_over_pieces(motion, input, trace_pass(input));
 }
 
 std::vector<RivalLaw> stepwise(const PieceSums& sums, const laws::VariableSet& available) {
