@@ -9,6 +9,7 @@
 #include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/constant_spread.hpp"
 #include "estimator/discovery/departure.hpp"
+#include "estimator/discovery/known_form.hpp"
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
@@ -347,8 +348,12 @@ class Search {
   }
 
   // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the
-  // class, its stability and that probability.
+  // class, its stability and that probability. What is only described has no class: that takes most of the time.
   void settle_class(std::size_t k, DiscoveredLaw& law) {
+    if (is_crowded(state_.terms[k].axis, state_.terms, state_.fit.gain, state_.processes)) {
+      law.ambiguous = {{state_.terms[k].expression.text(state_.terms[k].constants), state_.terms[k].axis, 1.0, {}}};
+      return;
+    }
     constexpr double worth_a_change = 0.02;  // of the probability
     LawClass all = class_of(k);
     const std::vector<double>& merit = all.elsewhere().merit;
@@ -363,26 +368,6 @@ class Search {
     const std::vector<Candidate> beside = all.tried_beside();
     tried.insert(tried.end(), beside.begin(), beside.end());
     law.stability = stability(laws_on_, all_but(k), tried, members, options_.stop);
-  }
-
-  // Several equations on one axis, the smaller of which take little beside the largest, are more probably one law whose form
-  // none of them has than laws of their own. So is one beside which its axis needs a process, or one that departs from what
-  // its axis does where a quantity is large.
-  bool form_is_known(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) const {
-    constexpr double comparable = 0.5;
-    double least = law.gain, most = law.gain;
-    int on_axis = 0;
-    for (const DiscoveredLaw& other : all) {
-      if (other.term.axis == law.term.axis) {
-        ++on_axis;
-        least = std::min(least, other.gain);
-        most = std::max(most, other.gain);
-      }
-    }
-    const bool process_beside = std::any_of(state_.processes.begin(), state_.processes.end(),
-                                            [&](const DiscoveredProcess& p) { return p.axis == law.term.axis; });
-    const bool departs = law.departure_log_p < std::log(options_.departure_rate);
-    return !process_beside && !departs && (on_axis == 1 || (on_axis == 2 && least > comparable * most));
   }
 
   void tell() {
@@ -426,14 +411,9 @@ class Search {
     }
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
-    // What a form that is not known leaves shows on other axes too, as a weaker law there.
-    double unknown = 0.0;
-    for (const DiscoveredLaw& law : laws) {
-      unknown = form_is_known(law, laws) ? unknown : std::max(unknown, law.gain);
-    }
-    for (DiscoveredLaw& law : laws) {
-      (form_is_known(law, laws) && law.gain > unknown ? result_.laws : result_.described).push_back(law);
-    }
+    TellingLaws telling = tell_laws(std::move(laws), state_.processes, options_.departure_rate);
+    result_.laws = std::move(telling.told);
+    result_.described = std::move(telling.described);
   }
 
   std::span<const UnitRecording> recordings_;

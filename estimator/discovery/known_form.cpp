@@ -1,0 +1,90 @@
+#include "estimator/discovery/known_form.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr double comparable = 0.5;  // share of the larger of two gains
+constexpr double more_likely_than_not = 0.5;
+// Of a law's gain: what its form may lack where it is to predict (carry_over.hpp).
+constexpr double shadow_share = 0.1;
+// Probability that the weaker law follows the stronger one's axis, beyond which it counts as its shadow. At one in twenty
+// the odds of another axis are no longer beyond doubt.
+constexpr double shadow_odds = 0.05;
+
+double probability_on(const DiscoveredLaw& law, int axis) {
+  double total = 0.0, on_axis = 0.0;
+  for (const ClassMember& m : law.ambiguous) {
+    total += m.odds;
+    on_axis += m.axis == axis ? m.odds : 0.0;
+  }
+  return total > 0.0 ? on_axis / total : 0.0;
+}
+
+bool has_shadow(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) {
+  return std::any_of(all.begin(), all.end(), [&](const DiscoveredLaw& weak) {
+    return weak.term.axis != law.term.axis && weak.gain < shadow_share * law.gain &&
+           probability_on(weak, law.term.axis) > shadow_odds;
+  });
+}
+
+bool form_is_known(int axis, const std::vector<DiscoveredLaw>& all, double departure_rate) {
+  int here = 0, unsure = 0;
+  for (const DiscoveredLaw& law : all) {
+    if (law.term.axis == axis) {
+      if (law.departure_log_p < std::log(departure_rate) || has_shadow(law, all)) {
+        return false;
+      }
+      ++here;
+      unsure += law.carries_over < more_likely_than_not ? 1 : 0;
+    }
+  }
+  return here == 1 || unsure == 0;
+}
+
+}  // namespace
+
+bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double> gains,
+                std::span<const DiscoveredProcess> processes) {
+  double least = 0.0, most = 0.0;
+  int here = 0;
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    if (terms[k].axis == axis) {
+      least = here == 0 ? gains[k] : std::min(least, gains[k]);
+      most = std::max(most, gains[k]);
+      ++here;
+    }
+  }
+  const bool process =
+      std::any_of(processes.begin(), processes.end(), [&](const DiscoveredProcess& p) { return p.axis == axis; });
+  return process || here > 2 || (here == 2 && least <= comparable * most);
+}
+
+TellingLaws tell_laws(std::vector<DiscoveredLaw> laws, std::span<const DiscoveredProcess> processes,
+                      double departure_rate) {
+  std::vector<LawTerm> terms;
+  std::vector<double> gains;
+  for (const DiscoveredLaw& law : laws) {
+    terms.push_back(law.term);
+    gains.push_back(law.gain);
+  }
+  std::array<bool, axis_count> known{};
+  double unknown = 0.0;
+  for (const DiscoveredLaw& law : laws) {
+    const int axis = law.term.axis;
+    known[static_cast<std::size_t>(axis)] =
+        !is_crowded(axis, terms, gains, processes) && form_is_known(axis, laws, departure_rate);
+    unknown = known[static_cast<std::size_t>(axis)] ? unknown : std::max(unknown, law.gain);
+  }
+  TellingLaws result;
+  for (DiscoveredLaw& law : laws) {
+    const bool told = law.gain > unknown && known[static_cast<std::size_t>(law.term.axis)];
+    (told ? result.told : result.described).push_back(std::move(law));
+  }
+  return result;
+}
+
+}  // namespace selfcal::discovery

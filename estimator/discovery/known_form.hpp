@@ -1,0 +1,29 @@
+// Which of the laws that were found are told as equations, and which only describe what their axis does.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "estimator/discovery/discovery.hpp"
+
+namespace selfcal::discovery {
+
+// Whether equations and processes on this axis rule it out, before their classes are looked at, that its form is known.
+bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double> gains,
+                std::span<const DiscoveredProcess> processes);
+
+struct TellingLaws {
+  std::vector<DiscoveredLaw> told, described;  // both in the order of `laws`
+};
+
+// An axis whose form is none of those found is described only, with all equations on it. It is known by one of these:
+// - a law on it departs from what the axis does (departure.hpp) more than `departure_rate` of true laws do;
+// - a process of its own stands beside the equation;
+// - three equations share it, or two of which the smaller takes less than half of what the larger does, or of which one
+//   more probably fails on another plan than not: they are more probably one law whose form none of them has;
+// - a law that takes less than a tenth of what its law takes may as well follow this axis: that is what the form lacks.
+// What is weaker than an axis that is only described may be what this one's form leaves, and is described too.
+TellingLaws tell_laws(std::vector<DiscoveredLaw> laws, std::span<const DiscoveredProcess> processes,
+                      double departure_rate);
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,78 @@
+#include "estimator/discovery/known_form.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <utility>
+
+using namespace selfcal::discovery;
+
+namespace {
+
+constexpr double departure_rate = 0.01;
+
+// A law of this axis; its class is the axis alone.
+DiscoveredLaw law(int axis, double gain, double carries_over = 0.9) {
+  DiscoveredLaw l;
+  l.term.axis = axis;
+  l.gain = gain;
+  l.carries_over = carries_over;
+  l.ambiguous = {{"fx", axis, 1.0, {}}};
+  return l;
+}
+
+std::pair<std::size_t, std::size_t> told_and_described(std::vector<DiscoveredLaw> laws,
+                                                       std::vector<DiscoveredProcess> processes = {}) {
+  const TellingLaws t = tell_laws(std::move(laws), processes, departure_rate);
+  return {t.told.size(), t.described.size()};
+}
+using Counts = std::pair<std::size_t, std::size_t>;
+
+TEST(KnownForm, LawsOfTwoAxesAreToldWhateverTheirSizes) {
+  EXPECT_EQ(told_and_described({law(0, 900.0), law(4, 30.0)}), Counts(2, 0));
+}
+
+TEST(KnownForm, TwoOfOneAxisAreToldWhereAlikeInSizeAndLikelyElsewhere) {
+  EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 500.0)}), Counts(2, 0));
+  EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 400.0)}), Counts(0, 2));
+  EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 500.0, 0.33)}), Counts(0, 2));
+  EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 800.0), law(3, 700.0)}), Counts(0, 3));
+}
+
+TEST(KnownForm, OneLawThatIsUnsureElsewhereIsTold) {
+  EXPECT_EQ(told_and_described({law(3, 900.0, 0.33)}), Counts(1, 0));
+}
+
+TEST(KnownForm, WhatDepartsTakesItsWholeAxisAlong) {
+  DiscoveredLaw departs = law(4, 700.0);
+  departs.departure_log_p = std::log(departure_rate) - 0.1;
+  EXPECT_EQ(told_and_described({law(4, 900.0), departs}), Counts(0, 2));
+  departs.departure_log_p = std::log(departure_rate) + 0.1;
+  EXPECT_EQ(told_and_described({law(4, 900.0), departs}), Counts(2, 0));
+}
+
+TEST(KnownForm, WhatIsWeakerThanADescribedAxisIsDescribed) {
+  DiscoveredLaw departs = law(4, 700.0);
+  departs.departure_log_p = -20.0;
+  EXPECT_EQ(told_and_described({law(0, 900.0), departs, law(1, 100.0)}), Counts(1, 2));
+}
+
+TEST(KnownForm, AWeakLawThatMayFollowTheStrongOnesAxisIsItsShadow) {
+  DiscoveredLaw weak = law(2, 60.0);
+  weak.ambiguous.push_back({"fy", 1, 0.2, {}});
+  EXPECT_EQ(told_and_described({law(1, 900.0), weak}), Counts(0, 2));
+  weak.ambiguous.back().odds = 0.04;  // of 1.04: 3.8 %
+  EXPECT_EQ(told_and_described({law(1, 900.0), weak}), Counts(2, 0));
+  weak.ambiguous.back().odds = 0.2;
+  weak.gain = 100.0;  // more than a tenth: a law of its own
+  EXPECT_EQ(told_and_described({law(1, 900.0), weak}), Counts(2, 0));
+}
+
+TEST(KnownForm, AProcessOnAnAxisLeavesItsFormOpen) {
+  DiscoveredProcess jumps;
+  jumps.axis = 5;
+  EXPECT_EQ(told_and_described({law(5, 900.0), law(0, 1000.0)}, {jumps}), Counts(1, 1));
+  EXPECT_EQ(told_and_described({law(4, 900.0)}, {jumps}), Counts(1, 0));
+}
+
+}  // namespace
