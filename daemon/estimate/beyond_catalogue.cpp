@@ -58,18 +58,21 @@ ordered_json law_json(const DiscoveredLaw& law) {
     }
     members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}, {"also", also}});
   }
-  return {{"axis", name_of_axis(law.term.axis)},
-          {"expression", law.expression},
-          {"coefficient", law.coefficient},
-          {"sigma", law.sigma},
-          {"unit", unit_of_axis(law.term.axis)},
-          {"constants", constants},
-          {"significance", law.significance},
-          {"held_out_gain", law.held_out_gain},
-          {"share", law.share},
-          {"stability", law.stability},
-          {"carries_over", law.carries_over},
-          {"class", members}};
+  ordered_json document = {{"axis", name_of_axis(law.term.axis)},
+                           {"expression", law.expression},
+                           {"coefficient", law.coefficient},
+                           {"sigma", law.sigma},
+                           {"unit", unit_of_axis(law.term.axis)},
+                           {"constants", constants},
+                           {"significance", law.significance},
+                           {"held_out_gain", law.held_out_gain},
+                           {"share", law.share}};
+  if (law.carries_over > 0.0) {  // else its class was not looked at
+    document["stability"] = law.stability;
+    document["carries_over"] = law.carries_over;
+  }
+  document["class"] = members;
+  return document;
 }
 
 }  // namespace

@@ -74,9 +74,9 @@ struct ClassAverage {
 
 struct Discovery {
   std::vector<DiscoveredLaw> laws;  // best first
-  // Equations whose axis does something else still: they make it up only together, or beside a process, or a form is short of
-  // it where a quantity is large. The axis' form is none of them, and on another plan they may be far off.
-  // The fit holds them too.
+  // Equations whose axis does something else still (known_form.hpp). The axis' form is none of them, and on another plan they
+  // may be far off. The fit holds them too. Where they are too many, or beside a process, their class is not looked at: it is
+  // the equation alone, and `carries_over` and `stability` are 0.
   std::vector<DiscoveredLaw> described;
   std::vector<DiscoveredProcess> processes;
   double misfit_before = 0.0, misfit_after = 0.0;  // squares of the residuals beyond their number
