@@ -8,7 +8,7 @@
 
 #include "daemon/host/journal.hpp"
 #include "daemon/host/wall_clock.hpp"
-#include "daemon/ins/frame_port.hpp"
+#include "daemon/ins/open_port.hpp"
 #include "daemon/ins/unlock_key.hpp"
 #include "daemon/service.hpp"
 #include "daemon/store/database_copies.hpp"

@@ -8,7 +8,7 @@
 #include "daemon/host/config.hpp"
 #include "daemon/host/event_loop.hpp"
 #include "daemon/ins/bus_listener.hpp"
-#include "daemon/ins/frame_port.hpp"
+#include "daemon/ins/open_port.hpp"
 
 namespace selfcal {
 

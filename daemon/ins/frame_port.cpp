@@ -8,9 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "daemon/ins/can_port.hpp"
-#include "daemon/ins/move_port.hpp"
-#include "daemon/ins/stream_port.hpp"
 #include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
@@ -378,20 +375,6 @@ void FramePort::answer(Answer<Bytes> result) {
       done(std::move(result));
     }
   });
-}
-
-std::unique_ptr<InsPort> open_port(EventLoop& loop, const InsConfig& config) {
-  if (config.profile->frames) {
-    return std::make_unique<FramePort>(loop, config);
-  }
-  if (config.profile->move) {
-    return std::make_unique<MovePort>(loop, std::make_shared<CanPort>(loop, config), config);
-  }
-  auto port = std::make_unique<CanPort>(loop, config);
-  if (!config.profile->stream.empty()) {
-    return std::make_unique<StreamPort>(loop, std::move(port), config);
-  }
-  return port;
 }
 
 }  // namespace selfcal

@@ -95,7 +95,4 @@ class FramePort : public InsPort {
   std::string unsaid_;              // why a rotation broke off, until somebody asks
 };
 
-// The port to an INS, as its profile says.
-std::unique_ptr<InsPort> open_port(EventLoop& loop, const InsConfig& config);
-
 }  // namespace selfcal

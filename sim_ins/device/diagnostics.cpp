@@ -4,8 +4,6 @@
 #include <array>
 #include <string_view>
 
-#include "protocol/byte_order.hpp"
-#include "protocol/profile/frame_values.hpp"
 #include "protocol/profile/records.hpp"
 
 namespace selfcal::sim {
@@ -14,7 +12,6 @@ namespace {
 using uds::Nrc;
 namespace service = uds::service;
 
-constexpr std::string_view software_version = "sim_ins 1.0";
 constexpr uds::SessionTimings timings{std::chrono::milliseconds(50), std::chrono::seconds(5)};
 
 // What figures 5 and 6 ask of every request. No sub-function depends on the session other than through its service, so
@@ -46,8 +43,6 @@ constexpr std::array<ServiceRule, 12> service_rules = {{
     {service::file_transfer, false, 6, 0},
     {service::tester_present, true, 2, values({0})},
 }};
-
-uds::Bytes as_bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
 tl::unexpected<Nrc> no(Nrc nrc) { return tl::unexpected(nrc); }
 
@@ -211,170 +206,6 @@ Diagnostics::Reply Diagnostics::security_access(View request, Time now) {
     });
   }
   lock_.begin_attempt(request.subspan(2), now);
-  return uds::Bytes{};
-}
-
-bool Diagnostics::knows(std::uint16_t did) const {
-  const profile::Profile& p = *profile_;
-  const std::array dids{
-      std::optional(p.serial),    std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
-      profile::told_directory(p), p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
-  return std::ranges::find(dids, std::optional(did)) != dids.end() || profile::field_of(p, did) != nullptr;
-}
-
-// nullopt: nothing is there yet, or the profile's fields do not hold it.
-std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
-  const profile::Profile& p = *profile_;
-  const auto told = [&](const auto& content) -> std::optional<uds::Bytes> {
-    auto bytes = profile::encode(p, content);
-    return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
-  };
-  const auto told_if_there = [&](const auto& content) { return content ? told(*content) : std::nullopt; };
-  if (id == p.serial) {
-    return as_bytes(std::string_view(instrument_.serial()));
-  }
-  if (id == p.software) {
-    return as_bytes(software_version);
-  }
-  if (id == p.state.did) {
-    return told(instrument_.state_record());
-  }
-  if (id == p.schedule.did) {
-    return told_if_there(instrument_.schedule());
-  }
-  if (id == p.site.did) {
-    return told(instrument_.site());
-  }
-  if (const profile::Field* field = profile::field_of(p, id)) {
-    const auto set = told(instrument_.coefficients().stored());
-    return set ? std::optional(uds::Bytes(set->begin() + static_cast<std::ptrdiff_t>(field->at),
-                                          set->begin() + static_cast<std::ptrdiff_t>(field->end())))
-               : std::nullopt;
-  }
-  if (id == p.set_in_force) {
-    return told(p.slots ? instrument_.coefficients().in_force() : instrument_.coefficients().stored());
-  }
-  if (id == p.set_inactive) {
-    return told_if_there(instrument_.coefficients().inactive());
-  }
-  if (id == p.set_factory) {
-    return told_if_there(instrument_.coefficients().factory());
-  }
-  return id == p.directory.did ? told(instrument_.raw().directory()) : told(instrument_.sample_format());
-}
-
-Diagnostics::Reply Diagnostics::read_data(View request) {
-  if (request.size() != 3) {  // one identifier in a request
-    return no(Nrc::incorrect_message_length);
-  }
-  const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  if (!knows(id)) {
-    return no(Nrc::request_out_of_range);
-  }
-  const auto content = record(id);
-  return content ? Reply(uds::read_response(id, *content)) : Reply(no(Nrc::conditions_not_correct));
-}
-
-// ISO 14229-1, WriteDataByIdentifier: identifier, its security, total length, record, conditions.
-Diagnostics::Reply Diagnostics::write_data(View request) {
-  const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  const profile::Profile& p = *profile_;
-  const bool of_set = p.slots ? id == p.set_inactive : id == p.set_in_force || profile::field_of(p, id) != nullptr;
-  const bool of_move = p.move && id == p.move->did;
-  if (id != p.schedule.did && id != p.site.did && !of_move && !of_set) {
-    return no(Nrc::request_out_of_range);
-  }
-  if (!unlocked()) {
-    return no(Nrc::security_access_denied);
-  }
-  const View record = request.subspan(3);
-  const Reply written = of_move                ? move(record)
-                        : id == p.schedule.did ? write_schedule(record)
-                        : id == p.site.did     ? write_site(record)
-                        : p.slots              ? write_coefficients(record)
-                                               : write_over_set(id, record);
-  return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
-}
-
-Diagnostics::Reply Diagnostics::write_schedule(View record) {
-  if (!profile::length_fits(profile_->schedule.layout, record)) {
-    return no(Nrc::incorrect_message_length);
-  }
-  const auto schedule = profile::decode_schedule(*profile_, record);
-  if (!schedule || !instrument_.check_schedule(*schedule)) {
-    return no(Nrc::request_out_of_range);
-  }
-  if (instrument_.busy()) {
-    return no(Nrc::conditions_not_correct);
-  }
-  instrument_.set_schedule(*schedule);
-  return uds::Bytes{};
-}
-
-// By a write or by a routine: length, position, conditions.
-Diagnostics::Reply Diagnostics::move(View record) {
-  if (!profile::length_fits(profile_->move->layout, record)) {
-    return no(Nrc::incorrect_message_length);
-  }
-  const auto position = profile::decode_move(*profile_, record);
-  if (!position) {
-    return no(Nrc::request_out_of_range);
-  }
-  return instrument_.move_to(*position, now_s_) ? Reply(uds::Bytes{}) : Reply(no(Nrc::conditions_not_correct));
-}
-
-Diagnostics::Reply Diagnostics::write_site(View record) {
-  if (!profile::length_fits(profile_->site.layout, record)) {
-    return no(Nrc::incorrect_message_length);
-  }
-  const auto site = profile::decode_site(*profile_, record);
-  if (!site) {
-    return no(Nrc::request_out_of_range);
-  }
-  if (instrument_.busy()) {
-    return no(Nrc::conditions_not_correct);
-  }
-  instrument_.set_site(*site);
-  return uds::Bytes{};
-}
-
-Diagnostics::Reply Diagnostics::write_coefficients(View record) {
-  if (!profile::length_fits(profile_->set, record)) {
-    return no(Nrc::incorrect_message_length);
-  }
-  const auto set = profile::decode_coefficients(*profile_, record);
-  if (!set) {
-    return no(Nrc::request_out_of_range);
-  }
-  if (instrument_.busy()) {
-    return no(Nrc::conditions_not_correct);
-  }
-  if (!instrument_.coefficients().write_inactive(*set)) {
-    return no(Nrc::general_programming_failure);  // not erased
-  }
-  return uds::Bytes{};
-}
-
-// Without slots: the whole set, or the field that has this identifier.
-Diagnostics::Reply Diagnostics::write_over_set(std::uint16_t id, View record) {
-  const profile::Field* field = profile::field_of(*profile_, id);
-  const std::size_t bytes = field != nullptr ? field->end() - field->at : profile_->set.bytes;
-  if (record.size() != bytes) {
-    return no(Nrc::incorrect_message_length);
-  }
-  auto whole = profile::encode(*profile_, instrument_.coefficients().stored());
-  if (!whole) {
-    return no(Nrc::conditions_not_correct);
-  }
-  std::ranges::copy(record, whole->begin() + static_cast<std::ptrdiff_t>(field != nullptr ? field->at : 0));
-  const auto set = profile::decode_coefficients(*profile_, *whole);
-  if (!set) {
-    return no(Nrc::request_out_of_range);
-  }
-  if (instrument_.busy()) {
-    return no(Nrc::conditions_not_correct);
-  }
-  instrument_.coefficients().write_over(*set);
   return uds::Bytes{};
 }
 
