@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 import numpy
 
-from server import START_UP_S, Refused, serve
+from server import START_UP_S, Refused, crc32c, serve
 
 REQUEST, RESPONSE, FUNCTIONAL = 0x1C0A0301, 0x1C0A0302, 0x1C0AFF01
 SESSION, ROTATE, MOVE = 0x41, 0x0A20, 0x0A21
@@ -27,23 +27,6 @@ SET, SET_BYTES = 0x0A10, 100
 NAMES = ([f"accel_bias_{a}" for a in "xyz"] + [f"gyro_drift_{a}" for a in "xyz"]
          + [f"accel_scale_{s}_{a}" for s in ("pos", "neg") for a in "xyz"] + [f"accel_misalignment_{p}" for p in ("yx", "zx", "zy")]
          + [f"gyro_scale_{a}" for a in "xyz"] + [f"gyro_misalignment_{p}" for p in ("xy", "xz", "yx", "yz", "zx", "zy")])
-
-
-def crc32c_table():
-    for byte in range(256):
-        for _ in range(8):
-            byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
-        yield byte
-
-
-CRC = list(crc32c_table())
-
-
-def crc32c(data):
-    crc = 0xFFFFFFFF
-    for byte in data:
-        crc = crc >> 8 ^ CRC[(crc ^ byte) & 0xFF]
-    return crc ^ 0xFFFFFFFF
 
 
 def in_counts(increments, worth):

@@ -1,4 +1,4 @@
-"""What the servers of this folder share, whatever they speak: refusals, a checksum, a gimbal that turns by the clock, the dialogue."""
+"""What the servers of this folder share, whatever they speak: refusals, checksums, a gimbal that turns by the clock, the dialogue."""
 import signal
 import sys
 import time
@@ -21,6 +21,24 @@ def crc16(data):
         for _ in range(8):
             crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
     return crc
+
+
+def _crc32c_table():
+    for byte in range(256):
+        for _ in range(8):
+            byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
+        yield byte
+
+
+_CRC32C = list(_crc32c_table())
+
+
+def crc32c(data):
+    """Castagnoli, reflected, initial value and final XOR 0xFFFFFFFF."""
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc = crc >> 8 ^ _CRC32C[(crc ^ byte) & 0xFF]
+    return crc ^ 0xFFFFFFFF
 
 
 class Turning:
@@ -77,10 +95,10 @@ class Turning:
         return len(self.dwells_s)
 
 
-def serve(ins, interface, request_id, response_id, functional_id):
-    """Until the process is ended. `ins.answer(request)`: the response, empty for none, None where the power goes; raises Refused."""
+def serve(ins, interface, request_id, response_id, functional_id, wide=True):
+    """Until the process is ended; `wide`: identifiers of 29 bits. `ins.answer(request)`: the response, empty for none, None where the power goes; raises Refused."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    bus = isotp.Transport(interface, request_id, response_id, functional_id)
+    bus = isotp.Transport(interface, request_id, response_id, functional_id, isotp.EXTENDED if wide else 0)
     print("ready", flush=True)
     heard = time.monotonic()
     while True:

@@ -1,4 +1,6 @@
 """What the tests of profiles share: benches under a profile, with the virtual INS or with a server of somebody else's."""
+import json
+import re
 import subprocess
 import sys
 import time
@@ -30,6 +32,44 @@ ins_address = 0x2A
 tester_address = 0xF1
 address_extension = 0x5C
 """
+
+
+STREAM = """[stream.sample.one]
+id = 0x18FF1001
+bytes = 8
+signals.counter = { start = 0, length = 8 }
+signals.delta_theta_x = { start = 8, length = 24, type = "signed" }
+signals.delta_theta_y = { start = 32, length = 24, type = "signed" }
+signals.temperature = { start = 56, length = 8, scale = 0.5, offset = -40.0, unit = "degC" }
+
+[stream.sample.two]
+id = 0x18FF1002
+bytes = 7
+signals.counter = { start = 7, length = 8, byte_order = "big" }
+signals.delta_theta_z = { start = 15, length = 24, byte_order = "big", type = "signed" }
+signals.delta_v_x = { start = 39, length = 24, byte_order = "big", type = "signed" }
+
+[stream.sample.three]
+id = 0x18FF1003
+bytes = 7
+signals.counter = { start = 0, length = 8 }
+signals.delta_v_y = { start = 8, length = 24, type = "signed" }
+signals.delta_v_z = { start = 32, length = 24, type = "signed" }
+
+[stream.sample.gimbal]
+id = 0x18FF1004
+bytes = 7
+signals.counter = { start = 0, length = 8 }
+signals.outer = { start = 8, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
+signals.inner = { start = 32, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
+
+"""
+
+
+def streaming(text):
+    """A profile with its samples in frames while it turns: no pages, and no directory of them."""
+    kept = (t for t in re.split(r"(?m)^(?=\[)", text) if not re.match(r"\[(upload|memory|page|directory)\]", t))
+    return "\n".join(kept) + STREAM
 
 
 def addressed(bus):
@@ -85,3 +125,18 @@ class UnderProfile(case.OnBench):
         except BaseException:
             print((unit.folder / "foreign.log").read_text(encoding="utf-8"), flush=True)
             raise
+
+    def loses_power(self, unit, memory, cuts_left, while_away=lambda: None):
+        """A run in which the INS's power goes when part of the set is written: the old one is put back."""
+        run = unit.start_run("--schedule", "horizontal", "--force", "short dwell")
+        end = time.monotonic() + 200
+        while json.loads(memory.read_text(encoding="ascii"))["cuts_left"] != cuts_left:
+            self.assertLess(time.monotonic(), end, "its power did not go")
+            time.sleep(0.02)
+        while_away()
+        failed = unit.wait_for_end(run)
+        self.assertEqual((failed["state"], failed["exit_status"]), ("failed", case.DEVICE_TROUBLE), failed["reason"])
+        told = [event["text"] for event in failed["events"] if "were put back" in event["text"]]
+        self.assertTrue(told, failed["events"])
+        print("then:", told[-1], flush=True)
+        return failed

@@ -3,44 +3,12 @@ from the description of that profile alone. On the same sensor data the 24 are t
 import concurrent.futures
 import json
 import math
-import re
 import tempfile
 import unittest
 from pathlib import Path
 
 import case
 import profile_case
-
-STREAM = """[stream.sample.one]
-id = 0x18FF1001
-bytes = 8
-signals.counter = { start = 0, length = 8 }
-signals.delta_theta_x = { start = 8, length = 24, type = "signed" }
-signals.delta_theta_y = { start = 32, length = 24, type = "signed" }
-signals.temperature = { start = 56, length = 8, scale = 0.5, offset = -40.0, unit = "degC" }
-
-[stream.sample.two]
-id = 0x18FF1002
-bytes = 7
-signals.counter = { start = 7, length = 8, byte_order = "big" }
-signals.delta_theta_z = { start = 15, length = 24, byte_order = "big", type = "signed" }
-signals.delta_v_x = { start = 39, length = 24, byte_order = "big", type = "signed" }
-
-[stream.sample.three]
-id = 0x18FF1003
-bytes = 7
-signals.counter = { start = 0, length = 8 }
-signals.delta_v_y = { start = 8, length = 24, type = "signed" }
-signals.delta_v_z = { start = 32, length = 24, type = "signed" }
-
-[stream.sample.gimbal]
-id = 0x18FF1004
-bytes = 7
-signals.counter = { start = 0, length = 8 }
-signals.outer = { start = 8, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
-signals.inner = { start = 32, length = 24, type = "signed", scale = 1e-4, unit = "deg" }
-
-"""
 
 
 class Profiles(profile_case.UnderProfile):
@@ -76,12 +44,11 @@ class Profiles(profile_case.UnderProfile):
 
     def streaming(self):
         """example.toml, its samples in frames while it turns: no pages, and no directory of them."""
-        text = (profile_case.PROFILES / "example.toml").read_text(encoding="utf-8")
-        kept = "\n".join(t for t in re.split(r"(?m)^(?=\[)", text) if not re.match(r"\[(upload|page|directory)\]", t))
+        text = profile_case.streaming((profile_case.PROFILES / "example.toml").read_text(encoding="utf-8"))
         folder = tempfile.TemporaryDirectory(prefix="selfcal_profile.")
         self.addCleanup(folder.cleanup)
         path = Path(folder.name) / "streaming.toml"
-        path.write_text(kept + STREAM, encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         return path
 
     def test_what_ends_a_stream(self):

@@ -2,10 +2,8 @@
 in the middle of a set, once while the service is there and once while that is killed too: the old set is put back."""
 import json
 import math
-import time
 import unittest
 
-import case
 import profile_case
 
 
@@ -35,28 +33,13 @@ class WithoutSlots(profile_case.UnderProfile):
             self.assertTrue(math.isclose(held[name], value, rel_tol=1e-6, abs_tol=6e-4), (parameter, held[name]))
         print("the INS without slots holds what the run says, version", held["version"], flush=True)
 
-        failed = self.fails(unit, memory, cuts_left=1)
+        failed = self.loses_power(unit, memory, cuts_left=1)
         self.assertEqual(json.loads(memory.read_text(encoding="ascii"))["held"], held)
         print("its power went in the middle of the second set:", failed["reason"], flush=True)
 
-        failed = self.fails(unit, memory, cuts_left=0, while_away=lambda: (unit.kill_daemon(), unit.start_daemon()))
+        failed = self.loses_power(unit, memory, cuts_left=0, while_away=lambda: (unit.kill_daemon(), unit.start_daemon()))
         self.assertEqual(json.loads(memory.read_text(encoding="ascii"))["held"], held)
         print("its power went in the middle of the third set, and the service was killed:", failed["reason"], flush=True)
-
-    def fails(self, unit, memory, cuts_left, while_away=lambda: None):
-        """A run in which the INS's power goes when part of the set is written: the old one is put back."""
-        run = unit.start_run("--schedule", "horizontal", "--force", "short dwell")
-        end = time.monotonic() + 200
-        while json.loads(memory.read_text(encoding="ascii"))["cuts_left"] != cuts_left:
-            self.assertLess(time.monotonic(), end, "its power did not go")
-            time.sleep(0.02)
-        while_away()
-        failed = unit.wait_for_end(run)
-        self.assertEqual((failed["state"], failed["exit_status"]), ("failed", case.DEVICE_TROUBLE), failed["reason"])
-        told = [event["text"] for event in failed["events"] if "were put back" in event["text"]]
-        self.assertTrue(told, failed["events"])
-        print("then:", told[-1], flush=True)
-        return failed
 
 
 if __name__ == "__main__":
