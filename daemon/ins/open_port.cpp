@@ -11,12 +11,12 @@ std::unique_ptr<InsPort> open_port(EventLoop& loop, const InsConfig& config) {
   if (config.profile->frames) {
     return std::make_unique<FramePort>(loop, config);
   }
-  if (config.profile->move) {
-    return std::make_unique<MovePort>(loop, std::make_shared<CanPort>(loop, config), config);
-  }
-  auto port = std::make_unique<CanPort>(loop, config);
+  std::unique_ptr<InsPort> port = std::make_unique<CanPort>(loop, config);
   if (!config.profile->stream.empty()) {
-    return std::make_unique<StreamPort>(loop, std::move(port), config);
+    port = std::make_unique<StreamPort>(loop, std::move(port), config);
+  }
+  if (config.profile->move) {
+    port = std::make_unique<MovePort>(loop, std::move(port), config);
   }
   return port;
 }

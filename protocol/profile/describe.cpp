@@ -292,25 +292,28 @@ class Document {
       return;
     }
     const Move& move = *p_.move;
+    const bool streams = !p_.stream.empty();
     constexpr double degrees_per_radian = 180.0 / 3.14159265358979323846;
     out_.heading("Moves: the gimbal is told each position by itself");
     out_.say(fmt::format(
         "The INS takes no schedule. A position is commanded by {}; the response comes at once, and the gimbal turns to "
         "it "
         "whether routine 0x{:04X} (rotate) was started or not. The tester commands the first position, waits until the "
-        "gimbal is there, and starts rotate. From then on the INS records raw data, at rest and while it turns, and "
-        "its "
-        "state is rotating, until rotate is stopped. After each dwell the tester commands the next position, and after "
-        "the last one it stops rotate: the directory is then complete with the last page, which need not be full, and "
+        "gimbal is there, and starts rotate. From then on the INS {}, at rest and while it turns, and its state is "
+        "rotating, until rotate is stopped. After each dwell the tester commands the next position, and after the last "
+        "one it stops rotate: {}, and the state is another one, complete for example. A stop before that ends {} in "
         "the "
-        "state is another one, complete for example. A stop before that ends the recording in the same way, and the "
-        "gimbal stands. A move is not commanded while another one is under way; such a one may be refused (0x22), and "
+        "same way, and the gimbal stands. A move is not commanded while another one is under way; such a one may be "
+        "refused (0x22), and "
         "a "
         "position that the gimbal cannot have is refused (0x31).",
         move.did ? fmt::format("writing identifier 0x{:04X}", *move.did)
                  : fmt::format("the start of routine 0x{:04X}, which is not stopped and has no result",
                                move.routine.value_or(0)),
-        p_.rotate.id.value_or(0)));
+        p_.rotate.id.value_or(0), streams ? "streams its samples" : "records raw data",
+        streams ? "its last sample has then been sent"
+                : "the directory is then complete with the last page, which need not be full",
+        streams ? "the stream" : "the recording"));
     out_.say(fmt::format(
         "The tester reads the state up to ten times a second while it waits. The gimbal is there when {}. It may take "
         "{:g} s. How many pages there will be the INS does not know; in the result of rotate, position is 0.",
@@ -377,7 +380,8 @@ class Document {
 
   void write_routines() {
     write_routine(p_.rotate, "rotate",
-                  p_.move ? "store raw data until it is stopped"
+                  p_.move && p_.stream.empty() ? "store raw data until it is stopped"
+                  : p_.move                    ? "stream the samples until it is stopped"
                   : p_.stream.empty()
                       ? "rotate by the schedule and store raw data; it can be stopped, the state is then aborted"
                       : "rotate by the schedule and stream the samples; it can be stopped, the state is then aborted",

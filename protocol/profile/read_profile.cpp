@@ -180,10 +180,6 @@ class ProfileReader {
     if (both) {
       move.fault("", fmt::format("and a schedule (line {}): positions are told in one way", root_.line_of("schedule")));
     }
-    if (root_.has("stream")) {
-      move.fault("", fmt::format("and a stream (line {}): who is told each position by itself keeps its samples",
-                                 root_.line_of("stream")));
-    }
     profile_.move = read_move(move, root_, profile_, order_);
     if (profile_.move->did) {
       dids_.take(move, "did", *profile_.move->did);

@@ -48,11 +48,11 @@ class Moves(profile_case.UnderProfile):
         self.assert_true(unit, self.calibrate(unit), "the virtual INS under moves.toml")
         self.interrupted(unit)
 
-    def test_by_a_write_and_by_state(self):
+    def test_by_a_write_by_state_and_streamed(self):
         text = (profile_case.PROFILES / "moves.toml").read_text(encoding="utf-8")
         self.assertEqual(text.count(BY_ANGLE), 1)
-        unit = self.virtual(profile=text.replace(BY_ANGLE, BY_STATE))
-        self.assert_true(unit, self.calibrate(unit), "moves by a write, over by state,")
+        unit = self.virtual(profile=profile_case.streaming(text.replace(BY_ANGLE, BY_STATE)))
+        self.assert_true(unit, self.calibrate(unit), "moves by a write, over by state, and samples streamed")
         unit.end_daemon()
         done = unit.selfcal("device", "check", unit.interface, "--profile", unit.folder / "other.toml", "--write", check=False, timeout=120)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
@@ -76,6 +76,15 @@ class Moves(profile_case.UnderProfile):
                                 "--first-did", "0A01", "--last-did", "0A01")
             self.assertRegex(told.stdout, r"0A01 +16 bytes: [0-7]6 ")  # complete, and the gimbal at rest
             unit.start_daemon()
+
+    def test_a_lost_frame_ends_a_stream(self):
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory(prefix="selfcal_faults.")))
+        scenario = folder / "drop.toml"
+        scenario.write_text("seed = 1\n[[fault]]\nkind = 'drop'\nprobability = 0.001\nat_s = 10\nstate = 'rotating'\n", encoding="ascii")
+        text = (profile_case.PROFILES / "moves.toml").read_text(encoding="utf-8")
+        unit = self.virtual("--scenario", scenario, profile=profile_case.streaming(text))
+        self.fails(unit, "the samples are of no use: .*(did not come|are missing)")
+        unit.wait_until(lambda _: "gimbal stopped at" in unit.log("sim_ins"), "the gimbal rests")
 
     def test_faults(self):
         folder = Path(self.enterContext(tempfile.TemporaryDirectory(prefix="selfcal_faults.")))

@@ -43,6 +43,22 @@ TEST(MovesProfile, HasARecordOfAPosition) {
   EXPECT_THAT(words, testing::HasSubstr("within 1.5 deg of the position and stay within 0.05 deg"));
 }
 
+// Its samples streamed in the place of pages.
+TEST(MovesProfile, MayStreamItsSamples) {
+  const auto profile = load_profile(SELFCAL_SOURCE_DIR "/tests/fuzz/protocol/corpus/profile/moves_streamed.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  const Profile& p = **profile;
+  ASSERT_TRUE(p.move);
+  EXPECT_EQ(p.stream.size(), 4U);
+  EXPECT_EQ(p.raw.way, Raw::Way::stream);
+  EXPECT_FALSE(told_directory(p));
+  EXPECT_EQ(told_as(*profile)->directory.did, kept_directory);
+  const std::string words = describe(p, Markup::markdown);
+  EXPECT_THAT(words, testing::HasSubstr("From then on the INS streams its samples, at rest and while it turns"));
+  EXPECT_THAT(words, testing::HasSubstr("it stops rotate: its last sample has then been sent"));
+  EXPECT_THAT(words, testing::HasSubstr("Routine 0x0A20: stream the samples until it is stopped"));
+}
+
 // What the service is told: our own INS's records, under the INS's identifiers.
 TEST(MovesProfile, IsToldAsOneWithASchedule) {
   EXPECT_EQ(told_as(built_in()), built_in());
@@ -72,7 +88,8 @@ TEST(MovesProfile, WhatDoesNotFitTogetherIsRefused) {
   const auto begin = whole.find("[move]"), end = whole.find("[directory]");
   EXPECT_THAT(complaint(whole.substr(0, begin) + whole.substr(end)),
               testing::HasSubstr("schedule: missing, and there is no move in its place"));
-  EXPECT_THAT(fault("[memory]", "[stream]\n\n[memory]"), testing::HasSubstr("move: and a stream (line 87): "));
+  EXPECT_THAT(fault("[memory]", "[stream]\n\n[memory]"),
+              testing::HasSubstr("p.toml:87: stream: and another: the raw data come in one way"));
   EXPECT_THAT(fault("routine = 0x0A21", "routine = 0x0A21\ndid = 0x0A05"),
               testing::HasSubstr("p.toml:40: move.routine: and did (line 41): a move is commanded in one way"));
   EXPECT_THAT(fault("routine = 0x0A21\n", ""), testing::HasSubstr("move.did: missing, and there is no routine"));
