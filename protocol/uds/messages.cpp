@@ -110,6 +110,11 @@ Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat fo
 Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format) {
   return with_range(message(service::read_memory, format_code(format)), address, bytes, format);
 }
+Bytes write_memory_request(std::uint32_t address, ByteView data, UploadFormat format) {
+  return with_tail(with_range(message(service::write_memory, format_code(format)), address,
+                              static_cast<std::uint32_t>(data.size()), format),
+                   data);
+}
 Bytes file_request(std::string_view name) {
   Bytes tail(name.begin(), name.end());
   tail.push_back(no_compression);
@@ -181,12 +186,45 @@ Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes) 
   return response.subspan(1);
 }
 
+Expected<void> read_write_memory_response(ByteView response, std::uint32_t address, std::uint32_t bytes,
+                                          UploadFormat format) {
+  const Bytes echo = with_range(message(format_code(format)), address, bytes, format);
+  if (const auto checked = check(response, service::write_memory, echo, 1 + echo.size()); !checked) {
+    return checked;
+  }
+  if (response.size() != 1 + echo.size()) {
+    return fail(ErrorKind::device, fmt::format("WriteMemoryByAddress: a response of {} bytes, {} expected",
+                                               response.size(), 1 + echo.size()));
+  }
+  return {};
+}
+
 Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block) {
   return check_code(response, service::transfer_data, block, 2).map([&] { return response.subspan(2); });
 }
 
 Expected<ByteView> read_transfer_exit_response(ByteView response) {
   return check(response, service::transfer_exit, {}, 1).map([&] { return response.subspan(1); });
+}
+
+// ISO 14229-1, 10.8: length, format, total length.
+tl::expected<MemoryWrite, Nrc> parse_write_memory_request(ByteView request, UploadFormat format) {
+  constexpr std::size_t shortest = 5;  // service, format, one byte each of address, length and data
+  if (request.size() < shortest) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  if (request[1] != format_code(format)) {
+    return tl::unexpected(Nrc::request_out_of_range);
+  }
+  const std::size_t head = 2 + format.address_bytes + format.size_bytes;
+  if (request.size() < head) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  const auto range = parse_range(request.first(head), 2, format);
+  if (request.size() != head + std::size_t{range->bytes}) {
+    return tl::unexpected(Nrc::incorrect_message_length);
+  }
+  return MemoryWrite{*range, request.subspan(head)};
 }
 
 tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadFormat format) {
@@ -303,6 +341,9 @@ void transfer_response(std::uint8_t block, ByteView data, Bytes& out) {
   out.insert(out.end(), data.begin(), data.end());
 }
 Bytes memory_response(ByteView data) { return with_tail(message(positive(service::read_memory)), data); }
+Bytes write_memory_response(const UploadRange& range, UploadFormat format) {
+  return with_range(message(positive(service::write_memory), format_code(format)), range.address, range.bytes, format);
+}
 Bytes transfer_exit_response(ByteView parameters) {
   return with_tail(message(positive(service::transfer_exit)), parameters);
 }

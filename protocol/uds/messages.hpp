@@ -37,6 +37,7 @@ struct UploadFormat {
 };
 Bytes upload_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
 Bytes memory_request(std::uint32_t address, std::uint32_t bytes, UploadFormat format = {});
+Bytes write_memory_request(std::uint32_t address, ByteView data, UploadFormat format = {});
 // ReadFile, uncompressed.
 Bytes file_request(std::string_view name);
 Bytes transfer_request(std::uint8_t block);  // 1 first; after 0xFF comes 0x00
@@ -63,7 +64,10 @@ struct FileAnswer {
   std::uint64_t bytes = 0;    // of the file
 };
 [[nodiscard]] Expected<FileAnswer> read_file_response(ByteView response);
-[[nodiscard]] Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes);   // the data, so many
+[[nodiscard]] Expected<ByteView> read_memory_response(ByteView response, std::uint32_t bytes);  // the data, so many
+// It repeats format, address and size of the request.
+[[nodiscard]] Expected<void> read_write_memory_response(ByteView response, std::uint32_t address, std::uint32_t bytes,
+                                                        UploadFormat format = {});
 [[nodiscard]] Expected<ByteView> read_transfer_response(ByteView response, std::uint8_t block);  // the data
 [[nodiscard]] Expected<ByteView> read_transfer_exit_response(ByteView response);                 // the parameter record
 
@@ -82,6 +86,11 @@ struct RoutineCall {
 };
 [[nodiscard]] tl::expected<UploadRange, Nrc> parse_upload_request(ByteView request, UploadFormat format = {});
 [[nodiscard]] tl::expected<UploadRange, Nrc> parse_memory_request(ByteView request, UploadFormat format = {});
+struct MemoryWrite {
+  UploadRange range;
+  ByteView data;  // as many bytes as the range has
+};
+[[nodiscard]] tl::expected<MemoryWrite, Nrc> parse_write_memory_request(ByteView request, UploadFormat format = {});
 [[nodiscard]] tl::expected<std::string, Nrc> parse_file_request(ByteView request);  // the file's name
 [[nodiscard]] tl::expected<RoutineCall, Nrc> parse_routine_request(ByteView request);
 
@@ -95,6 +104,7 @@ Bytes routine_response(const RoutineCall& call, ByteView status = {});
 Bytes upload_response(std::uint32_t max_block);
 Bytes file_response(std::uint32_t max_block, std::uint32_t file_bytes);
 Bytes memory_response(ByteView data);
+Bytes write_memory_response(const UploadRange& range, UploadFormat format = {});
 // Service, counter, data, into a buffer that is kept: 16 MB go this way.
 void transfer_response(std::uint8_t block, ByteView data, Bytes& out);
 Bytes transfer_exit_response(ByteView parameters = {});

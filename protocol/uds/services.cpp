@@ -17,6 +17,7 @@ std::string_view service_name(std::uint8_t service) {
     case service::file_transfer: return "RequestFileTransfer";
     case service::transfer_data: return "TransferData";
     case service::transfer_exit: return "RequestTransferExit";
+    case service::write_memory: return "WriteMemoryByAddress";
     case service::tester_present: return "TesterPresent";
     default: return "unknown service";
   }

@@ -19,6 +19,7 @@ inline constexpr std::uint8_t request_upload = 0x35;
 inline constexpr std::uint8_t transfer_data = 0x36;
 inline constexpr std::uint8_t transfer_exit = 0x37;
 inline constexpr std::uint8_t file_transfer = 0x38;
+inline constexpr std::uint8_t write_memory = 0x3D;
 inline constexpr std::uint8_t tester_present = 0x3E;
 inline constexpr std::uint8_t negative_response = 0x7F;
 }  // namespace service

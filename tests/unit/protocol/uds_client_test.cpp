@@ -273,6 +273,32 @@ TEST(UdsMessages, ReadMemoryByAddress) {
             "ReadMemoryByAddress: 2 bytes in answer to a request for 3");
 }
 
+// ISO 14229-1, 10.8: format, address and size, which the response repeats; then as many bytes.
+TEST(UdsMessages, WriteMemoryByAddress) {
+  const UploadFormat format{3, 1};
+  const Bytes request{0x3D, 0x13, 4, 0x80, 0, 2, 0xA, 0xB};
+  EXPECT_EQ(write_memory_request(0x048000, Bytes{0xA, 0xB}, format), request);
+  const auto write = parse_write_memory_request(request, format);
+  ASSERT_TRUE(write);
+  EXPECT_EQ(write->range.address, 0x048000U);
+  EXPECT_EQ(Bytes(write->data.begin(), write->data.end()), (Bytes{0xA, 0xB}));
+  const auto refused = [&](const Bytes& bytes) { return parse_write_memory_request(bytes, format).error(); };
+  EXPECT_EQ(refused({0x3D, 0x13, 4, 0x80}), Nrc::incorrect_message_length);
+  EXPECT_EQ(refused({0x3D, 0x23, 4, 0x80, 0, 2, 0xA, 0xB}), Nrc::request_out_of_range);
+  EXPECT_EQ(refused({0x3D, 0x13, 4, 0x80, 0}), Nrc::incorrect_message_length);
+  EXPECT_EQ(refused({0x3D, 0x13, 4, 0x80, 0, 3, 0xA, 0xB}), Nrc::incorrect_message_length);
+  EXPECT_EQ(refused({0x3D, 0x13, 4, 0x80, 0, 1, 0xA, 0xB}), Nrc::incorrect_message_length);
+  EXPECT_EQ(write_memory_response(write->range, format), (Bytes{0x7D, 0x13, 4, 0x80, 0, 2}));
+  EXPECT_TRUE(read_write_memory_response(Bytes{0x7D, 0x13, 4, 0x80, 0, 2}, 0x048000, 2, format));
+  const auto fault = [&](const Bytes& response) {
+    return read_write_memory_response(response, 0x048000, 2, format).error().message;
+  };
+  EXPECT_EQ(fault({0x7D, 0x13, 4, 0x80, 1, 2}),
+            "WriteMemoryByAddress: byte 4 of the response is 0x01, the request had 0x00");
+  EXPECT_EQ(fault({0x7D, 0x13, 4, 0x80, 0}), "WriteMemoryByAddress: the response has only 5 bytes");
+  EXPECT_EQ(fault({0x7D, 0x13, 4, 0x80, 0, 2, 0}), "WriteMemoryByAddress: a response of 7 bytes, 6 expected");
+}
+
 // ISO 14229-1, 14.6: mode 4 reads a file; its name's length in two bytes, the name, the format of the data.
 TEST(UdsMessages, RequestFileTransfer) {
   const Bytes request{0x38, 4, 0, 6, '/', 'r', '/', '7', '.', 'b', 0};
