@@ -8,6 +8,7 @@
 #include "protocol/profile/byte_picture.hpp"
 #include "protocol/profile/coefficient_fields.hpp"
 #include "protocol/profile/describe_frames.hpp"
+#include "protocol/profile/describe_identifiers.hpp"
 #include "protocol/profile/document_writer.hpp"
 #include "protocol/profile/raw_file.hpp"
 
@@ -158,7 +159,7 @@ class Document {
       write_bus();
       describe_status(out_, p_);
       write_services();
-      write_identifiers();
+      describe_identifiers(out_, p_);
       write_records();
       write_moves();
       write_set();
@@ -216,8 +217,7 @@ class Document {
       rows.push_back({fmt::format("27 {:02X} KEY", p_.security.level + 1),
                       fmt::format("67 {:02X}", p_.security.level + 1), key_words()});
     }
-    rows.push_back({"22 DID", "62 DID RECORD", "read, in any session; DID has two bytes, big-endian"});
-    rows.push_back({"2E DID RECORD", "6E DID", "write"});
+    std::ranges::move(rows_of_reading(p_), std::back_inserter(rows));
     rows.push_back({"31 01 ID OPTION", "71 01 ID", "start a routine; ID has two bytes, big-endian"});
     rows.push_back({"31 02 ID", "71 02 ID", "stop it"});
     rows.push_back({"31 03 ID", "71 03 ID RESULT", "its result"});
@@ -239,34 +239,6 @@ class Document {
         "{:g} s",
         p_.security.key_bytes, std::filesystem::path(program->file).filename().string(),
         program->seed_as_argument ? "as its argument" : "on standard input", program->limit_s);
-  }
-
-  void write_identifiers() {
-    out_.heading("Data identifiers");
-    std::vector<Row> rows;
-    const auto add = [&](std::optional<std::uint16_t> did, std::string_view name, std::string_view access) {
-      if (did) {
-        rows.push_back({fmt::format("0x{:04X}", *did), std::string(name), std::string(access)});
-      }
-    };
-    add(p_.serial, "serial number, ASCII", "read");
-    add(p_.software, "software version, ASCII", "read");
-    add(p_.state.did, "state", "read");
-    add(p_.schedule.did, "schedule", "read, write");
-    add(p_.move ? p_.move->did : std::nullopt, "move", "write");
-    add(p_.site.did, "site", "read");
-    add(told_directory(p_), "directory", "read");
-    add(p_.sample_format.did, "sample format", "read");
-    add(p_.set_in_force,
-        p_.slots ? "coefficients in force, as taken at power-on" : "coefficients, used from the next power-on on",
-        p_.slots ? "read" : "read, write");
-    for (const Field& field : p_.set.fields) {
-      add(field.did, fmt::format("coefficients: {}", field.name), "read, write");
-    }
-    add(p_.set_inactive, "coefficients in the slot not in force; erased: negative response 0x22, or all 0xFF",
-        "read, write");
-    add(p_.set_factory, "coefficients of the factory", "read");
-    out_.table({"DID", "content", "access"}, rows);
   }
 
   void write_records() {
@@ -307,7 +279,7 @@ class Document {
         "refused (0x22), and "
         "a "
         "position that the gimbal cannot have is refused (0x31).",
-        move.did ? fmt::format("writing identifier 0x{:04X}", *move.did)
+        move.did ? fmt::format("writing {}", place_text(p_, *move.did))
                  : fmt::format("the start of routine 0x{:04X}, which is not stopped and has no result",
                                move.routine.value_or(0)),
         p_.rotate.id.value_or(0), streams ? "streams its samples" : "records raw data",
@@ -353,13 +325,13 @@ class Document {
     const bool by_index = p_.frames.has_value();
     out_.say(fmt::format("Each field is {}; version is written last.",
                          by_index ? "told and written by its index, its bits being those of the signal value"
-                                  : "a record of its own, read and written by its identifier"));
+                                  : "a record of its own, read and written by its identifier or at its address"));
     std::vector<Row> rows = rows_of(p_.set.fields, set_role());
     for (Row& row : rows) {
       const auto field = std::ranges::find(p_.set.fields, row[0], &Field::name);
-      row[1] = by_index ? std::to_string(*field->did - first_index_did) : fmt::format("0x{:04X}", *field->did);
+      row[1] = by_index ? std::to_string(*field->did - first_index_did) : place_text(p_, *field->did);
     }
-    out_.table({"field", by_index ? "index" : "identifier", "type", "byte order", "one count is", "meaning"}, rows);
+    out_.table({"field", by_index ? "index" : "where", "type", "byte order", "one count is", "meaning"}, rows);
   }
 
   void write_routine(const Routine& routine, std::string_view table, std::string_view words, bool has_result) {

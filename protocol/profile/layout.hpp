@@ -46,6 +46,7 @@ struct Field {
   std::map<std::uint64_t, std::uint64_t> codes;  // the role's number to the INS's; empty: they are the same
   std::optional<long double> constant;           // always this
   std::optional<std::uint16_t> did;              // of a set that is told field by field: the field's own identifier
+  std::optional<std::uint32_t> memory;           // or its address
   std::size_t end() const { return at + type.bytes * count; }
 };
 

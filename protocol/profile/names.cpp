@@ -71,12 +71,23 @@ uds::DecoderOptions decoder_options(const ProfilePtr& profile) {
   options.response_byte = bus.response_byte;
   options.functional_byte = bus.functional_byte;
   for (auto& [did, name] : dids_of(*profile)) {
-    options.names.dids.emplace(did, std::move(name));
+    if (const Region* region = profile->memory.find(did)) {
+      options.names.memory.push_back({region->address, region->end(), std::move(name)});
+    } else {
+      options.names.dids.emplace(did, std::move(name));
+    }
   }
   for (auto& [routine, name] : routines_of(*profile)) {
     options.names.routines.emplace(routine, std::move(name));
   }
-  options.names.texts = {profile->serial, profile->software};
+  for (const std::uint16_t did : {profile->serial, profile->software}) {
+    if (profile->memory.find(did) == nullptr) {
+      options.names.texts.insert(did);
+    }
+  }
+  if (profile->raw.way == Raw::Way::memory) {
+    options.names.memory.push_back({profile->raw.first_address, profile->raw.end_address, "raw data"});
+  }
   options.names.upload_by_page = profile->raw.by_page;
   options.status = [profile](const can::CanFrame& frame) {
     std::vector<uds::LogEntry::Signal> signals;

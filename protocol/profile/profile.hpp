@@ -12,6 +12,7 @@
 #include "protocol/key_program/key_program.hpp"
 #include "protocol/profile/frames.hpp"
 #include "protocol/profile/layout.hpp"
+#include "protocol/profile/record_memory.hpp"
 #include "protocol/profile/set_form.hpp"
 #include "protocol/profile/turning.hpp"
 
@@ -45,8 +46,8 @@ struct Security {
   std::size_t seed_bytes = 16, key_bytes = 16;
 };
 
-// A record of a role: which identifier has it, where its fields stand, and which values the INS does not tell because they are
-// always the same.
+// A record of a role: which identifier has it, or by which number it stands in Profile::memory; where its fields stand; and which
+// values the INS does not tell because they are always the same.
 struct Record {
   std::optional<std::uint16_t> did;
   Layout layout;
@@ -78,7 +79,8 @@ struct Raw {
   Way way = Way::upload;            // RequestUpload, ReadMemoryByAddress, RequestFileTransfer, or frames while it turns
   bool by_page = true;              // RequestUpload's address counts pages; else bytes
   std::uint32_t first_address = 0;  // of ReadMemoryByAddress: where page 0 of the run begins
-  std::uint32_t longest_read = 0;   // bytes that it tells at once
+  std::uint64_t end_address = std::uint64_t{1} << 32U;  // the first one behind the raw data
+  std::uint32_t longest_read = 0;                       // bytes that it tells at once
   std::size_t address_bytes = 4, size_bytes = 4;
   std::string file;  // of RequestFileTransfer: the name of a page's file (raw_file.hpp)
   // Our axis k is the INS's axis index[k], times sign[k].
@@ -95,6 +97,7 @@ struct Profile {
   Timing timing;
   std::uint8_t session = 3;  // for everything but reading
   Security security;
+  RecordMemory memory;  // which of the identifiers here are none, but stand for a place in the INS's memory
   std::uint16_t serial = 0, software = 0;
   Record state, schedule, site, directory, sample_format;
   std::optional<Move> move;  // in place of `schedule`
@@ -122,6 +125,9 @@ inline const std::vector<Frame>& sample_frames(const Profile& profile) {
 inline std::optional<std::uint16_t> told_directory(const Profile& profile) {
   return profile.directory.did == kept_directory ? std::nullopt : profile.directory.did;
 }
+
+// What the service writes: the others are only read.
+bool is_written(const Profile& profile, std::uint16_t did);
 
 // Our own INS: config/profiles/selfcal.toml, as compiled in.
 const ProfilePtr& built_in();

@@ -34,6 +34,7 @@ class Section {
 
   bool there() const { return table_ != nullptr; }
   bool has(std::string_view key) const { return table_ != nullptr && table_->contains(key); }
+  bool has_table(std::string_view key) const { return has(key) && table_->get(key)->is_table(); }
   std::size_t line() const { return line_; }
   std::size_t line_of(std::string_view key) const;
   const std::string& path() const { return path_; }

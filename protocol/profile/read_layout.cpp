@@ -155,13 +155,26 @@ bool check_constant(Section& section, const Field& field, double value) {
   return fits;
 }
 
+// Of a field that is a record of its own: an identifier, or an address.
+void read_identifier_of(Section& section, Field& field) {
+  if (section.has("memory") && section.has(by_did)) {
+    section.fault("memory", fmt::format("and did (line {}): a field is told in one way", section.line_of(by_did)));
+  } else if (!section.has("memory") && !section.has(by_did)) {
+    section.fault(by_did, "missing, and there is no memory in its place");
+  }
+  if (const auto did = section.whole(by_did, 1, 0xFFFF)) {
+    field.did = static_cast<std::uint16_t>(*did);
+  }
+  if (const auto address = section.whole("memory", 0, 0xFFFFFFFF)) {
+    field.memory = static_cast<std::uint32_t>(*address);
+  }
+}
+
 void read_field(Section& section, const RoleField* role, ByteOrder order, std::string_view numbered_by, Field& field) {
   field.line = section.line();
   field.meaning = role == nullptr ? std::string_view() : role->meaning;
   if (numbered_by == by_did) {
-    if (const auto did = section.whole(by_did, 1, 0xFFFF, true)) {
-      field.did = static_cast<std::uint16_t>(*did);
-    }
+    read_identifier_of(section, field);
   } else if (numbered_by == by_index) {
     if (const auto index = section.whole(by_index, 0, 0xFF, true)) {
       field.did = static_cast<std::uint16_t>(first_index_did + *index);

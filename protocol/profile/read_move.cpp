@@ -30,19 +30,20 @@ void check_end_of_move(Section& section, Section& root, const Layout& state, boo
 
 }  // namespace
 
-Move read_move(Section& section, Section& root, const Profile& profile, ByteOrder order) {
+Move read_move(Section& section, Section& root, const Profile& profile, ByteOrder order,
+               std::optional<std::uint16_t> number) {
   Move move;
-  if (section.has("routine") && section.has("did")) {
-    section.fault("routine", fmt::format("and did (line {}): a move is commanded in one way", section.line_of("did")));
-  } else if (!section.has("routine") && !section.has("did")) {
-    section.fault("did", "missing, and there is no routine in its place");
+  const std::string_view other = section.has("did") ? "did" : "memory";
+  if (section.has("routine") && section.has(other)) {
+    section.fault("routine",
+                  fmt::format("and {} (line {}): a move is commanded in one way", other, section.line_of(other)));
+  } else if (!section.has("routine") && !section.has(other)) {
+    section.fault("did", "missing, and there is no routine and no memory in its place");
   }
   if (const auto routine = section.whole("routine", 1, most_number)) {
     move.routine = static_cast<std::uint16_t>(*routine);
   }
-  if (const auto did = section.whole("did", 1, most_number)) {
-    move.did = static_cast<std::uint16_t>(*did);
-  }
+  move.did = number;
   move.turning = read_turning(section);
   Record record;
   read_layout(section, record_role("move"), order, record);

@@ -12,12 +12,14 @@
 #include "protocol/profile/read_layout.hpp"
 #include "protocol/profile/read_move.hpp"
 #include "protocol/profile/read_raw.hpp"
+#include "protocol/profile/read_regions.hpp"
 #include "protocol/profile/read_security.hpp"
 
 namespace selfcal::profile {
 namespace {
 
 constexpr std::uint64_t most_did = 0xFFFF;
+constexpr std::uint64_t longest_text = 255;      // of the identity, where it stands in memory
 constexpr std::uint32_t longest_message = 4094;  // ISO-TP's 12 bits of length, less the service
 constexpr std::array<std::string_view, 2> orders{"big", "little"};
 
@@ -78,6 +80,7 @@ class ProfileReader {
     read_set();
     read_routines();
     read_raw(root_, profile_, order_);
+    regions_.check(root_, profile_.raw);
   }
 
   // What the service asks in the INS's place, it asks as our own INS would be asked.
@@ -120,6 +123,45 @@ class ProfileReader {
     return static_cast<std::uint16_t>(*number);
   }
 
+  // A record has an identifier, or stands in memory: the key `did` or `memory` of its table.
+  std::optional<std::uint16_t> did_or_memory(Section& section, bool needed) {
+    if (!section.has("memory")) {
+      if (needed && !section.has("did")) {
+        section.fault("did", "missing, and there is no memory in its place");
+      }
+      return did(section, "did", false);
+    }
+    if (section.has("did")) {
+      section.fault("memory", fmt::format("and did (line {}): a record is told in one way", section.line_of("did")));
+      did(section, "did", false);
+    }
+    return in_memory(section);
+  }
+
+  std::optional<std::uint16_t> in_memory(Section& section) {
+    const auto number = regions_.take(section);
+    if (number) {
+      dids_.take(section, "memory", *number);
+    }
+    return number;
+  }
+
+  // An identifier, or a table with the place in memory.
+  std::optional<std::uint16_t> did_or_place(Section& section, std::string_view key, bool needed,
+                                            std::optional<std::size_t> bytes = std::nullopt) {
+    if (!section.has_table(key)) {
+      return did(section, key, needed);
+    }
+    Section place = section.table(key);
+    if (!place.has("memory")) {
+      place.missing("memory");
+    }
+    const auto number = in_memory(place);
+    regions_.give_length(number, bytes ? *bytes : place.whole("bytes", 1, longest_text, true).value_or(1));
+    place.only_these();
+    return number;
+  }
+
   void read_durations(Section& timing) {
     constexpr double least_s = 0.1, most_s = 600.0;
     Timing& t = profile_.timing;
@@ -149,8 +191,8 @@ class ProfileReader {
   void read_identity() {
     Section identity = root_.table("identity", true);
     if (identity.there()) {
-      profile_.serial = did(identity, "serial", true).value_or(0);
-      profile_.software = did(identity, "software", true).value_or(0);
+      profile_.serial = did_or_place(identity, "serial", true).value_or(0);
+      profile_.software = did_or_place(identity, "software", true).value_or(0);
       identity.only_these();
     }
   }
@@ -161,9 +203,17 @@ class ProfileReader {
     if (!section.there()) {
       return;
     }
-    record.did = did(section, "did", did_needed || section.has("fields"));
+    record.did = did_or_memory(section, did_needed || section.has("fields"));
     read_layout(section, role, order_, record);
+    give_length(section, record.did, record.layout);
     section.only_these();
+  }
+
+  void give_length(Section& section, std::optional<std::uint16_t> number, const Layout& layout) {
+    if (section.has("memory") && layout.each && layout.bytes == 0) {
+      section.fault("bytes", "missing: a record in memory has the same length always");
+    }
+    regions_.give_length(number, layout.bytes);
   }
 
   // A schedule, or a move in its place.
@@ -180,10 +230,8 @@ class ProfileReader {
     if (both) {
       move.fault("", fmt::format("and a schedule (line {}): positions are told in one way", root_.line_of("schedule")));
     }
-    profile_.move = read_move(move, root_, profile_, order_);
-    if (profile_.move->did) {
-      dids_.take(move, "did", *profile_.move->did);
-    }
+    profile_.move = read_move(move, root_, profile_, order_, did_or_memory(move, false));
+    give_length(move, profile_.move->did, profile_.move->layout);
     if (profile_.move->routine) {
       routines_.take(move, "routine", *profile_.move->routine);
     }
@@ -224,13 +272,16 @@ class ProfileReader {
       section.fault("field_by_field", "each field has one identifier: an INS with slots needs two");
     }
     if (!profile_.field_by_field) {
-      profile_.set_in_force = did(section, "in_force", true);
+      profile_.set_in_force = did_or_place(section, "in_force", true, 0);
     }
     if (profile_.slots) {
-      profile_.set_inactive = did(section, "inactive", true);
-      profile_.set_factory = did(section, "factory", false);
+      profile_.set_inactive = did_or_place(section, "inactive", true, 0);
+      profile_.set_factory = did_or_place(section, "factory", false, 0);
     }
     read_set_layout(section, profile_.field_by_field ? by_did : std::string_view());
+    for (const auto& set : {profile_.set_in_force, profile_.set_inactive, profile_.set_factory}) {
+      regions_.give_length(set, profile_.set.bytes);
+    }
   }
 
   void read_set_layout(Section& section, std::string_view numbered_by) {
@@ -239,9 +290,15 @@ class ProfileReader {
     }
     Record record;
     read_layout(section, set_role(), order_, record, numbered_by);
-    for (const Field& field : record.layout.fields) {
+    for (Field& field : record.layout.fields) {
+      const std::string path =
+          fmt::format("coefficients.fields.{}.{}", field.name, field.memory ? "memory" : numbered_by);
+      if (field.memory) {
+        field.did = regions_.take(field.line, path, *field.memory);
+        regions_.give_length(field.did, field.end() - field.at);
+      }
       if (field.did) {
-        dids_.take(faults_, field.line, fmt::format("coefficients.fields.{}.{}", field.name, numbered_by), *field.did);
+        dids_.take(faults_, field.line, path, *field.did);
       }
     }
     section.only_these();
@@ -345,6 +402,7 @@ class ProfileReader {
   ByteOrder order_ = ByteOrder::big;
   Profile profile_;
   Numbers dids_{"data identifier"}, routines_{"routine"};
+  RegionReader regions_{faults_, profile_.memory};
 };
 
 }  // namespace

@@ -22,9 +22,19 @@ class RawReader {
       : root_(root), faults_(root.faults()), profile_(profile), raw_(profile.raw), order_(order) {}
 
   void read() {
+    if (read_way()) {
+      read_page();
+    }
+  }
+
+ private:
+  // False: there are no pages.
+  bool read_way() {
     Section memory = root_.table("memory");
+    // Without an address it says how records are asked for.
+    const bool of_raw = memory.there() && (memory.has("address") || profile_.memory.regions.empty());
     if (memory.there()) {
-      read_memory(memory);
+      read_memory(memory, of_raw);
     }
     Section file = root_.table("file");
     if (file.there()) {
@@ -32,18 +42,29 @@ class RawReader {
     }
     Section stream = root_.table("stream");
     Section upload = root_.table("upload", !memory.there() && !file.there() && !stream.there());
-    if (int{upload.there()} + int{memory.there()} + int{file.there()} + int{stream.there()} > 1) {
+    const int ways = int{upload.there()} + int{of_raw} + int{file.there()} + int{stream.there()};
+    if (ways == 0 && memory.there()) {
+      memory.fault("address", "missing, and there is no upload, file or stream in its place");
+    } else if (ways > 1) {
       (upload.there() ? upload : file.there() ? file : stream).fault("", "and another: the raw data come in one way");
     }
+    if (upload.there() && !stream.there()) {
+      read_upload(upload);
+    }
     if (stream.there()) {
-      return read_stream_of_samples(stream);
+      read_stream_of_samples(stream);
     }
-    if (upload.there()) {
-      raw_.by_page = upload.word("address", address_units, true).value_or("page") == "page";
-      raw_.address_bytes = upload.whole("address_bytes", 1, 4).value_or(4);
-      raw_.size_bytes = upload.whole("size_bytes", 1, 4).value_or(4);
-      upload.only_these();
-    }
+    return !stream.there();
+  }
+
+  void read_upload(Section& upload) {
+    raw_.by_page = upload.word("address", address_units, true).value_or("page") == "page";
+    raw_.address_bytes = upload.whole("address_bytes", 1, 4).value_or(4);
+    raw_.size_bytes = upload.whole("size_bytes", 1, 4).value_or(4);
+    upload.only_these();
+  }
+
+  void read_page() {
     Section page = root_.table("page", true);
     if (!page.there()) {
       return;
@@ -62,7 +83,8 @@ class RawReader {
     raw_.page = std::move(record.layout);
   }
 
- private:
+  static std::uint64_t largest(std::size_t bytes) { return (std::uint64_t{1} << (8 * bytes)) - 1; }
+
   void read_stream_of_samples(Section& stream) {
     profile_.stream = read_stream(stream, profile_, order_);
     raw_.way = Raw::Way::stream;
@@ -83,19 +105,37 @@ class RawReader {
     }
   }
 
+  // How the INS's memory is asked for, and what it tells and takes at once.
+  void read_memory(Section& memory, bool of_raw) {
+    RecordMemory& records = profile_.memory;
+    records.address_bytes = memory.whole("address_bytes", 1, 4).value_or(4);
+    records.size_bytes = memory.whole("size_bytes", 1, 4).value_or(2);
+    const std::uint64_t largest_size = largest(records.size_bytes);
+    constexpr std::uint64_t shortest = 32;
+    const auto longest =
+        memory.whole("longest", shortest, std::min<std::uint64_t>(longest_message, largest_size), true);
+    records.longest_read = static_cast<std::uint32_t>(longest.value_or(shortest));
+    const std::uint64_t most_written =
+        std::min(longest_message - 1 - records.address_bytes - records.size_bytes, largest_size);
+    records.longest_write =
+        static_cast<std::uint32_t>(memory.whole("longest_write", 1, most_written)
+                                       .value_or(std::min<std::uint64_t>(records.longest_read, most_written)));
+    if (of_raw) {
+      read_memory_of_raw(memory, records);
+    }
+    memory.only_these();
+  }
+
   // ReadMemoryByAddress: pages of the run one behind the other.
-  void read_memory(Section& memory) {
+  void read_memory_of_raw(Section& memory, const RecordMemory& asked) {
     raw_.way = Raw::Way::memory;
     raw_.by_page = false;
-    raw_.address_bytes = memory.whole("address_bytes", 1, 4).value_or(4);
-    raw_.size_bytes = memory.whole("size_bytes", 1, 4).value_or(2);
-    const auto largest = [](std::size_t bytes) { return (std::uint64_t{1} << (8 * bytes)) - 1; };
-    raw_.first_address =
-        static_cast<std::uint32_t>(memory.whole("address", 0, largest(raw_.address_bytes), true).value_or(0));
-    constexpr std::uint64_t shortest = 32, longest = longest_message;
-    raw_.longest_read = static_cast<std::uint32_t>(
-        memory.whole("longest", shortest, std::min(longest, largest(raw_.size_bytes)), true).value_or(shortest));
-    memory.only_these();
+    raw_.address_bytes = asked.address_bytes;
+    raw_.size_bytes = asked.size_bytes;
+    raw_.longest_read = asked.longest_read;
+    const std::uint64_t last = largest(asked.address_bytes);
+    raw_.first_address = static_cast<std::uint32_t>(memory.whole("address", 0, last, true).value_or(0));
+    raw_.end_address = memory.whole("end", std::uint64_t{raw_.first_address} + 1, last + 1).value_or(last + 1);
   }
 
   // RequestFileTransfer: each page is a file.

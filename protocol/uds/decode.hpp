@@ -22,6 +22,11 @@ struct Names {
   std::map<std::uint16_t, std::string> dids, routines;
   std::set<std::uint16_t> texts;  // data identifiers whose record is text
   bool upload_by_page = false;    // RequestUpload counts pages
+  struct Place {
+    std::uint64_t begin = 0, end = 0;  // addresses; end is the first one behind it
+    std::string name;
+  };
+  std::vector<Place> memory;  // what stands where
 };
 
 // One line: service, DID or routine, NRC by name, the first bytes of data; of seeds and keys only their length.

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "protocol/byte_order.hpp"
 #include "protocol/uds/decode.hpp"
@@ -42,15 +43,16 @@ std::string_view name_of(const std::map<std::uint16_t, std::string>& names, std:
   return found == names.end() ? std::string_view("unknown") : found->second;
 }
 
-// Its data format and the lengths of address and size, one hexadecimal digit each, stand before them.
-std::string upload_text(ByteView body, const Names& names) {
-  if (body.size() < 2) {
-    return data_text(body);
-  }
-  const std::size_t address_bytes = body[1] & 0x0FU, size_bytes = body[1] >> 4U;
+// Address and size, behind their lengths: one hexadecimal digit each. None where the bytes are not enough.
+struct Range {
+  std::uint64_t from = 0, bytes = 0;
+  std::size_t head = 0;  // bytes that say so
+};
+std::optional<Range> range_in(ByteView body) {
+  const std::size_t address_bytes = body.empty() ? 0 : body[0] & 0x0FU, size_bytes = body.empty() ? 0 : body[0] >> 4U;
   if (address_bytes == 0 || size_bytes == 0 || address_bytes > 8 || size_bytes > 8 ||
-      body.size() != 2 + address_bytes + size_bytes) {
-    return data_text(body);
+      body.size() < 1 + address_bytes + size_bytes) {
+    return std::nullopt;
   }
   const auto number = [](ByteView bytes) {
     std::uint64_t value = 0;
@@ -59,10 +61,32 @@ std::string upload_text(ByteView body, const Names& names) {
     }
     return value;
   };
-  const std::uint64_t from = number(body.subspan(2, address_bytes));
+  return Range{number(body.subspan(1, address_bytes)), number(body.subspan(1 + address_bytes, size_bytes)),
+               1 + address_bytes + size_bytes};
+}
+
+// Its data format stands before them.
+std::string upload_text(ByteView body, const Names& names) {
+  const auto range = body.empty() ? std::nullopt : range_in(body.subspan(1));
+  if (!range || body.size() != 1 + range->head) {
+    return data_text(body);
+  }
   return fmt::format(" from {}, {} bytes",
-                     names.upload_by_page ? fmt::format("page {}", from) : fmt::format("0x{:X}", from),
-                     number(body.subspan(2 + address_bytes)));
+                     names.upload_by_page ? fmt::format("page {}", range->from) : fmt::format("0x{:X}", range->from),
+                     range->bytes);
+}
+
+// What is read; what is written, and the bytes that are.
+std::string memory_text(ByteView body, const Names& names) {
+  const auto range = range_in(body);
+  if (!range) {
+    return data_text(body);
+  }
+  const auto place = std::ranges::find_if(
+      names.memory, [&](const Names::Place& p) { return range->from >= p.begin && range->from < p.end; });
+  return fmt::format("{} from 0x{:X}, {} bytes", place == names.memory.end() ? "" : fmt::format(" {}", place->name),
+                     range->from, range->bytes) +
+         data_text(body.subspan(range->head));
 }
 
 std::string_view action_name(std::uint8_t action) {
@@ -112,6 +136,8 @@ std::string body_text(std::uint8_t service, ByteView body, bool response, const 
       break;
     }
     case service::request_upload: return response ? data_text(body) : upload_text(body, names);
+    case service::read_memory: return response ? data_text(body) : memory_text(body, names);
+    case service::write_memory: return memory_text(body, names);
     case service::transfer_data:
       return body.empty() ? "" : fmt::format(" block {}, {} bytes", body[0], body.size() - 1);
     default: break;

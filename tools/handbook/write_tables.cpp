@@ -180,7 +180,7 @@ std::string profile_page() {
   std::string text = "# Profile\n\n" + made_from("protocol/profile/roles");
   text +=
       R"(What an INS speaks, in TOML. [Your INS in an hour](your-ins.md) shows how one is made, `selfcal device lint` tells what is wrong with
-it, and `config/profiles` holds five. Unknown keys are faults.
+it, and `config/profiles` holds six. Unknown keys are faults.
 
 | table | keys |
 |---|---|
@@ -189,13 +189,13 @@ it, and `config/profiles` holds five. Unknown keys are faults.
 | `timing` | `request_timeout_s`, `p2_star_s`, `tester_present_s`; what the INS states lengthens them. How long the INS may take: `erase_s` (8 s where it is left out), `write_s` a set (4), `commit_s` (4), and on its own clock `restart_s` (60), `stop_s` of the gimbal (30) |
 | `session` | `calibration`: the session in which it writes, 3 where it is left out |
 | `security` | `method` aes-cmac, program or none; `level` of requestSeed, odd. Of a program: `program`, from the folder of the profile on; `seed` stdin or argument, stdin where it is left out; `seed_bytes`, `key_bytes`; `limit_s`, 5 s where it is left out |
-| `identity` | `serial`, `software`: data identifiers of ASCII |
-| `state`, `schedule`, `site`, `directory`, `sample_format` | `did` and a record; `site` may be left out where the configuration gives it |
-| `move` | in place of `schedule`, where the INS is told each position by itself: `did` or `routine`, a record; `there` angle (with `tolerance_deg`, and `rest_deg`: it rests while `outer` and `inner` of the state stay so near, 0.05 where it is left out) or state (`gimbal_moving` of the state); `longest_s` of a move, 60 where it is left out. `rotate` then records from its start to its stop, and the directory need not tell `pages_expected` |
-| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` in place of `at`. `form`: what the 24 mean, errors where it is left out, correction or correction-first ([Your INS](your-ins.md)) |
+| `identity` | `serial`, `software`: data identifiers of ASCII, or places in memory: `{ memory = ADDRESS, bytes = LENGTH }` |
+| `state`, `schedule`, `site`, `directory`, `sample_format` | `did`, or `memory`: its address, and a record; `site` may be left out where the configuration gives it |
+| `move` | in place of `schedule`, where the INS is told each position by itself: `did`, `memory` or `routine`, a record; `there` angle (with `tolerance_deg`, and `rest_deg`: it rests while `outer` and `inner` of the state stay so near, 0.05 where it is left out) or state (`gimbal_moving` of the state); `longest_s` of a move, 60 where it is left out. `rotate` then records from its start to its stop, and the directory need not tell `pages_expected` |
+| `coefficients` | `in_force`, `inactive`, `factory`: data identifiers, or places in memory: `{ memory = ADDRESS }`; a record. `slots = false`: one set, `in_force`, is written over. `field_by_field = true`, without slots: each field has `did` or `memory` in place of `at`. `form`: what the 24 mean, errors where it is left out, correction or correction-first ([Your INS](your-ins.md)) |
 | `rotate`, `erase`, `commit`, `navigation_check` | `routine`: its identifier; `start`, `result`: records. All but `rotate` may be left out |
 | `upload` | RequestUpload: `address` page or byte; `address_bytes`, `size_bytes` |
-| `memory` | ReadMemoryByAddress in its place: `address` of the run's first page, `longest` that is told at once; `address_bytes`, `size_bytes` |
+| `memory` | how the INS's memory is asked for: `address_bytes` (4 where it is left out), `size_bytes` (2), bytes that it tells at once, `longest`, and takes, `longest_write` (as many where it is left out). With `address`, raw data by ReadMemoryByAddress in the place of RequestUpload: where the run's first page begins; `end` is the first address behind them, that behind all addresses where it is left out |
 | `file` | RequestFileTransfer in its place, each page a file: `name`, with `{page}` and perhaps `{run}`; `{page:6}` has six digits at least |
 | `stream` | the samples in CAN frames while it rotates, in its place: `dbc` and `sample.NAME` as of [plain frames](#plain-frames); then there are no `directory` and no `page` |
 | `frames` | of an INS without UDS, [below](#plain-frames) |
