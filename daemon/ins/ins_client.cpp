@@ -79,6 +79,15 @@ std::string text(const Bytes& bytes) {
   return result;
 }
 
+// In memory a text has a fixed length: blanks behind it may be padding too.
+std::string text_of(const profile::Profile& profile, std::uint16_t did, const Bytes& bytes) {
+  std::string result = text(bytes);
+  if (profile.memory.find(did) != nullptr) {
+    result.erase(result.find_last_not_of(' ') + 1);
+  }
+  return result;
+}
+
 }  // namespace
 
 tl::unexpected<PortError> protocol_error(const InsPort& port, const Error& error) {
@@ -153,7 +162,7 @@ Task<Answer<InsClient::Identity>> InsClient::identify() {
   if (!software) {
     co_return tl::unexpected(software.error());
   }
-  Identity identity{text(*serial), text(*software)};
+  Identity identity{text_of(*profile_, profile_->serial, *serial), text_of(*profile_, profile_->software, *software)};
   if (identity.serial.empty()) {
     co_return protocol_error(port_, {ErrorKind::device, "the INS tells an empty serial number"});
   }

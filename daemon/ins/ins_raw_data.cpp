@@ -56,6 +56,11 @@ Task<Answer<Done>> InsClient::read_memory(std::uint32_t first, std::uint32_t cou
         port_, {ErrorKind::device,
                 fmt::format("ReadMemoryByAddress: address {:X} does not fit {} bytes", end - 1, raw.address_bytes)});
   }
+  if (end > raw.end_address) {
+    co_return protocol_error(
+        port_, {ErrorKind::device, fmt::format("ReadMemoryByAddress: page {} ends at {:X}, the raw data end at {:X}",
+                                               first + count - 1, end - 1, raw.end_address - 1)});
+  }
   for (std::uint32_t page = first; page < first + count; ++page) {
     Bytes data;
     while (data.size() < page_bytes) {

@@ -2,6 +2,7 @@
 
 #include "daemon/ins/can_port.hpp"
 #include "daemon/ins/frame_port.hpp"
+#include "daemon/ins/memory_port.hpp"
 #include "daemon/ins/move_port.hpp"
 #include "daemon/ins/stream_port.hpp"
 
@@ -12,6 +13,9 @@ std::unique_ptr<InsPort> open_port(EventLoop& loop, const InsConfig& config) {
     return std::make_unique<FramePort>(loop, config);
   }
   std::unique_ptr<InsPort> port = std::make_unique<CanPort>(loop, config);
+  if (!config.profile->memory.regions.empty()) {
+    port = std::make_unique<MemoryPort>(std::move(port), config.profile);
+  }
   if (!config.profile->stream.empty()) {
     port = std::make_unique<StreamPort>(loop, std::move(port), config);
   }

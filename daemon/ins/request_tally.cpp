@@ -24,8 +24,14 @@ std::string request_name(const profile::Profile& profile, std::span<const std::u
   ByteReader in(request.subspan(1));
   switch (request.front()) {
     case uds::service::read_data:
-    case uds::service::write_data:
-      return fmt::format("{} {}", service, profile::did_name(profile, in.get<std::uint16_t>()));
+    case uds::service::write_data: {
+      const auto did = in.get<std::uint16_t>();
+      if (profile.memory.find(did) != nullptr) {
+        service = uds::service_name(request.front() == uds::service::read_data ? uds::service::read_memory
+                                                                               : uds::service::write_memory);
+      }
+      return fmt::format("{} {}", service, profile::did_name(profile, did));
+    }
     case uds::service::routine_control: {
       const auto action = in.get<std::uint8_t>();
       return fmt::format("{} {} {}", service, action_name(action),

@@ -31,6 +31,14 @@ TEST(RequestName, KnowsTheFieldsOfASet) {
             "WriteDataByIdentifier coefficients.accel_bias_y");
 }
 
+// The service that goes over the bus, not the one that the service asks by.
+TEST(RequestName, KnowsWhatStandsInMemory) {
+  const auto profile = profile::load_profile(SELFCAL_SOURCE_DIR "/config/profiles/addresses.toml").value();
+  EXPECT_EQ(request_name(*profile, uds::read_request(*profile->state.did)), "ReadMemoryByAddress state");
+  EXPECT_EQ(request_name(*profile, uds::write_request(*profile->schedule.did, uds::Bytes{1})),
+            "WriteMemoryByAddress schedule");
+}
+
 TEST(RequestTally, TellsWhatFailedMostOften) {
   RequestTally tally(example());
   EXPECT_EQ(tally.words(), "");
