@@ -29,7 +29,7 @@ constexpr std::uint16_t values(std::initializer_list<unsigned> list) {
   }
   return static_cast<std::uint16_t>(bits);
 }
-constexpr std::array<ServiceRule, 12> service_rules = {{
+constexpr std::array<ServiceRule, 13> service_rules = {{
     {service::session_control, true, 2, values({1, 2, 3})},
     {service::ecu_reset, false, 2, values({1, 2})},
     {service::read_data, true, 3, 0},
@@ -41,10 +41,13 @@ constexpr std::array<ServiceRule, 12> service_rules = {{
     {service::transfer_data, false, 2, 0},
     {service::transfer_exit, false, 1, 0},
     {service::file_transfer, false, 6, 0},
+    {service::write_memory, false, 5, 0},
     {service::tester_present, true, 2, values({0})},
 }};
 
 tl::unexpected<Nrc> no(Nrc nrc) { return tl::unexpected(nrc); }
+
+bool has_records(const profile::Profile& profile) { return !profile.memory.regions.empty(); }
 
 }  // namespace
 
@@ -67,6 +70,7 @@ void Diagnostics::enter(uds::Session session) {
   session_ = session;
   lock_.close();
   upload_.drop();
+  begun_.reset();
 }
 
 void Diagnostics::session_expired(Time) { enter(uds::Session::standard); }
@@ -112,7 +116,8 @@ bool Diagnostics::profile_has(std::uint8_t id) const {
   using Way = profile::Raw::Way;
   const Way way = profile_->raw.way;
   switch (id) {
-    case service::read_memory: return way == Way::memory;
+    case service::read_memory: return way == Way::memory || has_records(*profile_);
+    case service::write_memory: return has_records(*profile_);
     case service::request_upload: return way == Way::upload;
     case service::file_transfer: return way == Way::file;
     case service::transfer_data:
@@ -127,7 +132,8 @@ Nrc Diagnostics::general_objection(View request) const {
   if (rule == service_rules.end() || !profile_has(request[0])) {
     return Nrc::service_not_supported;
   }
-  if (session_ == uds::Session::standard && !rule->in_default_session) {
+  const bool reads_records = rule->id == service::read_memory && has_records(*profile_);
+  if (session_ == uds::Session::standard && !rule->in_default_session && !reads_records) {
     return Nrc::service_not_supported_in_session;
   }
   if (request.size() < rule->shortest) {
@@ -160,7 +166,8 @@ Diagnostics::Reply Diagnostics::dispatch(View request, Time now, uds::Bytes& res
     case service::read_data: return read_data(request);
     case service::write_data: return write_data(request);
     case service::routine_control: return routine(request);
-    case service::read_memory: return upload_.memory(request);
+    case service::read_memory: return read_memory(request);
+    case service::write_memory: return write_memory(request);
     case service::request_upload: return upload_.request(request);
     case service::file_transfer: return upload_.file(request);
     case service::transfer_data: return upload_.transfer(request, response);

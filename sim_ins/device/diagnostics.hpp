@@ -60,6 +60,10 @@ class Diagnostics : public uds::RequestHandler {
   bool knows(std::uint16_t did) const;
   std::optional<uds::Bytes> record(std::uint16_t id);
   Reply write_data(View request);
+  bool takes(std::uint16_t id) const;
+  Reply write_record(std::uint16_t id, View record);
+  Reply read_memory(View request);
+  Reply write_memory(View request);
   Reply write_schedule(View record);
   Reply move(View record);
   Reply write_site(View record);
@@ -88,6 +92,13 @@ class Diagnostics : public uds::RequestHandler {
     double due_s = 0.0;  // INS time
   };
   std::optional<Waiting> answer_;
+
+  // A record in memory of which not all parts were written: it is taken with the last one.
+  struct Begun {
+    std::uint16_t id = 0;
+    uds::Bytes record;
+  };
+  std::optional<Begun> begun_;
 };
 
 }  // namespace selfcal::sim

@@ -26,7 +26,8 @@ bool Diagnostics::knows(std::uint16_t did) const {
   const std::array dids{
       std::optional(p.serial),    std::optional(p.software), p.state.did,    p.schedule.did, p.site.did,
       profile::told_directory(p), p.sample_format.did,       p.set_in_force, p.set_inactive, p.set_factory};
-  return std::ranges::find(dids, std::optional(did)) != dids.end() || profile::field_of(p, did) != nullptr;
+  const bool has = std::ranges::find(dids, std::optional(did)) != dids.end() || profile::field_of(p, did) != nullptr;
+  return has && p.memory.find(did) == nullptr;
 }
 
 // nullopt: nothing is there yet, or the profile's fields do not hold it.
@@ -37,11 +38,12 @@ std::optional<uds::Bytes> Diagnostics::record(std::uint16_t id) {
     return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
   };
   const auto told_if_there = [&](const auto& content) { return content ? told(*content) : std::nullopt; };
-  if (id == p.serial) {
-    return as_bytes(std::string_view(instrument_.serial()));
-  }
-  if (id == p.software) {
-    return as_bytes(software_version);
+  if (id == p.serial || id == p.software) {
+    uds::Bytes text = as_bytes(id == p.serial ? std::string_view(instrument_.serial()) : software_version);
+    if (const profile::Region* region = p.memory.find(id)) {
+      text.resize(region->bytes, 0);
+    }
+    return text;
   }
   if (id == p.state.did) {
     return told(instrument_.state_record());
@@ -82,25 +84,90 @@ Diagnostics::Reply Diagnostics::read_data(View request) {
   return content ? Reply(uds::read_response(id, *content)) : Reply(no(Nrc::conditions_not_correct));
 }
 
+bool Diagnostics::takes(std::uint16_t id) const {
+  return profile::is_written(*profile_, id) || id == profile_->site.did;
+}
+
 // ISO 14229-1, WriteDataByIdentifier: identifier, its security, total length, record, conditions.
 Diagnostics::Reply Diagnostics::write_data(View request) {
   const auto id = ByteReader(request.subspan(1)).get<std::uint16_t>();
-  const profile::Profile& p = *profile_;
-  const bool of_set = p.slots ? id == p.set_inactive : id == p.set_in_force || profile::field_of(p, id) != nullptr;
-  const bool of_move = p.move && id == p.move->did;
-  if (id != p.schedule.did && id != p.site.did && !of_move && !of_set) {
+  if (!takes(id) || profile_->memory.find(id) != nullptr) {
     return no(Nrc::request_out_of_range);
   }
   if (!unlocked()) {
     return no(Nrc::security_access_denied);
   }
-  const View record = request.subspan(3);
-  const Reply written = of_move                ? move(record)
-                        : id == p.schedule.did ? write_schedule(record)
-                        : id == p.site.did     ? write_site(record)
-                        : p.slots              ? write_coefficients(record)
-                                               : write_over_set(id, record);
-  return written.map([&](const uds::Bytes&) { return uds::write_response(id); });
+  return write_record(id, request.subspan(3)).map([&](const uds::Bytes&) { return uds::write_response(id); });
+}
+
+Diagnostics::Reply Diagnostics::write_record(std::uint16_t id, View record) {
+  const profile::Profile& p = *profile_;
+  if (p.move && id == p.move->did) {
+    return move(record);
+  }
+  if (id == p.schedule.did) {
+    return write_schedule(record);
+  }
+  if (id == p.site.did) {
+    return write_site(record);
+  }
+  return p.slots ? write_coefficients(record) : write_over_set(id, record);
+}
+
+// The raw data are told in a session alone, records in every one.
+Diagnostics::Reply Diagnostics::read_memory(View request) {
+  const profile::RecordMemory& memory = profile_->memory;
+  const auto range = uds::parse_memory_request(request, memory.format());
+  const auto id = range ? memory.holding(range->address, range->bytes) : std::nullopt;
+  if (range && !id) {
+    const bool of_raw = profile_->raw.way == profile::Raw::Way::memory && session_ != uds::Session::standard;
+    return of_raw ? upload_.memory(request) : no(Nrc::request_out_of_range);
+  }
+  if (!range) {
+    return no(range.error());
+  }
+  const bool only_written = profile_->move && *id == profile_->move->did;
+  if (range->bytes == 0 || range->bytes > memory.longest_read || only_written) {
+    return no(Nrc::request_out_of_range);
+  }
+  const auto content = record(*id);
+  const std::size_t at = range->address - memory.find(*id)->address;
+  return content && content->size() >= at + range->bytes
+             ? Reply(uds::memory_response(View(*content).subspan(at, range->bytes)))
+             : Reply(no(Nrc::conditions_not_correct));
+}
+
+// ISO 14229-1, WriteMemoryByAddress: format, total length, range, its security, then record and conditions. Parts come in order from
+// the record's beginning; what was begun is forgotten where another one begins.
+Diagnostics::Reply Diagnostics::write_memory(View request) {
+  const profile::RecordMemory& memory = profile_->memory;
+  const auto write = uds::parse_write_memory_request(request, memory.format());
+  if (!write) {
+    return no(write.error());
+  }
+  const auto id = memory.holding(write->range.address, write->range.bytes);
+  if (!id || !takes(*id) || write->data.empty() || write->data.size() > memory.longest_write) {
+    return no(Nrc::request_out_of_range);
+  }
+  if (!unlocked()) {
+    return no(Nrc::security_access_denied);
+  }
+  const profile::Region& region = *memory.find(*id);
+  const std::size_t at = write->range.address - region.address;
+  if (at == 0) {
+    begun_ = Begun{*id, {}};
+  }
+  if (!begun_ || begun_->id != *id || begun_->record.size() != at) {
+    return no(Nrc::conditions_not_correct);
+  }
+  begun_->record.insert(begun_->record.end(), write->data.begin(), write->data.end());
+  if (begun_->record.size() == region.bytes) {
+    const Begun whole = *std::exchange(begun_, std::nullopt);
+    if (const Reply written = write_record(*id, whole.record); !written) {
+      return written;
+    }
+  }
+  return uds::write_memory_response(write->range, memory.format());
 }
 
 Diagnostics::Reply Diagnostics::write_schedule(View record) {
