@@ -4,6 +4,8 @@
 #include "protocol/odx/communication.hpp"
 #include "protocol/odx/odx.hpp"
 #include "protocol/odx/services.hpp"
+#include "protocol/profile/names.hpp"
+#include "protocol/uds/services.hpp"
 
 namespace selfcal::odx {
 namespace {
@@ -47,6 +49,14 @@ void tell_lost(const Profile& p, std::vector<std::string>& lost) {
   lost.emplace_back(p.stream.empty()
                         ? "page: where the samples stand, for a page comes in several blocks"
                         : "stream: the frames of the samples, which answer no request (selfcal device dbc)");
+  for (const auto& [did, region] : p.memory.regions) {
+    const bool reads = region.bytes > p.memory.longest_read;
+    if (reads || (profile::is_written(p, did) && region.bytes > p.memory.longest_write)) {
+      lost.push_back(fmt::format("{}: how it is {} in parts, by {}", profile::did_name(p, did),
+                                 reads ? "read" : "written",
+                                 uds::service_name(reads ? uds::service::read_memory : uds::service::write_memory)));
+    }
+  }
   lost.push_back(axes_words(p.raw));
   if (p.set_form != profile::SetForm::errors) {
     lost.push_back(fmt::format("coefficients: the 24 are those of the {}, not of the errors",

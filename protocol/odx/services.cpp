@@ -116,15 +116,47 @@ class Services {
   }
 
   void read_identifier(const std::string& name, std::uint16_t did, const std::string& content) {
+    if (const profile::Region* region = p_.memory.find(did)) {
+      return read_region(name, *region, content);
+    }
     const Messages read = begin("read_" + name, "CURRENTDATA", service::read_data, {});
     both(read, "identifier", "ID", 1, did_bits, did);
     value(read.response, "record", record_at, content);
   }
 
   void write_to_identifier(const std::string& name, std::uint16_t did, const std::string& content) {
+    if (const profile::Region* region = p_.memory.find(did)) {
+      return write_region(name, *region, content);
+    }
     const Messages write = begin("write_" + name, "STOREDDATA", service::write_data, {});
     both(write, "identifier", "ID", 1, did_bits, did);
     value(write.request, "record", record_at, content);
+  }
+
+  // A record in memory, where it is told and taken at once: its address and size always the same.
+  void add_place(Node params, const profile::Region& region) const {
+    const profile::RecordMemory& memory = p_.memory;
+    add_coded_constant(params, "address_and_length_format", "DATA", 1, byte_bits,
+                       memory.size_bytes << 4U | memory.address_bytes);
+    add_coded_constant(params, "address", "DATA", 2, byte_bits * memory.address_bytes, region.address);
+    add_coded_constant(params, "size", "DATA", 2 + memory.address_bytes, byte_bits * memory.size_bytes, region.bytes);
+  }
+
+  void read_region(const std::string& name, const profile::Region& region, const std::string& content) {
+    if (region.bytes <= p_.memory.longest_read) {
+      const Messages read = begin("read_" + name, "CURRENTDATA", service::read_memory, {});
+      add_place(read.request, region);
+      value(read.response, "record", 1, content);
+    }
+  }
+
+  void write_region(const std::string& name, const profile::Region& region, const std::string& content) {
+    if (region.bytes <= p_.memory.longest_write) {
+      const Messages write = begin("write_" + name, "STOREDDATA", service::write_memory, {});
+      add_place(write.request, region);
+      add_place(write.response, region);
+      value(write.request, "record", 2 + p_.memory.address_bytes + p_.memory.size_bytes, content);
+    }
   }
 
   // A position, by a write or as the option of a routine.

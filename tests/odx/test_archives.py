@@ -30,7 +30,7 @@ class Archives(unittest.TestCase):
         return pdx, done.stdout
 
     def test_every_reference_leads_somewhere(self):
-        for name in ("selfcal", "example", "memory", "moves"):
+        for name in ("selfcal", "example", "memory", "moves", "addresses"):
             with self.subTest(name):
                 self.read(ROOT / "config" / "profiles" / f"{name}.toml")
 
@@ -51,6 +51,31 @@ class Archives(unittest.TestCase):
             pdx.decode_response(bytes.fromhex("62fd10 1203 0500 07000000 090000"), bytes.fromhex("22fd10"))
         for words in ("AES-CMAC", "crc32 of bytes 0 to 199", "y -x z, gimbal outer -inner", "255 repetitions", "page"):
             self.assertIn(words, lost)
+
+    def test_records_in_memory(self):
+        pdx, lost = self.read(ROOT / "config" / "profiles" / "addresses.toml")
+        asked = bytes.fromhex("23 13 040100 0c")
+        self.assertEqual(pdx.decode_request(asked)[0], "read_state")
+        # 0x201 complete, no faults, version 3, run 7, power-on 9.
+        name, values = pdx.decode_response(bytes.fromhex("63 0201 00 03 00000007 00000009"), asked)
+        self.assertEqual(name, "read_state")
+        self.assertEqual(values["record"], {"state": "complete", "faults": 0, "coefficients_version": 3, "run_id": 7, "power_cycles": 9})
+        for other in ("23 13 040101 0c", "23 13 040100 0b", "23 14 040100 0c"):
+            with self.assertRaises(read_pdx.Other):
+                pdx.decode_request(bytes.fromhex(other))
+        self.assertIn("coefficients.in_force: how it is read in parts, by ReadMemoryByAddress", lost)
+        self.assertIn("schedule: how it is read in parts, by ReadMemoryByAddress", lost)
+        self.assertFalse([name for name in pdx.services if "coefficients" in name or "schedule" in name])
+        # Where they are told and taken at once they are services.
+        whole = self.folder / "whole.toml"
+        text = (ROOT / "config" / "profiles" / "addresses.toml").read_text(encoding="utf-8")
+        whole.write_text(text.replace("size_bytes = 1\nlongest = 64\nlongest_write = 48", "size_bytes = 2\nlongest = 512"), encoding="utf-8")
+        pdx, lost = self.read(whole)
+        self.assertNotIn("in parts", lost)
+        name, values = pdx.decode_request(bytes.fromhex("3d 23 048000 00cc 00000005") + bytes(200))
+        self.assertEqual((name, values["record"]["version"]), ("write_coefficients_in_force", 5))
+        self.assertEqual(pdx.decode_response(bytes.fromhex("7d 23 048000 00cc"), bytes.fromhex("3d 23 048000 00cc") + bytes(204))[0],
+                         "write_coefficients_in_force")
 
     def test_addresses_and_times(self):
         pdx, _ = self.read(ROOT / "config" / "profiles" / "example.toml")
