@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "protocol/profile/names.hpp"
 #include "protocol/uds/messages.hpp"
 
 namespace selfcal::cli::device {
@@ -106,6 +107,30 @@ Expected<std::vector<Address>> ask_around(can::Socket& socket, const ProbePlan& 
   return found;
 }
 
+// Not at other addresses: what memory another node has, and what reading it does, nobody here knows.
+void read_memory(Tester& tester, const profile::Profile& profile, std::vector<KnownPlace>& found) {
+  for (const auto& [number, region] : profile.memory.regions) {
+    if (profile.move && number == profile.move->did) {  // only written
+      continue;
+    }
+    KnownPlace place{region.address, profile::did_name(profile, number), {}, 0};
+    for (const profile::RegionPart& part : profile::parts_of(region, profile.memory.longest_read)) {
+      const Exchange told = tester.ask(profile.memory.read_request(part));
+      const auto data = uds::read_memory_response(told.response, part.bytes);
+      if (!data) {
+        if (told.kind == Exchange::Kind::silent) {
+          return;
+        }
+        place.record.clear();
+        place.nrc = told.nrc;
+        break;
+      }
+      place.record.insert(place.record.end(), data->begin(), data->end());
+    }
+    found.push_back(std::move(place));
+  }
+}
+
 Expected<Found> read_all(const ProbePlan& plan, const Address& address) {
   profile::Profile profile = plan.profile;
   profile.bus.request = address.request;
@@ -117,7 +142,7 @@ Expected<Found> read_all(const ProbePlan& plan, const Address& address) {
   if (!tester) {
     return tl::unexpected(tester.error());
   }
-  Found found{address, {}, {}, {}};
+  Found found{address, {}, {}, {}, {}};
   found.present = tester->ask(uds::tester_present_request(false)).response;
   if (!found.present.empty()) {
     found.session = tester->ask(uds::session_request(uds::Session::standard)).response;
@@ -133,6 +158,11 @@ Expected<Found> read_all(const ProbePlan& plan, const Address& address) {
         found.dids.push_back(
             {static_cast<std::uint16_t>(did), record ? Bytes(record->begin(), record->end()) : Bytes{}, told.nrc});
       }
+    }
+    const profile::Bus& own = plan.profile.bus;
+    if (address.request == own.request && address.response == own.response &&
+        address.extended_ids == own.extended_ids) {
+      read_memory(*tester, plan.profile, found.memory);
     }
   }
   return tester->trouble() ? Expected<Found>(tl::unexpected(*tester->trouble())) : found;

@@ -32,11 +32,20 @@ struct Known {
   std::uint8_t nrc = 0;  // of such a refusal
 };
 
+// A record that the profile has in memory.
+struct KnownPlace {
+  std::uint32_t address = 0;
+  std::string name;      // the profile's
+  Bytes record;          // empty where it is refused
+  std::uint8_t nrc = 0;  // of the refusal
+};
+
 struct Found {
   Address address;
   Bytes present;  // the answer to TesterPresent
   Bytes session;  // to 10 01
   std::vector<Known> dids;
+  std::vector<KnownPlace> memory;  // at the profile's own address alone
 };
 
 struct ProbePlan {

@@ -49,6 +49,16 @@ std::string timings_text(const Found& found) {
              : fmt::format("default session: {}", found.session.empty() ? "no answer" : hex(found.session));
 }
 
+std::string record_text(const Bytes& record, std::uint8_t nrc) {
+  if (record.empty()) {
+    return nrc == 0 ? "no answer that makes sense" : uds::describe_nrc(nrc);
+  }
+  constexpr std::size_t shown = 16;
+  return fmt::format("{} bytes: {:02X}{}{}", record.size(),
+                     fmt::join(ByteView(record).first(std::min(record.size(), shown)), " "),
+                     record.size() > shown ? " ..." : "", ascii(record));
+}
+
 void print(const ProbePlan& plan, const ProbeResult& result) {
   for (const Heard& heard : result.heard) {
     fmt::print("heard     {}: {} frames in {:g} s, the last {:02X}\n", id_text(heard.id, heard.extended_ids),
@@ -59,13 +69,10 @@ void print(const ProbePlan& plan, const ProbeResult& result) {
     fmt::print("answers   request {}, response {}: {}; {}\n", address_text(a.request, a.extended_ids, a.request_byte),
                address_text(a.response, a.extended_ids, a.response_byte), hex(found.present), timings_text(found));
     for (const Known& known : found.dids) {
-      fmt::print("  {:04X}    {}\n", known.did,
-                 known.record.empty()
-                     ? uds::describe_nrc(known.nrc)
-                     : fmt::format(
-                           "{} bytes: {:02X}{}{}", known.record.size(),
-                           fmt::join(ByteView(known.record).first(std::min<std::size_t>(known.record.size(), 16)), " "),
-                           known.record.size() > 16 ? " ..." : "", ascii(known.record)));
+      fmt::print("  {:04X}    {}\n", known.did, record_text(known.record, known.nrc));
+    }
+    for (const KnownPlace& place : found.memory) {
+      fmt::print("  {:08X}  {}: {}\n", place.address, place.name, record_text(place.record, place.nrc));
     }
   }
   fmt::print("{} address{} answered\n", result.found.size(), result.found.size() == 1 ? "" : "es");
@@ -88,6 +95,13 @@ std::string document_of(const ProbePlan& plan, const ProbeResult& result) {
                            : item["record"] = fmt::format("{:02X}", fmt::join(known.record, ""));
       dids.push_back(std::move(item));
     }
+    Json memory = Json::array();
+    for (const KnownPlace& place : one.memory) {
+      Json item{{"address", place.address}, {"name", place.name}};
+      place.record.empty() ? item["nrc"] = place.nrc
+                           : item["record"] = fmt::format("{:02X}", fmt::join(place.record, ""));
+      memory.push_back(std::move(item));
+    }
     Json address{{"request_id", one.address.request},
                  {"response_id", one.address.response},
                  {"extended_id", one.address.extended_ids}};
@@ -98,6 +112,9 @@ std::string document_of(const ProbePlan& plan, const ProbeResult& result) {
     address.update({{"tester_present", fmt::format("{:02X}", fmt::join(one.present, ""))},
                     {"default_session", fmt::format("{:02X}", fmt::join(one.session, ""))},
                     {"dids", std::move(dids)}});
+    if (!memory.empty()) {
+      address["memory"] = std::move(memory);
+    }
     found.push_back(std::move(address));
   }
   return document::with_head(document::probe, {{"interface", plan.interface},

@@ -6,7 +6,7 @@
 #include "protocol/profile/raw_file.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
-#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/record_access.hpp"
 
 namespace selfcal::cli::device {
 namespace {
@@ -143,10 +143,9 @@ class Upload {
 
 Expected<ins::DirectoryRecord> directory_of(Conformance& c) {
   const profile::Profile& p = c.profile();
-  const Exchange told = c.tester().ask(uds::read_request(*p.directory.did));
-  const auto record = uds::read_read_response(told.response, *p.directory.did);
-  return record ? profile::decode_directory(p, *record)
-                : fail(ErrorKind::device, fmt::format("the directory cannot be read: {}", words(told)));
+  const RecordExchange told = read_record(c, *p.directory.did);
+  return told.record ? profile::decode_directory(p, *told.record)
+                     : fail(ErrorKind::device, fmt::format("the directory cannot be read: {}", words(told.exchange)));
 }
 
 constexpr std::string_view memory = "ISO 14229-1, 10.3";
@@ -201,7 +200,7 @@ void try_memory(Conformance& c) {
             {Nrc::request_out_of_range, Nrc::incorrect_message_length});
   c.refused({"memory.session", "ISO 14229-1, 7.5", "In the default session no memory is told."},
             memory_request(p, p.raw.first_address, 1),
-            {Nrc::service_not_supported_in_session, Nrc::security_access_denied});
+            {Nrc::service_not_supported_in_session, Nrc::security_access_denied, Nrc::request_out_of_range});
   try_page_of_memory(c, *directory);
 }
 

@@ -1,18 +1,18 @@
-// ReadDataByIdentifier: every record of the profile, and what is none.
+// ReadDataByIdentifier and ReadMemoryByAddress: every record of the profile, and what is none.
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
-#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/record_access.hpp"
 #include "tools/cli/device/unused_number.hpp"
 
 namespace selfcal::cli::device {
 namespace {
 
 using uds::Nrc;
-constexpr std::string_view clause = "ISO 14229-1, 10.2";
+constexpr std::string_view clause = "ISO 14229-1, 10.2", memory_clause = "ISO 14229-1, 10.3";
 
 std::string fault_of_text(ByteView record) {
   for (const std::uint8_t byte : record) {
@@ -47,24 +47,63 @@ void try_record(Conformance& c, std::string_view record_name, std::optional<std:
   const std::string id = fmt::format("read.{}", record_name);
   const std::string sentence =
       fmt::format("{} is read in the default session, as the profile lays it out.", record_name);
-  const Requirement requirement{id, clause, sentence};
-  const Bytes request = uds::read_request(*did);
-  const auto of_record = [&](ByteView response) { return judge(response.subspan(3)); };
-  if (may == May::be_there) {
-    c.answered(requirement, request, 2, of_record);
-    return;
-  }
+  const Requirement requirement{id, in_memory(c.profile(), *did) ? memory_clause : clause, sentence};
   if (!c.ready(requirement)) {
     return;
   }
-  const Exchange exchange = c.tester().ask(request);
-  const bool absent = exchange.kind == Exchange::Kind::negative &&
-                      exchange.nrc == static_cast<std::uint8_t>(Nrc::conditions_not_correct);
-  const auto told = uds::read_read_response(exchange.response, *did);
-  const bool blank = told && std::ranges::all_of(*told, [](std::uint8_t b) { return b == 0xFF; });
-  const std::string fault = absent || blank ? "" : told ? judge(*told) : told.error().message;
-  c.judged(requirement, hex(request), "the record, or conditionsNotCorrect (0x22) where there is none",
-           fault.empty() ? words(exchange) : fmt::format("{}: {}", words(exchange), fault), fault.empty());
+  const RecordExchange told = read_record(c, *did);
+  const bool none = told.exchange.kind == Exchange::Kind::negative &&
+                    told.exchange.nrc == static_cast<std::uint8_t>(Nrc::conditions_not_correct);
+  const bool blank = told.record && std::ranges::all_of(*told.record, [](std::uint8_t b) { return b == 0xFF; });
+  const bool absent = may == May::be_absent && (none || blank);
+  const std::string fault = absent ? "" : told.record ? judge(*told.record) : told.record.error().message;
+  c.judged(requirement, told.sent,
+           may == May::be_there ? "the record" : "the record, or conditionsNotCorrect (0x22) where there is none",
+           came(told, fault), fault.empty());
+}
+
+// Where records stand in memory.
+void try_refusals_of_memory(Conformance& c) {
+  const profile::Profile& p = c.profile();
+  if (p.memory.regions.empty()) {
+    return;
+  }
+  const Bytes request = read_request_of(p, p.memory.regions.begin()->first);
+  Bytes shorter = request, longer = request, other = request;
+  shorter.pop_back();
+  longer.push_back(0);
+  other[1] = 0x11;
+  c.refused({"read.memory_short", memory_clause, "An address and size that are too short are refused."}, shorter,
+            {Nrc::incorrect_message_length, Nrc::request_out_of_range});
+  c.refused({"read.memory_long", memory_clause, "An address and size with a byte too many are refused."}, longer,
+            {Nrc::incorrect_message_length, Nrc::request_out_of_range});
+  c.refused({"read.memory_format", memory_clause, "Another format of address and size is refused."}, other,
+            {Nrc::request_out_of_range, Nrc::incorrect_message_length});
+}
+
+// An identifier that a record has, if any has one.
+std::optional<std::uint16_t> some_identifier(const profile::Profile& p) {
+  for (const auto& did : {std::optional(p.serial), std::optional(p.software), p.state.did, p.set_in_force}) {
+    if (did && !in_memory(p, *did)) {
+      return did;
+    }
+  }
+  return std::nullopt;
+}
+
+void try_refusals_of_identifiers(Conformance& c) {
+  const auto did = some_identifier(c.profile());
+  if (!did) {
+    return;
+  }
+  c.refused({"read.unknown", clause, "An identifier that is none is refused."}, uds::read_request(unused_did),
+            {Nrc::request_out_of_range});
+  c.refused({"read.too_short", clause, "Half an identifier is refused."}, Bytes{0x22, 0xF1},
+            {Nrc::incorrect_message_length});
+  Bytes longer = uds::read_request(*did);
+  longer.push_back(0);
+  c.refused({"read.too_long", clause, "An identifier and a half are refused."}, longer,
+            {Nrc::incorrect_message_length});
 }
 
 }  // namespace
@@ -92,13 +131,8 @@ void try_records(Conformance& c) {
       return b.size() == bytes ? "" : fmt::format("{} bytes, {} expected", b.size(), bytes);
     });
   }
-  c.refused({"read.unknown", clause, "An identifier that is none is refused."}, uds::read_request(unused_did),
-            {Nrc::request_out_of_range});
-  c.refused({"read.too_short", clause, "Half an identifier is refused."}, Bytes{0x22, 0xF1},
-            {Nrc::incorrect_message_length});
-  c.refused({"read.too_long", clause, "An identifier and a half are refused."},
-            Bytes{0x22, static_cast<std::uint8_t>(p.serial >> 8U), static_cast<std::uint8_t>(p.serial), 0x00},
-            {Nrc::incorrect_message_length});
+  try_refusals_of_identifiers(c);
+  try_refusals_of_memory(c);
   if (p.bus.status) {
     constexpr Requirement status{"status.frame", "profile, bus.status", "The state frame comes by itself."};
     constexpr double within_s = 3.0;

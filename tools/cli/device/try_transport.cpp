@@ -5,7 +5,7 @@
 #include <array>
 
 #include "protocol/uds/messages.hpp"
-#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/record_access.hpp"
 
 namespace selfcal::cli::device {
 namespace {
@@ -126,7 +126,7 @@ std::optional<Bytes> long_read(Conformance& c) {
   const profile::Profile& p = c.profile();
   for (const auto& did : {p.set_in_force, p.sample_format.did, profile::told_directory(p), p.site.did, p.state.did,
                           std::optional(p.serial)}) {
-    const Bytes request = did ? uds::read_request(*did) : Bytes{};
+    const Bytes request = did ? read_request_of(p, *did) : Bytes{};
     const Exchange told = did ? c.tester().ask(request) : Exchange{};
     if (told.kind == Exchange::Kind::broken || told.response.size() > 2 * can::max_classic_bytes) {
       return request;

@@ -1,4 +1,4 @@
-// WriteDataByIdentifier, the slots, and ECUReset: what changes something. No set is put in force.
+// WriteDataByIdentifier and WriteMemoryByAddress, the slots, and ECUReset: what changes something. No set is put in force.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/messages.hpp"
-#include "tools/cli/device/conformance.hpp"
+#include "tools/cli/device/record_access.hpp"
 #include "tools/cli/device/unused_number.hpp"
 
 namespace selfcal::cli::device {
@@ -15,7 +15,8 @@ namespace {
 
 using uds::Nrc;
 using uds::RoutineAction;
-constexpr std::string_view writing = "ISO 14229-1, 10.7", routines = "ISO 14229-1, 13.2", reset = "ISO 14229-1, 9.3";
+constexpr std::string_view writing = "ISO 14229-1, 10.7", writing_memory = "ISO 14229-1, 10.8",
+                           routines = "ISO 14229-1, 13.2", reset = "ISO 14229-1, 9.3";
 
 Bytes without_last(Bytes request) {
   request.pop_back();
@@ -25,9 +26,8 @@ Bytes without_last(Bytes request) {
 // The schedule that the INS has; where it has none, one move there and back, which is never begun.
 Bytes schedule_of(Conformance& c) {
   const profile::Profile& p = c.profile();
-  const Exchange told = c.tester().ask(uds::read_request(*p.schedule.did));
-  if (const auto record = uds::read_read_response(told.response, *p.schedule.did)) {
-    return {record->begin(), record->end()};
+  if (const RecordExchange told = read_record(c, *p.schedule.did); told.record) {
+    return *told.record;
   }
   ins::ScheduleRecord schedule;
   schedule.rotation_ms = 10000;
@@ -40,34 +40,38 @@ void try_write(Conformance& c, const Requirement& requirement, std::uint16_t did
   if (!c.ready(requirement)) {
     return;
   }
-  const Bytes request = uds::write_request(did, record);
-  const Exchange written = c.tester().ask(request);
-  const Exchange told = c.tester().ask(uds::read_request(did));
-  const auto back = uds::read_read_response(told.response, did);
-  const bool same = back && std::ranges::equal(*back, record);
-  c.judged(requirement, fmt::format("{}, then {}", hex(request), hex(uds::read_request(did))),
-           "6E and the identifier, then the record as it was written",
-           written.kind != Exchange::Kind::positive ? words(written)
-           : same                                   ? "the record as it was written"
-                                                    : words(told),
-           written.kind == Exchange::Kind::positive && same);
+  const RecordExchange written = write_record(c, did, record);
+  const RecordExchange told = read_record(c, did);
+  const bool same = told.record && std::ranges::equal(*told.record, record);
+  c.judged(requirement, fmt::format("{}, then {}", written.sent, told.sent),
+           "a positive response, then the record as it was written",
+           !written.record ? came(written, written.record.error().message)
+           : same          ? "the record as it was written"
+                           : words(told.exchange),
+           written.record && same);
 }
 
 // What is refused whatever is written.
 void try_refusals_of_writing(Conformance& c, const Bytes& request) {
   const profile::Profile& p = c.profile();
+  const bool by_address = request[0] == uds::service::write_memory;
+  const std::string_view clause = by_address ? writing_memory : writing;
   if (p.security.needed) {
-    c.refused({"write.locked", writing, "While the lock is closed nothing is written.", Mode::session, true}, request,
+    c.refused({"write.locked", clause, "While the lock is closed nothing is written.", Mode::session, true}, request,
               {Nrc::security_access_denied});
   }
   c.refused({"write.session", "ISO 14229-1, 7.5", "In the default session nothing is written.", Mode::standard, true},
             request, {Nrc::service_not_supported_in_session});
-  c.refused({"write.too_short", writing, "A record that is too short is refused.", Mode::open, true},
+  c.refused({"write.too_short", clause, "A record that is too short is refused.", Mode::open, true},
             without_last(request), {Nrc::incorrect_message_length});
-  c.refused({"write.unknown", writing, "An identifier that is none is not written.", Mode::open, true},
-            uds::write_request(unused_did, Bytes{0}), {Nrc::request_out_of_range});
-  c.refused({"write.read_only", writing, "A record that is only read is not written.", Mode::open, true},
-            uds::write_request(*p.state.did, Bytes(p.state.layout.bytes, 0)), {Nrc::request_out_of_range});
+  if (request[0] == uds::service::write_data) {
+    c.refused({"write.unknown", clause, "An identifier that is none is not written.", Mode::open, true},
+              uds::write_request(unused_did, Bytes{0}), {Nrc::request_out_of_range});
+  }
+  if (by_address == in_memory(p, *p.state.did)) {
+    c.refused({"write.read_only", clause, "A record that is only read is not written.", Mode::open, true},
+              write_request_of(p, *p.state.did, Bytes(p.state.layout.bytes, 0)), {Nrc::request_out_of_range});
+  }
 }
 
 void try_schedule(Conformance& c) {
@@ -76,7 +80,7 @@ void try_schedule(Conformance& c) {
     return c.not_tried({"write.schedule", writing, "The schedule is written."}, "needs --write");
   }
   const Bytes schedule = schedule_of(c);
-  try_refusals_of_writing(c, uds::write_request(*p.schedule.did, schedule));
+  try_refusals_of_writing(c, write_request_of(p, *p.schedule.did, schedule));
   try_write(c, {"write.schedule", writing, "The schedule is written, and read back as written.", Mode::open, true},
             *p.schedule.did, schedule);
 }
@@ -85,9 +89,8 @@ void try_schedule(Conformance& c) {
 std::optional<ins::MoveRecord> standing(Conformance& c) {
   const profile::Profile& p = c.profile();
   const bool tells = p.state.layout.find("outer") != nullptr && p.state.layout.find("inner") != nullptr;
-  const Exchange told = c.tester().ask(uds::read_request(*p.state.did));
-  const auto record = uds::read_read_response(told.response, *p.state.did);
-  const auto state = record && tells ? profile::decode_state(p, *record) : tl::unexpected(Error{});
+  const RecordExchange told = read_record(c, *p.state.did);
+  const auto state = told.record && tells ? profile::decode_state(p, *told.record) : tl::unexpected(Error{});
   if (!state) {
     return std::nullopt;
   }
@@ -105,20 +108,25 @@ void try_move(Conformance& c) {
   }
   const auto here = standing(c);
   const Bytes record = profile::encode(p, here.value_or(ins::MoveRecord{})).value_or(Bytes(p.move->layout.bytes, 0));
-  const Bytes request = p.move->did ? uds::write_request(*p.move->did, record)
+  const Bytes request = p.move->did ? write_request_of(p, *p.move->did, record)
                                     : uds::routine_request(RoutineAction::start, *p.move->routine, record);
   try_refusals_of_writing(c, request);
   if (!here) {
     return c.not_tried(taken, "where it stands is not told");
   }
-  c.answered(taken, request, p.move->did ? 2 : 3);
+  if (!p.move->did) {
+    c.answered(taken, request, 3);
+  } else if (c.ready(taken)) {
+    const RecordExchange written = write_record(c, *p.move->did, record);
+    c.judged(taken, written.sent, "a positive response",
+             came(written, written.record ? "" : written.record.error().message), written.record.has_value());
+  }
 }
 
 bool erased(Conformance& c) {
-  const Exchange told = c.tester().ask(uds::read_request(*c.profile().set_inactive));
-  const auto record = uds::read_read_response(told.response, *c.profile().set_inactive);
-  return told.kind == Exchange::Kind::negative ||
-         (record && std::ranges::all_of(*record, [](std::uint8_t byte) { return byte == 0xFF; }));
+  const RecordExchange told = read_record(c, *c.profile().set_inactive);
+  return told.exchange.kind == Exchange::Kind::negative ||
+         (told.record && std::ranges::all_of(*told.record, [](std::uint8_t byte) { return byte == 0xFF; }));
 }
 
 void try_erase(Conformance& c, const Requirement& requirement) {
@@ -141,30 +149,27 @@ void try_writing_over(Conformance& c) {
   const std::uint16_t did = p.field_by_field ? p.set.fields.front().did.value_or(0) : p.set_in_force.value_or(0);
   constexpr Requirement written{"set.write_over", writing, "What is there is written again, and read back as written.",
                                 Mode::open, true};
-  const Exchange told = c.tester().ask(uds::read_request(did));
-  const auto record = uds::read_read_response(told.response, did);
-  if (!record) {
-    return c.not_tried(written, fmt::format("it cannot be read: {}", words(told)));
+  const RecordExchange told = read_record(c, did);
+  if (!told.record) {
+    return c.not_tried(written, fmt::format("it cannot be read: {}", words(told.exchange)));
   }
-  const Bytes held(record->begin(), record->end());
+  const Bytes held = *told.record;
   c.refused({"set.too_short", writing, "A record of coefficients that is too short is refused.", Mode::open, true},
-            without_last(uds::write_request(did, held)), {Nrc::incorrect_message_length});
+            without_last(write_request_of(p, did, held)), {Nrc::incorrect_message_length});
   try_write(c, written, did, held);
 }
 
 // A set that is the one in force, in the inactive slot; erased afterwards.
 void try_set(Conformance& c) {
   const profile::Profile& p = c.profile();
-  const Exchange told = p.set_in_force ? c.tester().ask(uds::read_request(*p.set_in_force)) : Exchange{};
-  const auto record =
-      p.set_in_force ? uds::read_read_response(told.response, *p.set_in_force) : tl::unexpected(Error{});
+  const auto record = p.set_in_force ? read_record(c, *p.set_in_force).record : tl::unexpected(Error{});
   constexpr Requirement written{"set.write", writing,
                                 "A set is written into the inactive slot, and read back as written.", Mode::open, true};
   if (!record || !p.set_inactive || !c.permission().write) {
     return c.not_tried(written, c.permission().write ? "no set in force can be read" : "needs --write");
   }
   // What an INS tells has any length: a set is only spoilt and written where it is a whole one.
-  if (told.kind != Exchange::Kind::positive || !profile::length_fits(p.set, *record)) {
+  if (!profile::length_fits(p.set, *record)) {
     return c.not_tried(written,
                        fmt::format("the set in force has {} bytes, the profile says {}", record->size(), p.set.bytes));
   }
@@ -173,8 +178,9 @@ void try_set(Conformance& c) {
     try_erase(c, {"set.erase", routines, "The inactive slot is erased.", Mode::open, true});
   }
   c.refused({"set.too_short", writing, "A set that is too short is refused.", Mode::open, true},
-            without_last(uds::write_request(*p.set_inactive, set)), {Nrc::incorrect_message_length});
-  if (p.set.checksum) {
+            without_last(write_request_of(p, *p.set_inactive, set)), {Nrc::incorrect_message_length});
+  const bool judged = !in_memory(p, *p.set_inactive);  // what is written into memory the INS need not look at
+  if (p.set.checksum && judged) {
     Bytes spoilt = set;
     spoilt[p.set.checksum->field.at] ^= 0x01U;
     c.refused(
@@ -191,10 +197,12 @@ void try_set(Conformance& c) {
         uds::routine_request(RoutineAction::start, *p.commit.id, profile::commit_start(p, spoilt).value_or(Bytes{})),
         {Nrc::request_out_of_range});
   }
-  if (p.erase.id) {
+  if (p.erase.id && judged) {
     c.refused({"set.not_erased", writing, "A slot that is not erased is not written.", Mode::open, true},
               uds::write_request(*p.set_inactive, set),
               {Nrc::general_programming_failure, Nrc::conditions_not_correct, Nrc::request_out_of_range});
+  }
+  if (p.erase.id) {
     try_erase(c, {"set.erase_again", routines, "The slot is erased again.", Mode::open, true});
   }
 }
