@@ -86,7 +86,12 @@ void configure_new(Options& options, device::NewProfile& answers) {
   options.can_identifier("--tester-address", answers.tester_address,
                          "normal-fixed: address of the tester, hexadecimal");
   options.choice("--byte-order", answers.byte_order, {"big", "little"}, "of its numbers");
-  options.choice("--security", answers.security, {"aes-cmac", "none"}, "what opens its lock");
+  options.choice("--security", answers.security, {"aes-cmac", "program", "none"}, "what opens its lock");
+  options.choice("--records", answers.records, {"identifier", "memory"}, "by what they are asked for");
+  options.choice("--rotation", answers.rotation, {"schedule", "moves"}, "what its gimbal is told");
+  options.choice("--raw-data", answers.raw_data, {"upload", "memory", "file", "stream"}, "how they come");
+  options.choice("--sets", answers.sets, {"two", "one"}, "of coefficients that it keeps beside the factory's");
+  options.choice("--form", answers.form, {"errors", "correction", "correction-first"}, "what the 24 mean");
 }
 
 void configure_probe(Options& options, device::ProbeArguments& arguments) {

@@ -15,7 +15,12 @@ struct NewProfile {
                 functional = profile::built_in()->bus.functional;
   std::uint32_t ins_address = 0x2A, tester_address = 0xF1;  // normal-fixed
   std::string byte_order = "big";
-  std::string security = "aes-cmac";
+  std::string security = "aes-cmac";   // none, program
+  std::string records = "identifier";  // memory
+  std::string rotation = "schedule";   // moves
+  std::string raw_data = "upload";     // memory, file, stream
+  std::string sets = "two";            // slots of coefficients; one
+  std::string form = "errors";         // correction, correction-first
   bool operator==(const NewProfile&) const = default;
 };
 
