@@ -154,6 +154,19 @@ const std::vector<Way>& ways() {
        R"(^fields\.(outer|inner) = \{ at = 1[02], type = "i16", scale.*)",
        {"# left out"},
        true},
+      {"address left out", R"(^memory = 0x\w+)", {"# left out"}, true},
+      {"address of more than 32 bits", R"(\bmemory = 0x\w+)", {"memory = 0x100000000", "memory = 0x1F0000000"}},
+      {"record beyond the width of an address", R"(\bmemory = 0x04\w+)", {"memory = 0xFFFFFF", "memory = 0xFFFFF8"}},
+      {"records on each other in memory", R"(^memory = 0x040[1-6]00)", {"memory = 0x0480C0", "memory = 0x047FFF"}},
+      {"identifier and address", R"(^(memory = 0x04\w+))", {"$1\ndid = 0x4001"}},
+      {"text of no length", R"(^((?:serial|software) = \{ memory = \w+), bytes = \d+)", {"$1", "$1, bytes = 0"}},
+      {"record in memory of no length", R"(^bytes = 260$)", {"# left out"}, true},
+      {"width of an address", R"(^address_bytes = \d)", {"address_bytes = 5", "address_bytes = 0"}},
+      {"as many bytes as none tells", R"(^longest(_write)? = \d+)", {"longest$1 = 0", "longest$1 = 100000"}},
+      {"bytes that are told at once left out", R"(^longest = \d+)", {"# left out"}, true},
+      {"address of a field left out", R"(\{ memory = 0x700\w+, )", {"{ "}},
+      {"field in the raw data", R"(\{ memory = 0x700\w+, )", {"{ memory = 0x80000010, "}},
+      {"raw data of no length", R"(^(address = 0x\d+0000))", {"$1\nend = 0", "$1\nend = 0x1FFFFFFFF"}, true},
       {"unknown section", R"(^\[(\w+)\])", {"[$1s]", "[my_$1]"}},
       {"broken TOML", R"( \}$)", {""}, false, R"(^#)"},
       {"broken text", R"re(= "(\w[^"]*)")re", {"= \"$1"}, false, R"(\{)"}};
@@ -284,12 +297,51 @@ Lines with_files(Lines lines) {
   return lines;
 }
 
+// memory.toml, each coefficient at an address in the place of an identifier.
+Lines with_addresses(Lines lines) {
+  for (std::string& line : lines) {
+    line = std::regex_replace(line, std::regex(R"(\{ did = 0x41(\w\w))"), "{ memory = 0x70000$010");
+  }
+  return lines;
+}
+
+// moves.toml, its samples streamed: no pages, and no directory of them.
+Lines with_stream(const Lines& lines) {
+  Lines kept;
+  bool left_out = false;
+  for (const std::string& line : lines) {
+    if (line.starts_with('[')) {
+      left_out = line == "[memory]" || line == "[page]" || line == "[directory]";
+    }
+    if (!left_out) {
+      kept.push_back(line);
+    }
+  }
+  const std::vector<std::vector<std::string_view>> parts{
+      {"delta_theta_x", "delta_theta_y", "delta_theta_z"}, {"delta_v_x", "delta_v_y", "delta_v_z"}, {"outer", "inner"}};
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    for (const std::string& line :
+         {std::string(), fmt::format("[stream.sample.part{}]", k), fmt::format("id = 0x{:08X}", 0x18FF1001 + k),
+          std::string("bytes = 7"), std::string("signals.counter = { start = 0, length = 8 }")}) {
+      kept.push_back(line);
+    }
+    for (std::size_t i = 0; i < parts[k].size(); ++i) {
+      kept.push_back(fmt::format("signals.{} = {{ start = {}, length = 16, type = \"signed\"{} }}", parts[k][i],
+                                 8 + 16 * i, parts[k].size() == 2 ? ", scale = 0.01, unit = \"deg\"" : ""));
+    }
+  }
+  return kept;
+}
+
 int trial(std::size_t count, std::uint64_t seed) {
   const std::vector<Lines> profiles{read(SELFCAL_SOURCE_DIR "/config/profiles/selfcal.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/frames.toml"),
                                     read(SELFCAL_SOURCE_DIR "/config/profiles/moves.toml"),
+                                    read(SELFCAL_SOURCE_DIR "/config/profiles/addresses.toml"),
+                                    with_addresses(read(SELFCAL_SOURCE_DIR "/config/profiles/memory.toml")),
+                                    with_stream(read(SELFCAL_SOURCE_DIR "/config/profiles/moves.toml")),
                                     with_files(read(SELFCAL_SOURCE_DIR "/config/profiles/example.toml"))};
   Random random(seed);
   std::set<std::string> seen;
