@@ -49,6 +49,8 @@ MovePort::MovePort(Timers& timers, std::shared_ptr<InsPort> ins, const InsConfig
     ins::Status status = told;
     status.state = as_rotation(told.state);
     status.position = static_cast<std::uint8_t>(turning() ? sequence_.position() : 0);
+    status.time_left_s = sequence_.left_s(now_s());
+    status.moving = told.moving || waits();
     if (on_status) {
       on_status(status);
     }

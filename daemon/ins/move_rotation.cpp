@@ -84,7 +84,8 @@ void MovePort::take_phase(Phase before) {
 // Where the INS sends no status frames.
 void MovePort::tell_status(const ins::StateRecord& state) {
   const std::pair<std::size_t, bool> shown{turning() ? sequence_.position() : 0, state.moving || waits()};
-  if (shown == shown_ || !on_status) {
+  const bool goes_on = recording_ && sequence_.phase() == Phase::dwelling;  // its time does
+  if ((shown == shown_ && !goes_on) || !on_status) {
     return;
   }
   shown_ = shown;
@@ -93,6 +94,7 @@ void MovePort::tell_status(const ins::StateRecord& state) {
   status.faults = state.faults;
   status.position = static_cast<std::uint8_t>(shown.first);
   status.moving = shown.second;
+  status.time_left_s = sequence_.left_s(now_s());
   status.session = 0;
   status.pages_written = pages_written_;
   status.outer_deg = in_turn(state.outer_deg);

@@ -55,6 +55,20 @@ void MoveSequence::arrive(double now_s) {
   dwell_end_s_ = now_s + schedule_.positions[at_].dwell_ms * 1e-3;
 }
 
+double MoveSequence::left_s(double now_s) const {
+  const bool dwells = phase_ == Phase::dwelling;
+  if (!dwells && phase_ != Phase::moving && phase_ != Phase::approaching) {
+    return 0.0;
+  }
+  const double move_s = schedule_.rotation_ms * 1e-3;
+  const double here_s = schedule_.positions[at_].dwell_ms * 1e-3;
+  double left = dwells ? std::max(0.0, dwell_end_s_ - now_s) : here_s + (at_ > 0 ? move_s : 0.0);
+  for (std::size_t k = at_ + 1; k < schedule_.positions.size(); ++k) {
+    left += move_s + schedule_.positions[k].dwell_ms * 1e-3;
+  }
+  return left;
+}
+
 bool MoveSequence::rests(double now_s) const { return now_s - rest_from_s_ >= rest_s - rounding_s; }
 
 // Of a move that is none, because the gimbal is there already, the rest counts from the command on.

@@ -34,6 +34,8 @@ class MoveSequence {
   std::size_t position() const { return at_ + 1; }  // a move belongs to the position that it leads to
   const std::string& why() const { return why_; }
   double dwell_end_s() const { return dwell_end_s_; }
+  // By the schedule, until the end of its last dwell; on the way to a position all of the move is yet to come.
+  double left_s(double now_s) const;
   // The angles have stayed where they are, as they were told.
   bool rests(double now_s) const;
 

@@ -102,7 +102,8 @@ bool RunningSteps::may_end_early() const {
 }
 
 // Anybody may send a status frame: the INS is asked itself, for the position that it is at (result of the routine) and for the
-// time that its data cover (directory), before its rotation is ended on such a frame's word.
+// time that its data cover (directory), before its rotation is ended on such a frame's word. Where each move is commanded from here
+// the port itself says how far the schedule is, by the INS's answers, and the data cover the time that the moves took.
 Task<Answer<bool>> RunningSteps::confirm_standing() {
   const double told_s = data_.schedule.duration_s() - journal_.progress.ins.time_left_s;
   const SteadyTime heard_at = data_.status_at;
@@ -116,7 +117,9 @@ Task<Answer<bool>> RunningSteps::confirm_standing() {
   }
   const double since_s = std::chrono::duration<double>(timers_.now() - heard_at).count() * data_.config.time_scale;
   const double data_s = static_cast<double>(directory->samples) / data_.format.sample_rate_hz;
-  const bool time_fits = told_s <= data_s + raw_.page_s() + flash_lag_s && told_s + since_s >= data_s - flash_lag_s;
+  const bool by_moves = data_.config.profile->move.has_value();
+  const bool time_fits =
+      by_moves || (told_s <= data_s + raw_.page_s() + flash_lag_s && told_s + since_s >= data_s - flash_lag_s);
   const bool ours = answered->state == ins::State::rotating && answered->run_id == journal_.record.rotation;
   const int told_position = position_at(data_.schedule, told_s, 0.0);  // it may have gone on to the next one since
   const bool place_fits = answered->position == told_position || answered->position == told_position + 1;

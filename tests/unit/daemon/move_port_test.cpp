@@ -5,6 +5,7 @@
 
 #include "daemon/ins/move_port.hpp"
 #include "protocol/byte_order.hpp"
+#include "protocol/flash/page.hpp"
 #include "protocol/profile/read_profile.hpp"
 #include "tests/own_ins/identifiers.hpp"
 #include "tests/unit/daemon/calibration_run_fixture.hpp"
@@ -16,6 +17,7 @@ using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing_support::CalibrationRunTest;
+using testing_support::FakeIns;
 
 constexpr std::uint16_t move_did = 0x0230;
 constexpr std::string_view by_angle = "there = \"angle\"\ntolerance_deg = 1.0\n", by_state = "there = \"state\"\n";
@@ -150,6 +152,54 @@ TEST_F(MovePortTest, TheScheduleIsTurnedMoveByMove) {
   // 80 s of dwells and three moves of 3 s, each seen within some tenths, at 5 s a page; the last one is not whole.
   EXPECT_THAT(ins_.pages_read.size(), testing::AllOf(testing::Ge(17U), testing::Le(18U)));
   EXPECT_EQ(ins_.in_force().version, 1U);
+}
+
+// The INS's clock runs four times faster here, so that 90 s of data, the least for an estimate, are there in the second dwell.
+class EarlyEndOfMovesTest : public MovePortTest {
+ protected:
+  static constexpr double time_scale = 4.0;
+  EarlyEndOfMovesTest() {
+    config_.time_scale = time_scale;
+    config_.drift_check_s = 0.0;  // the fake's check knows no other clock
+    config_.running_estimate_s = 20.0;
+    ins_.sample_rate_hz = FakeIns::pages * flash::samples_per_page / (FakeIns::rotation_s * time_scale);
+    schedule_.dwell_s.assign(4, 20.0 * time_scale);
+    estimators_.met_from = 2;
+  }
+  void begin_wanting_it() {
+    RunRecord record;
+    record.stop_when_met = true;
+    begin(record);
+  }
+};
+
+TEST_F(EarlyEndOfMovesTest, TheRotationEndsInADwellWhenTheTolerancesAreMet) {
+  for (const auto there : {by_angle, by_state}) {
+    speak(there);
+    moves_.clear();
+    estimators_.running_jobs = observer_.finished = ins_.stops = 0;
+    ins_.pages_read.clear();
+    begin_wanting_it();
+    EXPECT_EQ(end(), State::completed) << reason();
+    EXPECT_EQ(moves_.size(), 2U);
+    EXPECT_EQ(ins_.stops, 1);
+    EXPECT_FALSE(gimbal_.moving());
+    // Into the second dwell: 80 s, a move of 12 s, and less than 80 s more.
+    EXPECT_THAT(run_->record().early_end_s, testing::AllOf(testing::Gt(92.0), testing::Lt(172.0)));
+    EXPECT_EQ(ins_.pages_read.size(), ins_.pages_written());
+  }
+}
+
+// The first estimate is begun at 100 s, with five pages, and comes 4 s later, amid the move that begins at 96 s and has 15 s.
+TEST_F(EarlyEndOfMovesTest, NotWhileAMoveIsUnderWay) {
+  estimators_.met_from = 1;
+  schedule_.dwell_s[0] = 96.0;
+  begin_wanting_it();
+  on_move = [this](std::size_t number, Answer<Bytes>&) { gimbal_.sticks = number == 2; };
+  EXPECT_EQ(end(), State::failed);
+  EXPECT_THAT(reason(), HasSubstr("position 2 is not reached within 15 s"));
+  EXPECT_GE(estimators_.running_jobs, 1);
+  EXPECT_LT(run_->record().early_end_s, 0.0);
 }
 
 TEST_F(MovePortTest, AMoveMayBeOverByState) {
