@@ -107,6 +107,27 @@ Expected<std::vector<Address>> ask_around(can::Socket& socket, const ProbePlan& 
   return found;
 }
 
+void read_identifiers(Tester& tester, const ProbePlan& plan, std::vector<Known>& found) {
+  for (std::uint32_t did = plan.first_did; did <= plan.last_did && !tester.trouble(); ++did) {
+    const Exchange told = tester.ask(uds::read_request(static_cast<std::uint16_t>(did)));
+    const auto record = uds::read_read_response(told.response, static_cast<std::uint16_t>(did));
+    const bool refused_now =
+        told.kind == Exchange::Kind::negative && told.nrc != static_cast<std::uint8_t>(uds::Nrc::request_out_of_range);
+    if (told.kind == Exchange::Kind::silent) {
+      break;  // it fell silent: what is asked further only takes time
+    }
+    const bool no_service =
+        told.kind == Exchange::Kind::negative && told.nrc == static_cast<std::uint8_t>(uds::Nrc::service_not_supported);
+    if (record || refused_now) {
+      found.push_back(
+          {static_cast<std::uint16_t>(did), record ? Bytes(record->begin(), record->end()) : Bytes{}, told.nrc});
+    }
+    if (no_service) {
+      break;  // it has no identifiers at all
+    }
+  }
+}
+
 // Not at other addresses: what memory another node has, and what reading it does, nobody here knows.
 void read_memory(Tester& tester, const profile::Profile& profile, std::vector<KnownPlace>& found) {
   for (const auto& [number, region] : profile.memory.regions) {
@@ -146,19 +167,7 @@ Expected<Found> read_all(const ProbePlan& plan, const Address& address) {
   found.present = tester->ask(uds::tester_present_request(false)).response;
   if (!found.present.empty()) {
     found.session = tester->ask(uds::session_request(uds::Session::standard)).response;
-    for (std::uint32_t did = plan.first_did; did <= plan.last_did && !tester->trouble(); ++did) {
-      const Exchange told = tester->ask(uds::read_request(static_cast<std::uint16_t>(did)));
-      const auto record = uds::read_read_response(told.response, static_cast<std::uint16_t>(did));
-      const bool refused_now = told.kind == Exchange::Kind::negative &&
-                               told.nrc != static_cast<std::uint8_t>(uds::Nrc::request_out_of_range);
-      if (told.kind == Exchange::Kind::silent) {
-        break;  // it fell silent: what is asked further only takes time
-      }
-      if (record || refused_now) {
-        found.dids.push_back(
-            {static_cast<std::uint16_t>(did), record ? Bytes(record->begin(), record->end()) : Bytes{}, told.nrc});
-      }
-    }
+    read_identifiers(*tester, plan, found.dids);
     const profile::Bus& own = plan.profile.bus;
     if (address.request == own.request && address.response == own.response &&
         address.extended_ids == own.extended_ids) {

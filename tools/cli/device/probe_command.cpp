@@ -35,7 +35,13 @@ std::string address_text(std::uint32_t id, bool extended, std::optional<std::uin
   return byte ? fmt::format("{} address {:02X}", id_text(id, extended), *byte) : id_text(id, extended);
 }
 
-std::string ascii(ByteView bytes) {
+// What fills a text up is left out.
+std::string ascii(ByteView record) {
+  const auto fills = [](std::uint8_t b) { return b == 0 || b == 0xFF || b == ' '; };
+  ByteView bytes = record;
+  while (!bytes.empty() && fills(bytes.back())) {
+    bytes = bytes.first(bytes.size() - 1);
+  }
   const bool printable =
       !bytes.empty() && std::ranges::all_of(bytes, [](std::uint8_t b) { return b >= 0x20 && b <= 0x7E; });
   return printable ? fmt::format(" \"{}\"", std::string(bytes.begin(), bytes.end())) : "";

@@ -18,6 +18,10 @@ using uds::RoutineAction;
 constexpr std::string_view writing = "ISO 14229-1, 10.7", writing_memory = "ISO 14229-1, 10.8",
                            routines = "ISO 14229-1, 13.2", reset = "ISO 14229-1, 9.3";
 
+std::string_view clause_of_writing(const profile::Profile& p, std::uint16_t did) {
+  return in_memory(p, did) ? writing_memory : writing;
+}
+
 Bytes without_last(Bytes request) {
   request.pop_back();
   return request;
@@ -81,7 +85,9 @@ void try_schedule(Conformance& c) {
   }
   const Bytes schedule = schedule_of(c);
   try_refusals_of_writing(c, write_request_of(p, *p.schedule.did, schedule));
-  try_write(c, {"write.schedule", writing, "The schedule is written, and read back as written.", Mode::open, true},
+  try_write(c,
+            {"write.schedule", clause_of_writing(p, *p.schedule.did),
+             "The schedule is written, and read back as written.", Mode::open, true},
             *p.schedule.did, schedule);
 }
 
@@ -147,14 +153,15 @@ void try_erase(Conformance& c, const Requirement& requirement) {
 void try_writing_over(Conformance& c) {
   const profile::Profile& p = c.profile();
   const std::uint16_t did = p.field_by_field ? p.set.fields.front().did.value_or(0) : p.set_in_force.value_or(0);
-  constexpr Requirement written{"set.write_over", writing, "What is there is written again, and read back as written.",
-                                Mode::open, true};
+  const std::string_view clause = clause_of_writing(p, did);
+  const Requirement written{"set.write_over", clause, "What is there is written again, and read back as written.",
+                            Mode::open, true};
   const RecordExchange told = read_record(c, did);
   if (!told.record) {
     return c.not_tried(written, fmt::format("it cannot be read: {}", words(told.exchange)));
   }
   const Bytes held = *told.record;
-  c.refused({"set.too_short", writing, "A record of coefficients that is too short is refused.", Mode::open, true},
+  c.refused({"set.too_short", clause, "A record of coefficients that is too short is refused.", Mode::open, true},
             without_last(write_request_of(p, did, held)), {Nrc::incorrect_message_length});
   try_write(c, written, did, held);
 }
@@ -163,8 +170,9 @@ void try_writing_over(Conformance& c) {
 void try_set(Conformance& c) {
   const profile::Profile& p = c.profile();
   const auto record = p.set_in_force ? read_record(c, *p.set_in_force).record : tl::unexpected(Error{});
-  constexpr Requirement written{"set.write", writing,
-                                "A set is written into the inactive slot, and read back as written.", Mode::open, true};
+  const std::string_view clause = p.set_inactive ? clause_of_writing(p, *p.set_inactive) : writing;
+  const Requirement written{"set.write", clause, "A set is written into the inactive slot, and read back as written.",
+                            Mode::open, true};
   if (!record || !p.set_inactive || !c.permission().write) {
     return c.not_tried(written, c.permission().write ? "no set in force can be read" : "needs --write");
   }
@@ -177,7 +185,7 @@ void try_set(Conformance& c) {
   if (p.erase.id) {
     try_erase(c, {"set.erase", routines, "The inactive slot is erased.", Mode::open, true});
   }
-  c.refused({"set.too_short", writing, "A set that is too short is refused.", Mode::open, true},
+  c.refused({"set.too_short", clause, "A set that is too short is refused.", Mode::open, true},
             without_last(write_request_of(p, *p.set_inactive, set)), {Nrc::incorrect_message_length});
   const bool judged = !in_memory(p, *p.set_inactive);  // what is written into memory the INS need not look at
   if (p.set.checksum && judged) {
