@@ -100,22 +100,30 @@ class DeviceCheck(unittest.TestCase):
             document = self.check(*self.where[name])
         return document
 
+    def failed_of(self, name, requirement):
+        """What a deviating server fails. Where one answer comes seconds late, the ones behind it are taken for answers to something else:
+        the deviation must be named alone then."""
+        failed = {r["id"]: r for r in self.found[name].result()["requirements"] if r["verdict"] == "fails"}
+        if requirement not in failed and any("answers something else" in r["came"] for r in failed.values()):
+            concurrent.futures.wait(self.found.values())
+            print(f"{name}: late beside {len(self.found) - 1} others; alone:", flush=True)
+            failed = {r["id"]: r for r in self.check(*self.where[name])["requirements"] if r["verdict"] == "fails"}
+        return failed
+
     def test_deviations(self):
-        found = {name: self.found[name] for name in deviating_ins.DEVIATIONS}
         sound = self.judged_of_sound(None)
         self.assertEqual([r for r in sound["requirements"] if r["verdict"] != "holds"], [])
         named = 0
-        for name, future in found.items():
-            what, requirement = deviating_ins.DEVIATIONS[name]
-            failed = {r["id"]: r for r in future.result()["requirements"] if r["verdict"] == "fails"}
+        for name, (what, requirement) in deviating_ins.DEVIATIONS.items():
+            failed = self.failed_of(name, requirement)
             with self.subTest(name):
                 self.assertIn(requirement, failed, f"{what}; named instead: {sorted(failed)}")
                 r = failed[requirement]
                 print(f"{name}: {what}. {r['id']} ({r['clause']}): sent {r['sent']}; expected {r['expected']}; "
                       f"came {r['came']}; {len(failed) - 1} others fail with it", flush=True)
                 named += 1
-        print(f"{named} of {len(found)} deviations named; the sound server: {sound['holds']} requirements hold, 0 fail", flush=True)
-        self.assertGreaterEqual(len(found), 20)
+        print(f"{named} of {len(deviating_ins.DEVIATIONS)} deviations named; the sound server: {sound['holds']} requirements hold, 0 fail", flush=True)
+        self.assertGreaterEqual(len(deviating_ins.DEVIATIONS), 20)
 
     def test_the_virtual_ins_is_sound(self):
         """It shares no line with the server in Python; without a run it has no raw data to upload."""
