@@ -176,6 +176,24 @@ TEST_F(Moves, OneAfterTheOtherByState) {
   EXPECT_EQ(moves_.phase(), Phase::over);
 }
 
+// Two dwells of 2 s and a move of 1 s; a move that takes longer leaves no less.
+TEST_F(Moves, WhatIsLeftIsTheSchedules) {
+  EXPECT_EQ(moves_.left_s(0.0), 0.0);
+  begin(false);
+  EXPECT_DOUBLE_EQ(moves_.left_s(0.0), 5.0);
+  EXPECT_DOUBLE_EQ(moves_.left_s(1.5), 3.5);
+  EXPECT_DOUBLE_EQ(moves_.left_s(2.5), 3.0);  // nobody has looked since
+  EXPECT_TRUE(at(20, 0.0));
+  EXPECT_DOUBLE_EQ(moves_.left_s(2.0), 3.0);
+  EXPECT_DOUBLE_EQ(moves_.left_s(4.0), 3.0);
+  tell(35, FrameState::idle);
+  tell(40, FrameState::idle);
+  ASSERT_EQ(moves_.phase(), Phase::dwelling);
+  EXPECT_DOUBLE_EQ(moves_.left_s(4.5), 1.5);
+  EXPECT_FALSE(at(60, 0.0));
+  EXPECT_EQ(moves_.left_s(6.0), 0.0);
+}
+
 TEST_F(Moves, WhatIsNotReachedIsTold) {
   begin(true);
   at(20, 0.0);
