@@ -118,6 +118,25 @@ class DeviceProbe(unittest.TestCase):
         told = {d["did"] for d in document["found"][0]["dids"]}
         self.assertEqual(told, {0xFD00, 0xFD01, 0xFD10, 0xFD11, 0xFD12, 0xFD20, 0xFD21, 0xFD30, 0xFD31, 0xFD32})
 
+    def test_records_in_memory(self):
+        """Those that the profile has, part by part, and no other address."""
+        self.start_ins("addresses.toml")
+        time.sleep(2.0)
+        bus = Bus("vcan0")
+        bus.start()
+        status, document = self.probe("--profile", PROFILES / "addresses.toml", "--only", "--listen", "0.1")
+        frames = bus.end()
+        self.assertEqual(status, 0)
+        told = {place["name"]: place for place in document["found"][0]["memory"]}
+        self.assertEqual({name: len(bytes.fromhex(place.get("record", ""))) for name, place in told.items()},
+                         {"identity.serial": 16, "identity.software": 12, "state": 12, "schedule": 0, "site": 24, "directory": 20,
+                          "sample_format": 12, "coefficients.in_force": 204})
+        self.assertEqual(told["schedule"]["nrc"], 0x22)  # none was written
+        asked = [data for _, data in sent_by_tester(frames, {0x5A8}) if not harmless(data)]
+        self.assertEqual(sorted(data[:7].hex() for data in asked), sorted(
+            ["06231304000010", "0623130400100c", "0623130401000c", "06231304020040", "06231304040018", "06231304050014", "0623130406000c"]
+            + [f"06231304{at:04x}{size:02x}" for at, size in ((0x8000, 64), (0x8040, 64), (0x8080, 64), (0x80C0, 12))]))
+
     def test_behind_an_address_byte(self):
         profile = self.folder / "extended.toml"
         profile.write_text(profile_case.addressed(profile_case.EXTENDED), encoding="utf-8")
