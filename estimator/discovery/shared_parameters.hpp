@@ -1,13 +1,13 @@
 // What of the 24 is common to several recordings of one unit. The data decide.
 //
 // Stacked, the 24 of R recordings and the laws' coefficients are one Gaussian vector: theta_r = theta_r0 + S_r c, with c
-// common. That two recordings share a parameter is a linear condition on it, D x = 0, tested by the square of D x in units of
-// its covariance and imposed, where it holds, by conditioning: x - C D' (D C D')^-1 D x.
+// common. That two recordings share a parameter is a linear condition on it (joint_gaussian.hpp), imposed where it holds.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
+#include "estimator/discovery/joint_gaussian.hpp"
 #include "estimator/discovery/law_fit.hpp"
 
 namespace selfcal::discovery {
@@ -33,5 +33,11 @@ struct SharedParameters {
 
 // `rate`: at which one of the two conditions is refused although it holds.
 SharedParameters share_parameters(const LawFit& fit, double rate = 0.01);
+
+// The same in two steps, for a vector of the 24 of `recordings` and what else stands behind them. Decides, and imposes on `all`
+// what holds: the decisions.
+SharedParameters share(JointGaussian& all, std::size_t recordings, double rate = 0.01);
+// The 24 as `all` has them.
+void read_parameters(const JointGaussian& all, std::size_t recordings, SharedParameters& result);
 
 }  // namespace selfcal::discovery

@@ -26,17 +26,8 @@ class BlockSignatures : public ExtraSignatures {
              Eigen::Ref<Eigen::Matrix3Xd> angle) override {
     const EffectContext c = context_.of(block);
     for (const Candidate& candidate : candidates_) {
-      if (candidate.effect->sensor == nullptr) {
-        continue;
-      }
-      candidate.effect->sensor(c, candidate.constant, velocity.middleCols(candidate.first, candidate.count),
-                               angle.middleCols(candidate.first, candidate.count));
-      const double factor = candidate.modulation == nullptr ? 1.0 : candidate.modulation(c);
-      for (int k = 0; k < candidate.count; ++k) {
-        const EffectParameter& p = candidate.effect->parameters[static_cast<std::size_t>(k)];
-        velocity.col(candidate.first + k) *= factor * p.typical * p.si_per_unit;
-        angle.col(candidate.first + k) *= factor * p.typical * p.si_per_unit;
-      }
+      add_signature(candidate, c, velocity.middleCols(candidate.first, candidate.count),
+                    angle.middleCols(candidate.first, candidate.count));
     }
     if (!map_.empty()) {
       map_columns(block, c, velocity, angle);
@@ -246,6 +237,19 @@ void Correction::add(const Effect& effect, double constant, const Eigen::VectorX
     effects.push_back({&effect, constant, static_cast<int>(first), static_cast<int>(own.size())});
     size.conservativeResize(first + own.size());
     size.tail(own.size()) = own;
+  }
+}
+
+void add_signature(const Candidate& candidate, const EffectContext& context, Columns velocity, Columns angle) {
+  if (candidate.effect->sensor == nullptr) {
+    return;
+  }
+  candidate.effect->sensor(context, candidate.constant, velocity, angle);
+  const double factor = candidate.modulation == nullptr ? 1.0 : candidate.modulation(context);
+  for (int k = 0; k < candidate.count; ++k) {
+    const EffectParameter& p = candidate.effect->parameters[static_cast<std::size_t>(k)];
+    velocity.col(k) *= factor * p.typical * p.si_per_unit;
+    angle.col(k) *= factor * p.typical * p.si_per_unit;
   }
 }
 

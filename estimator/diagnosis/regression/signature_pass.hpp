@@ -25,6 +25,10 @@ struct Candidate {
   Modulation modulation = nullptr;  // none: the effect as its equation says
 };
 
+// Adds the candidate's columns over one stretch, per typical size; [candidate.count] columns each, zero before. Nothing for what is
+// no sensor's.
+void add_signature(const Candidate& candidate, const EffectContext& context, Columns velocity, Columns angle);
+
 std::vector<int> columns_of(const Candidate& candidate);
 // Of all of them, but of that number `without`.
 std::vector<int> columns_of(const std::vector<Candidate>& candidates,
