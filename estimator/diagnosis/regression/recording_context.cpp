@@ -3,7 +3,9 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace selfcal::diagnosis {
@@ -38,6 +40,13 @@ double rate_runs_out(const std::vector<double>& time, const std::vector<double>&
   const double misfit_smooth = ((A * root).array().square() + stretch - w.array()).matrix().norm();
   const Eigen::Vector2d& best = misfit_even < misfit_smooth ? even : root;
   return time.front() - best(0) / best(1);
+}
+
+// A read-out is that of the end of its sample: of an odd number of samples the middle lies between two of them.
+double angle_in_the_middle(std::span<const double> angle, const SensorBlock& block) {
+  const std::size_t ends = block.first + block.last;
+  const double before = angle[ends > 1 ? (ends - 2) / 2 : 0], after = angle[(ends - 1) / 2];
+  return before + 0.5 * std::remainder(after - before, 2.0 * std::numbers::pi);
 }
 
 }  // namespace
@@ -171,10 +180,9 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
     c.since_turn_end_s = block.end_s - next[-1].end_s;
   }
   c.turning = next != turns_.end() && 0.5 * (block.start_s + block.end_s) > next->start_s;
-  const std::size_t middle = (block.first + block.last) / 2;
   if (!data_.gimbal_outer.empty() && !data_.gimbal_inner.empty()) {
-    c.outer = data_.gimbal_outer[middle];
-    c.inner = data_.gimbal_inner[middle];
+    c.outer = angle_in_the_middle(data_.gimbal_outer, block);
+    c.inner = angle_in_the_middle(data_.gimbal_inner, block);
   }
   if (has_temperature()) {
     double sum = 0.0;
