@@ -160,8 +160,13 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   if (taken.size() == 1 && !first.unexplained) {
     return std::nullopt;
   }
+  const auto joint = fit_together(*rest, answer.found, stop);
+  if (!joint) {
+    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, joint.error()));
+  }
   if (files.size() > 1) {
-    answer.together = put_together(files, *rest, answer.found);
+    answer.together = put_together(files, *rest, **joint);
+    answer.joint = *joint;
   }
   progress();
   discovery::ExperimentLimits limits;
@@ -243,6 +248,7 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
   document["amends"] = request.amends.run;
   if (beyond && beyond->together) {
     document["together"] = together_json(*beyond->together);
+    document["fitted_effects"] = fitted_effects_json(*beyond->joint);
   }
   if (beyond) {
     add_next_experiment(document, beyond->next);

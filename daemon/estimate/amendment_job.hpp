@@ -30,7 +30,8 @@ struct AmendmentRequest {
 // What the search for laws says, in one recording or in several of the unit.
 struct BeyondAnswer {
   discovery::Discovery found;
-  std::optional<Together> together;  // several
+  std::optional<Together> together;          // several
+  std::optional<discovery::JointFit> joint;  // of them
   std::optional<discovery::NextExperiment> next;
 };
 

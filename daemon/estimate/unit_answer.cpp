@@ -1,10 +1,13 @@
 #include "daemon/estimate/unit_answer.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
 
@@ -18,8 +21,23 @@ std::vector<discovery::DiagnosedRecording> recordings_of(std::span<const Diagnos
   return all;
 }
 
+tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const discovery::UnexplainedRest& rest,
+                                                                           discovery::Discovery& found,
+                                                                           const std::stop_token& stop) {
+  const bool one = rest.recordings().size() == 1;
+  if (one && (rest.taken_out().empty() || found.fit.terms.empty())) {
+    return std::nullopt;
+  }
+  auto joint = rest.beside(found.fit.terms, found.fit.coefficient, stop);
+  if (!joint) {
+    return tl::unexpected(joint.error());
+  }
+  discovery::adopt(*joint, found);
+  return std::move(*joint);
+}
+
 Together put_together(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
-                      const discovery::Discovery& found) {
+                      const discovery::JointFit& joint) {
   Together together;
   for (const DiagnosedFile& r : recordings) {
     together.recordings.push_back({r.file, r.diagnosis.verdict, {}});
@@ -30,7 +48,7 @@ Together put_together(std::span<const DiagnosedFile> recordings, const discovery
   for (const diagnosis::Effect* effect : rest.taken_out()) {
     together.taken_out.emplace_back(effect->id);
   }
-  together.shared = discovery::share_parameters(found.fit);
+  together.shared = joint.shared;
   return together;
 }
 
@@ -46,6 +64,66 @@ std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::Un
     }
   }
   return next;
+}
+
+namespace {
+
+ordered_json fitted_json(const diagnosis::Effect& effect, const discovery::EffectFit& fit) {
+  ordered_json parameters = ordered_json::array();
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    const diagnosis::EffectParameter& p = effect.parameters[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    parameters.push_back({{"name", p.name},
+                          {"unit", p.unit},
+                          {"value", fit.size(at) * p.typical},
+                          {"sigma", fit.sigma(at) * p.typical}});
+  }
+  if (!std::isnan(fit.constant)) {
+    parameters.push_back({{"name", effect.constant.name},
+                          {"unit", effect.constant.unit},
+                          {"value", fit.constant},
+                          {"sigma", fit.constant_sigma}});
+  }
+  return {{"recording", fit.recording}, {"parameters", parameters}};
+}
+
+}  // namespace
+
+ordered_json fitted_effects_json(const discovery::JointFit& joint) {
+  ordered_json all = ordered_json::array();
+  for (std::size_t e = 0; e < joint.effects.size(); ++e) {
+    const discovery::FittedEffect& effect = joint.effects[e];
+    ordered_json each = ordered_json::array(), differing = ordered_json::array(), entangled = ordered_json::array();
+    for (const discovery::EffectFit& fit : effect.each) {
+      each.push_back(fitted_json(*effect.effect, fit));
+    }
+    for (std::size_t k = 0; k < effect.common.size(); ++k) {
+      if (!effect.common[k]) {
+        differing.push_back(name_of_coefficient(*effect.effect, static_cast<int>(k)));
+      }
+    }
+    for (const discovery::Entangled& one : joint.entangled) {
+      if (one.effect == e) {
+        entangled.push_back({{"law", fmt::format("{} {}", name_of_axis(one.axis), one.expression)},
+                             {"recording", one.recording},
+                             {"name", name_of_coefficient(*effect.effect, one.coefficient)},
+                             {"correlation", one.correlation}});
+      }
+    }
+    all.push_back({{"effect", effect.effect->id},
+                   {"common", effect.all_common()},
+                   {"log_p_common", effect.log_p_common},
+                   {"log_p_none", effect.log_p_none},
+                   {"free", differing},
+                   {"recordings", each},
+                   {"entangled", entangled}});
+  }
+  return all;
+}
+
+std::string name_of_coefficient(const diagnosis::Effect& effect, int coefficient) {
+  const auto at = static_cast<std::size_t>(coefficient);
+  return at < effect.parameters.size() ? effect.parameters[at].name : std::string(effect.constant.name);
 }
 
 ordered_json together_json(const Together& together) {

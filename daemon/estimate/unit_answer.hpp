@@ -4,10 +4,13 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
+#include <tl/expected.hpp>
 #include <vector>
 
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/joint_fit.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "estimator/discovery/next_experiment.hpp"
 #include "estimator/discovery/shared_parameters.hpp"
@@ -32,11 +35,17 @@ struct Together {
   };
   std::vector<Recording> recordings;   // the first is the one that the document is about
   std::vector<std::string> taken_out;  // effects that were named and are taken out of the recordings
-  discovery::SharedParameters shared;
+  discovery::SharedParameters shared;  // with the effects and laws fitted beside
 };
 
+// Named effects and the laws of `found` fitted together, with the 24 that the recordings share; `found` has its coefficients from there
+// afterwards. None for one recording that has not both. The failure is that of a calibration, or "stopped".
+tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const discovery::UnexplainedRest& rest,
+                                                                           discovery::Discovery& found,
+                                                                           const std::stop_token& stop = {});
+
 Together put_together(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
-                      const discovery::Discovery& found);
+                      const discovery::JointFit& joint);
 
 // The experiment for the law whose closest rival is nearest now.
 std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::UnitRecording> unit,
@@ -45,6 +54,10 @@ std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::Un
                                                    const std::stop_token& stop = {});
 
 nlohmann::ordered_json together_json(const Together& together);
+// For people; of an effect's coefficient, or of its constant behind them.
+std::string name_of_coefficient(const diagnosis::Effect& effect, int coefficient);
+// "fitted_effects" of the document: the effects of the joint fit.
+nlohmann::ordered_json fitted_effects_json(const discovery::JointFit& joint);
 // "next_experiment" of the document, where there is one.
 void add_next_experiment(nlohmann::ordered_json& document, const std::optional<discovery::NextExperiment>& next);
 

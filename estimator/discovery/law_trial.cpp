@@ -151,6 +151,11 @@ Started started(std::vector<LawTerm> laws, const std::vector<std::unique_ptr<Sce
   return result;
 }
 
+double significance_of(const TriedLaw& law) {
+  const double degrees = 1.0 + static_cast<double>(law.constants.size());
+  return sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + law.log_peaks));
+}
+
 }  // namespace
 
 tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
@@ -185,15 +190,39 @@ tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const Un
     }
     law.gain = fit.gain[k];
     law.held_out_gain = fit.held_out_gain[k];
-    const double degrees = 1.0 + static_cast<double>(law.constants.size());
-    law.significance =
-        sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + std::log(start.peaks[k])));
+    law.log_peaks = std::log(start.peaks[k]);
+    law.significance = significance_of(law);
     law.share = std::clamp(law.gain / std::max(1.0, fit.square_before - fit.rows), 0.0, 1.0);
     law.stated = stated[k];
     law.collinear = fit.collinear[k];
     tried.push_back(std::move(law));
   }
   return tried;
+}
+
+void adopt(const JointFit& joint, std::vector<TriedLaw>& tried) {
+  auto constant = static_cast<Eigen::Index>(tried.size());
+  for (std::size_t k = 0; k < tried.size(); ++k) {
+    TriedLaw& law = tried[k];
+    const auto row = static_cast<Eigen::Index>(k);
+    const double alone = law.coefficient / law.sigma;
+    law.coefficient = joint.shared.coefficient(row);
+    law.sigma = std::sqrt(std::max(0.0, joint.shared.coefficient_covariance(row, row)));
+    for (Constant& c : law.constants) {
+      c.sigma = std::sqrt(std::max(0.0, joint.shared.coefficient_covariance(constant, constant)));
+      ++constant;
+    }
+    // The fall of the square goes with the square of the coefficient in its sigma.
+    const double together = law.coefficient / law.sigma;
+    law.gain *= alone != 0.0 ? together * together / (alone * alone) : 0.0;
+    law.significance = significance_of(law);
+    for (const Entangled& e : joint.entangled) {
+      if (e.law == k) {
+        const diagnosis::Effect& effect = *joint.effects[e.effect].effect;
+        law.shares_with.push_back(effect.id + " " + effect.parameters[static_cast<std::size_t>(e.coefficient)].name);
+      }
+    }
+  }
 }
 
 }  // namespace selfcal::discovery

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/joint_fit.hpp"
 
 namespace selfcal::discovery {
 
@@ -20,6 +21,9 @@ struct TriedLaw {
   double gain = 0.0, held_out_gain = 0.0, share = 0.0;
   double stated = 0.0;     // the file's coefficient; NaN: none
   double collinear = 0.0;  // share of its information that the other laws and the constants take, 0 to 1
+  double log_peaks = 0.0;  // of the peaks that free constants had to choose from
+  std::vector<std::string>
+      shares_with;  // "effect coefficient": of an effect that was named, where the data tell a combination
 };
 
 struct LawTrialFailure {
@@ -33,5 +37,8 @@ struct LawTrialFailure {
 tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const UnitRecording> recordings,
                                                               const std::vector<LawTerm>& laws,
                                                               const std::vector<double>& stated);
+
+// Coefficient, sigma and significance as the joint fit with the effects that were named has them; its laws are these.
+void adopt(const JointFit& joint, std::vector<TriedLaw>& tried);
 
 }  // namespace selfcal::discovery

@@ -11,6 +11,7 @@
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/diagnosis/regression/corrected_recording.hpp"
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/joint_fit.hpp"
 
 namespace selfcal::discovery {
 
@@ -20,13 +21,13 @@ struct DiagnosedRecording {
   const diagnosis::Diagnosis& diagnosis;
 };
 
-// Recordings of one unit, less what was named, calibrated anew. An effect is taken out of a recording that named it. Where the
-// catalogue explains some of the recordings and leaves another unexplained, only what all of them name is taken out: a name that
-// one recording gives may stand for the law that the other one lacks, and one unit has one physics. Motions of the base and noise stay:
-// they are in the calibrations.
+// Recordings of one unit, less what was named, calibrated anew. Of one recording an effect is taken out as it was named; of several,
+// as fitted together (joint_fit.hpp) on all of them that can hold it, whether they named it or not. Where the catalogue explains some of the
+// recordings and leaves another unexplained, only what all of them name is taken out: a name that one recording gives may stand for the law
+// that the other one lacks, and one unit has one physics. Motions of the base and noise stay: they are in the calibrations.
 class UnexplainedRest {
  public:
-  // The failure is that of a calibration, or "stopped".
+  // The failure is that of a calibration, or "stopped". What `unit` refers to must outlive this.
   static tl::expected<UnexplainedRest, std::string> of(std::span<const DiagnosedRecording> unit,
                                                        const std::stop_token& stop = {});
 
@@ -34,11 +35,17 @@ class UnexplainedRest {
   // Of the catalogue, each once.
   const std::vector<const diagnosis::Effect*>& taken_out() const { return taken_out_; }
 
+  // What was taken out fitted anew beside these laws, all of it together on all recordings. Failures as above.
+  tl::expected<JointFit, std::string> beside(const std::vector<LawTerm>& laws, const Eigen::VectorXd& coefficient,
+                                             const std::stop_token& stop = {}) const;
+
  private:
   std::vector<std::unique_ptr<diagnosis::CorrectedRecording>> corrected_;
   std::vector<std::unique_ptr<CalibrationResult>> calibrations_;
   std::vector<UnitRecording> recordings_;
   std::vector<const diagnosis::Effect*> taken_out_;
+  std::vector<JointRecording> unit_;
+  JointStart start_;  // the effects
 };
 
 }  // namespace selfcal::discovery

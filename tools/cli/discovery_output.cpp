@@ -18,6 +18,7 @@ using discovery::Discovery;
 using nlohmann::ordered_json;
 
 constexpr std::size_t members_shown = 6;
+constexpr double not_there = 0.01;  // p above which a named effect is nothing once all is fitted together
 
 // Two digits of sigma, and the value to the same place.
 std::string with_sigma(double value, double sigma, std::string_view unit) {
@@ -145,6 +146,38 @@ std::string shared_text(const char* what, bool shared, double log_p) {
                      p_text(log_p));
 }
 
+// One line a coefficient; common ones once, the others for each recording.
+std::string fitted_text(const discovery::FittedEffect& effect) {
+  const diagnosis::Effect& e = *effect.effect;
+  const bool several = effect.each.size() > 1;
+  std::string text =
+      fmt::format("  {}{}\n", e.id,
+                  !several ? ""
+                  : effect.all_common()
+                      ? fmt::format(": the same in all recordings that can hold it ({})", p_text(effect.log_p_common))
+                      : fmt::format(": not the same in all recordings ({})", p_text(effect.log_p_common)));
+  if (effect.log_p_none > std::log(not_there)) {
+    return text +
+           fmt::format("    nothing is left of it when all is fitted together ({})\n", p_text(effect.log_p_none));
+  }
+  for (std::size_t k = 0; k < effect.common.size(); ++k) {
+    const bool common = effect.common[k];
+    for (const discovery::EffectFit& fit : effect.each) {
+      const auto at = static_cast<Eigen::Index>(k);
+      const bool constant = k == e.parameters.size();
+      const diagnosis::EffectParameter& p = e.parameters[constant ? 0 : k];
+      text += fmt::format("    {}{}: {}\n", name_of_coefficient(e, static_cast<int>(k)),
+                          common ? "" : fmt::format(", recording {}", fit.recording + 1),
+                          constant ? with_sigma(fit.constant, fit.constant_sigma, e.constant.unit)
+                                   : with_sigma(fit.size(at) * p.typical, fit.sigma(at) * p.typical, p.unit));
+      if (common) {
+        break;
+      }
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string together_text(const Together& together) {
@@ -173,6 +206,20 @@ std::string together_text(const Together& together) {
                     d.recording + 1);
   }
   return text;
+}
+
+std::string effects_text(const discovery::JointFit& joint) {
+  std::string text;
+  for (const discovery::FittedEffect& effect : joint.effects) {
+    text += fitted_text(effect);
+  }
+  for (const discovery::Entangled& e : joint.entangled) {
+    const diagnosis::Effect& effect = *joint.effects[e.effect].effect;
+    text += fmt::format("  {} {} and {} = {} share their evidence (correlation {:.2f}); the sigma of each holds it\n",
+                        effect.id, name_of_coefficient(effect, e.coefficient), name_of_axis(e.axis), e.expression,
+                        e.correlation);
+  }
+  return text.empty() ? text : "named effects, fitted together with the laws and the 24 of each recording\n" + text;
 }
 
 std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
@@ -216,6 +263,10 @@ std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {
       text += fmt::format("    stated: {:.6g} {}, {:.1f} sigma from what this recording says\n", law.stated,
                           unit_of_axis(law.term.axis), std::abs(law.stated - law.coefficient) / law.sigma);
     }
+    if (!law.shares_with.empty()) {
+      text += fmt::format("    shares its evidence with {}: its sigma holds what they leave open\n",
+                          fmt::join(law.shares_with, ", "));
+    }
     if (law.collinear > 0.99) {
       text += "    nearly collinear with the other laws or with its own constants: its sigma says how little is seen\n";
     }
@@ -235,7 +286,8 @@ ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried) {
                       {"significance", law.significance},
                       {"held_out_gain", law.held_out_gain},
                       {"share", law.share},
-                      {"collinear", law.collinear}};
+                      {"collinear", law.collinear},
+                      {"shares_with", law.shares_with}};
     if (std::isfinite(law.stated)) {
       j["stated"] = law.stated;
     }

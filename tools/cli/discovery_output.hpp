@@ -15,6 +15,8 @@
 namespace selfcal::cli {
 
 std::string together_text(const Together& together);
+// Named effects fitted together on all recordings, and beside the laws. Empty where none was.
+std::string effects_text(const discovery::JointFit& joint);
 std::string discovery_text(const discovery::Discovery& found, const std::optional<discovery::NextExperiment>& next);
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried);
 nlohmann::ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried);

@@ -47,16 +47,29 @@ Expected<LawsToTry> read_terms(const std::string& file) {
   return laws;
 }
 
-Expected<void> try_them(const std::string& file, std::span<const discovery::UnitRecording> unit,
-                        BeyondCatalogue& result) {
+// Beside what was named, all of it fitted anew.
+Expected<void> try_them(const std::string& file, const discovery::UnexplainedRest& rest, BeyondCatalogue& result) {
   const Expected<LawsToTry> laws = read_terms(file);
   if (!laws) {
     return tl::unexpected(laws.error());
   }
-  auto tried = discovery::try_laws(unit, laws->terms, laws->stated);
+  auto tried = discovery::try_laws(rest.recordings(), laws->terms, laws->stated);
   if (!tried) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: law {}: expression: {}", file, tried.error().law + 1, tried.error().words));
+  }
+  if (rest.recordings().size() > 1 || !rest.taken_out().empty()) {
+    std::vector<discovery::LawTerm> terms;
+    Eigen::VectorXd coefficient(static_cast<Eigen::Index>(tried->size()));
+    for (const discovery::TriedLaw& law : *tried) {
+      coefficient(static_cast<Eigen::Index>(terms.size())) = law.coefficient;
+      terms.push_back(law.term);
+    }
+    const auto joint = rest.beside(terms, coefficient);
+    if (!joint) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, joint.error()));
+    }
+    discovery::adopt(*joint, *tried);
   }
   result.tried = std::move(*tried);
   return {};
@@ -92,7 +105,7 @@ void add_discovery_options(Options& options, DiscoveryArguments& arguments) {
 }
 
 std::string BeyondCatalogue::text() const {
-  return (together ? together_text(*together) : std::string()) +
+  return (together ? together_text(*together) : std::string()) + (joint ? effects_text(*joint) : std::string()) +
          (found ? discovery_text(*found, next) : std::string()) + (tried.empty() ? std::string() : trial_text(tried));
 }
 
@@ -100,6 +113,9 @@ void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {
   add_next_experiment(document, next);
   if (together) {
     document["together"] = together_json(*together);
+  }
+  if (joint) {
+    document["fitted_effects"] = fitted_effects_json(*joint);
   }
   if (!tried.empty()) {
     document["laws"] = trial_json(tried);
@@ -120,7 +136,7 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
     return fail(ErrorKind::bad_input, rest.error());
   }
   if (!arguments.laws.empty()) {
-    if (const auto tried = try_them(arguments.laws, rest->recordings(), result); !tried) {
+    if (const auto tried = try_them(arguments.laws, *rest, result); !tried) {
       return tl::unexpected(tried.error());
     }
   }
@@ -131,8 +147,13 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
       result.found.reset();
       return result;
     }
+    auto joint = fit_together(*rest, *result.found);
+    if (!joint) {
+      return fail(ErrorKind::bad_input, joint.error());
+    }
+    result.joint = std::move(*joint);
     if (recordings.size() > 1) {
-      result.together = put_together(recordings, *rest, *result.found);
+      result.together = put_together(recordings, *rest, *result.joint);
     }
     if (const auto planned = plan_and_write(arguments.next_experiment, rest->recordings(), result); !planned) {
       return tl::unexpected(planned.error());

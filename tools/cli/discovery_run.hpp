@@ -27,6 +27,7 @@ void add_discovery_options(Options& options, DiscoveryArguments& arguments);
 
 struct BeyondCatalogue {
   std::optional<discovery::Discovery> found;
+  std::optional<discovery::JointFit> joint;  // of several recordings, or of effects and laws
   std::optional<Together> together;
   std::optional<discovery::NextExperiment> next;
   std::vector<discovery::TriedLaw> tried;
@@ -36,7 +37,7 @@ struct BeyondCatalogue {
   const discovery::Discovery* found_or_null() const { return found ? &*found : nullptr; }
   // The 24 of the first recording with what was found; with what all recordings share imposed, where there are several.
   ParameterVector parameters() const {
-    return together ? together->shared.parameters.front() : found->fit.recordings.front().parameters;
+    return joint ? joint->shared.parameters.front() : found->fit.recordings.front().parameters;
   }
   std::string text() const;
   void add_to(nlohmann::ordered_json& document) const;
