@@ -45,6 +45,16 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
                       : fmt::format("{} and {} {}", fmt::join(axes, ", "), last, several);
 }
 
+// Of what explains the recordings as well, what differs on another plan or another base.
+std::size_t others_elsewhere(const DiscoveredLaw& law) {
+  std::size_t others = law.ambiguous.size() - std::min<std::size_t>(1, law.ambiguous.size());
+  for (const discovery::ClassMember& m : law.ambiguous) {
+    others += static_cast<std::size_t>(
+        std::count_if(m.also.begin(), m.also.end(), [](const discovery::OtherWords& w) { return w.only_here; }));
+  }
+  return others;
+}
+
 ordered_json law_json(const DiscoveredLaw& law) {
   ordered_json constants = ordered_json::object();
   for (const discovery::Constant& c : law.constants) {
@@ -52,11 +62,18 @@ ordered_json law_json(const DiscoveredLaw& law) {
   }
   ordered_json members = ordered_json::array();
   for (const discovery::ClassMember& m : law.ambiguous) {
-    ordered_json also = ordered_json::array();
+    ordered_json also = ordered_json::array(), only_here = ordered_json::array();
     for (const discovery::OtherWords& other : m.also) {
       also.push_back(other.expression);
+      if (other.only_here) {
+        only_here.push_back(other.expression);
+      }
     }
-    members.push_back({{"expression", m.expression}, {"axis", name_of_axis(m.axis)}, {"odds", m.odds}, {"also", also}});
+    members.push_back({{"expression", m.expression},
+                       {"axis", name_of_axis(m.axis)},
+                       {"odds", m.odds},
+                       {"also", also},
+                       {"only_here", only_here}});
   }
   ordered_json document = {{"axis", name_of_axis(law.term.axis)},
                            {"expression", law.expression},
@@ -137,8 +154,7 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* 
 std::string discovered_words(const Discovery& found) {
   std::vector<std::string> all;
   for (const DiscoveredLaw& law : found.laws) {
-    const std::size_t others =
-        law.carries_over < sure ? law.ambiguous.size() - std::min<std::size_t>(1, law.ambiguous.size()) : 0;
+    const std::size_t others = law.carries_over < sure ? others_elsewhere(law) : 0;
     all.push_back(fmt::format("{} follows {}{}", name_of_axis(law.term.axis), law.expression,
                               others > 0 ? fmt::format(" or one of {} others", others) : std::string()));
   }

@@ -50,7 +50,8 @@ double left(const Eigen::MatrixXd& G, const std::vector<PossibleLaw>& laws, std:
 CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& laws, const std::stop_token& stop) {
   const std::size_t n = laws.size();
   const auto rows = static_cast<Eigen::Index>(n);
-  CarryOver result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0), Eigen::MatrixXd::Zero(rows, rows)};
+  CarryOver result{std::vector<double>(n, 0.0), std::vector<double>(n, 0.0), Eigen::MatrixXd::Zero(rows, rows),
+                   Eigen::MatrixXd::Zero(rows, rows)};
   std::vector<LawTerm> terms;
   double total = 0.0;
   for (const PossibleLaw& law : laws) {
@@ -68,6 +69,9 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
     vehicle.pitch += one.pitch;
     const Eigen::MatrixXd G = planned_information(one.plan, like, vehicle, terms, stop);
     result.information += G;
+    if (n > 1) {
+      result.here += planned_information(one.plan, like, like.calibration.initial_attitude, terms, stop);
+    }
     for (std::size_t a = 0; a < n; ++a) {
       for (std::size_t b = 0; b < n; ++b) {
         const double share = a == b ? 0.0 : left(G, laws, a, b);
@@ -81,9 +85,10 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
   return result;
 }
 
-bool one_function(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
+namespace {
+
+bool alike(const Eigen::MatrixXd& G, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
   constexpr double least_share = 0.01;
-  const Eigen::MatrixXd& G = elsewhere.information;
   const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
   if (laws[a].term.axis != laws[b].term.axis || !(G(i, i) > 0.0) || !(G(j, j) > 0.0)) {
     return a == b;
@@ -92,6 +97,16 @@ bool one_function(const CarryOver& elsewhere, const std::vector<PossibleLaw>& la
   const double size =
       std::max(std::pow(laws[a].coefficient, 2.0) * G(i, i), std::pow(laws[b].coefficient, 2.0) * G(j, j));
   return share < least_share && share * size < 1.0;
+}
+
+}  // namespace
+
+bool one_function(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
+  return alike(elsewhere.information, laws, a, b);
+}
+
+bool one_function_here(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b) {
+  return alike(elsewhere.here, laws, a, b);
 }
 
 }  // namespace selfcal::discovery

@@ -24,11 +24,15 @@ struct CarryOver {
   std::vector<double> probability;  // [laws] that at most a tenth of the misfit's power is left on another plan
   std::vector<double> merit;        // [laws] the same with a soft limit: what is compared
   Eigen::MatrixXd information;      // [laws x laws] of the coefficients, on both plans together
+  Eigen::MatrixXd here;             // the same with the vehicle as it stands
 };
 
 // Whether the two are one function in other words: fitted in each other's place they leave less than 1 sigma and less than a
 // hundredth of the power, on all plans that `elsewhere` was asked on.
 bool one_function(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b);
+// The same with the vehicle as it stands. On a level base sin(outer) and a component of gravity are one function whatever the
+// gimbal does.
+bool one_function_here(const CarryOver& elsewhere, const std::vector<PossibleLaw>& laws, std::size_t a, std::size_t b);
 
 // `like`: the unit, its noise and its site. Laws of temperature carry over to themselves only.
 CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& laws, const std::stop_token& stop = {});

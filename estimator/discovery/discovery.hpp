@@ -29,6 +29,8 @@ struct DiscoveryOptions {
 struct OtherWords {
   std::string expression;
   double odds = 0.0;  // as in ClassMember
+  bool only_here =
+      false;  // no rotation tells them apart as long as the base stands as it does; another attitude of it would
 };
 
 struct ClassMember {

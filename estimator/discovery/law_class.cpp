@@ -76,9 +76,14 @@ std::size_t LawClass::place(const Candidate& c) const {
   return static_cast<std::size_t>(found - possible_.begin());
 }
 
-bool LawClass::written_otherwise(const Candidate& a, const Candidate& b) const {
+LawClass::Likeness LawClass::likeness(const Candidate& a, const Candidate& b) const {
   const std::size_t of_a = place(a), of_b = place(b), none = possible_.size();
-  return of_a != none && of_b != none && one_function(elsewhere_, laws_, of_a, of_b);
+  if (of_a == none || of_b == none) {
+    return Likeness::none;
+  }
+  return one_function(elsewhere_, laws_, of_a, of_b)        ? Likeness::anywhere
+         : one_function_here(elsewhere_, laws_, of_a, of_b) ? Likeness::here
+                                                            : Likeness::none;
 }
 
 // `own` stands for its function, and the most probable expression for each other one.
@@ -86,12 +91,12 @@ std::vector<ClassMember> LawClass::functions() const {
   std::vector<std::pair<Candidate, ClassMember>> all;
   for (const Candidate& c : members()) {
     const auto same =
-        std::find_if(all.begin(), all.end(), [&](const auto& one) { return written_otherwise(one.first, c); });
+        std::find_if(all.begin(), all.end(), [&](const auto& one) { return likeness(one.first, c) != Likeness::none; });
     if (same == all.end()) {
       all.push_back({c, {c.text(), c.term.axis, odds(c), {}}});
     } else {
       same->second.odds += odds(c);
-      same->second.also.push_back({c.text(), odds(c)});
+      same->second.also.push_back({c.text(), odds(c), likeness(same->first, c) == Likeness::here});
     }
   }
   const double own_odds = all.front().second.odds;

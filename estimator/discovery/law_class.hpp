@@ -35,7 +35,8 @@ class LawClass {
   bool is_member(const Candidate& c) const;
   std::vector<Candidate> split(bool members) const;
   std::size_t place(const Candidate& c) const;
-  bool written_otherwise(const Candidate& a, const Candidate& b) const;
+  enum class Likeness { none, here, anywhere };
+  Likeness likeness(const Candidate& a, const Candidate& b) const;
 
   Candidate own_;
   std::vector<Candidate> tried_;  // the others, each with its best constant, most probable first

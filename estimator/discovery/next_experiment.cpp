@@ -10,10 +10,10 @@ namespace selfcal::discovery {
 namespace {
 
 constexpr std::size_t most_rivals = 12;  // the most probable of a class
-// A plan that tells less than this share of the class's probability apart settles nothing.
+// A plan that is worth less settles nothing.
 constexpr double least_help = 0.05;
-// Square of the separation from which the odds are beyond 1:100, which a class does not hold, in 19 of 20 recordings.
-constexpr double told_for_sure = 25.0;
+// Odds against the law from which an equation is no member of its class (DiscoveryOptions::least_odds).
+constexpr double least_odds = 0.01;
 
 // The law and its rivals, with the size that each would have and its odds.
 struct Members {
@@ -27,19 +27,31 @@ double left_by(const Eigen::MatrixXd& G, const Members& m, Eigen::Index a, Eigen
   return m.size_squared(a) * std::max(0.0, left);
 }
 
-// Of the probability that two members drawn by their odds are two, the share in which they are told apart: linear in the
-// expected logarithm of the odds until they are told for sure.
-double told_apart(const Eigen::MatrixXd& G, const Members& m) {
-  double told = 0.0, all = 0.0;
+// The probability that b is no member any more when a is the truth. The logarithm of the odds of a against b, as the recordings
+// have them, grows by half of what b leaves more of a, with a variance of all of it.
+double excluded(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with, const Members& m, Eigen::Index a,
+                Eigen::Index b) {
+  const double more = std::max(0.0, left_by(with, m, a, b) - left_by(now, m, a, b));
+  const double wanted = std::log(m.odds(b) / m.odds(a)) - std::log(least_odds);
+  return more > 0.0 ? 0.5 * std::erfc((wanted - 0.5 * more) / std::sqrt(2.0 * more)) : wanted < 0.0 ? 1.0 : 0.0;
+}
+
+// What a plan is worth, each member the truth with its probability: the share of the others that it excludes, and the probability that
+// it excludes them all, half and half. The second alone does not say which way is up where one rival cannot be told.
+double told_apart(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with, const Members& m) {
+  double told = 0.0;
   for (Eigen::Index a = 0; a < m.odds.size(); ++a) {
+    double share = 0.0, all = 1.0;
     for (Eigen::Index b = 0; b < m.odds.size(); ++b) {
       if (a != b) {
-        all += m.odds(a) * m.odds(b);
-        told += m.odds(a) * m.odds(b) * std::min(1.0, left_by(G, m, a, b) / told_for_sure);
+        const double p = excluded(now, with, m, a, b);
+        share += p / static_cast<double>(m.odds.size() - 1);
+        all *= p;
       }
     }
+    told += m.odds(a) / m.odds.sum() * 0.5 * (share + all);
   }
-  return all > 0.0 ? told / all : 1.0;
+  return told;
 }
 
 // The rival that stands behind most of what a plan tells.
@@ -47,8 +59,7 @@ Eigen::Index most_told(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with, 
   Eigen::Index best = 1;
   double most = -1.0;
   for (Eigen::Index b = 1; b < m.odds.size(); ++b) {
-    const double told = m.odds(b) * (std::min(1.0, left_by(with, m, 0, b) / told_for_sure) -
-                                     std::min(1.0, left_by(now, m, 0, b) / told_for_sure));
+    const double told = m.odds(b) * excluded(now, with, m, 0, b);
     if (told > most) {
       most = told;
       best = b;
@@ -93,12 +104,17 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
   members.size_squared = (law.coefficient * law.coefficient * now(0, 0)) *
                          now.diagonal().cwiseMax(1e-12 * now.diagonal().maxCoeff()).cwiseInverse();
   const UnitRecording& last = recordings.back();
-  const double told_now = told_apart(now, members);
+  const double told_now = told_apart(now, now, members);
   const auto with = [&](const Schedule& plan) -> Eigen::MatrixXd {
     return now + planned_information(plan, last, last.calibration.initial_attitude, members.terms, stop);
   };
-  const RatedPlan best = search_plan(
-      limits, told_now, [&](const Schedule& plan) { return told_apart(with(plan), members); }, stop);
+  RatedPlan best = search_plan(
+      limits, told_now, [&](const Schedule& plan) { return told_apart(now, with(plan), members); }, stop);
+  if (best.plan.positions.empty() || best.merit < told_now + least_help) {
+    // What one rotation does not tell two may.
+    best = search_plan(
+        limits, told_now, [&](const Schedule& plan) { return told_apart(now, 2.0 * with(plan) - now, members); }, stop);
+  }
   if (best.plan.positions.empty() || best.merit < told_now + least_help) {
     return std::nullopt;
   }

@@ -3,7 +3,8 @@
 // With z_A the whitened signature of the law as found and z_B that of a rival, the rival fitted in its place leaves a misfit
 // of |z_A|^2 - (z_A . z_B)^2 / |z_B|^2, summed over the recording and the planned one: the square of the separation in sigma.
 // A planned recording needs no data for that (diagnosis/ideal_recording.hpp). Half the square is the expected logarithm of
-// the odds. The plan is taken that tells apart most of the class's probability, and of those the shortest (plan_search.hpp).
+// the odds. The plan is taken that most probably leaves one member, and of those the shortest (plan_search.hpp); where no rotation would,
+// one that would together with a second one alike.
 #pragma once
 
 #include <optional>

@@ -11,8 +11,10 @@ namespace {
 
 constexpr std::array<double, 3> dwells_s = {60.0, 100.0, 150.0};
 constexpr std::array<double, 5> lengths = {0.1, 0.2, 0.4, 0.7, 1.0};  // of the longest rotation
-constexpr int drawn_plans = 6;
-constexpr int changes = 30;
+constexpr std::array<double, 3> turn_times = {1.0, 2.0, 4.0};         // of the shortest that the gimbal makes
+constexpr std::size_t fewest_positions = 3;
+constexpr int drawn_plans = 9;
+constexpr int changes = 45;
 constexpr double enough = 0.9;         // of what could be gained
 constexpr double worth_longer = 0.03;  // of merit
 constexpr double farthest_deg = 360.0;
@@ -20,12 +22,16 @@ constexpr double grid_deg = 45.0;
 constexpr double least_dwell_s = 40.0, dwell_step_s = 30.0;
 
 Schedule drawn(ExperimentLimits limits, unsigned k) {
-  limits.rotation_s *= k % 2 == 0 ? 1.0 : 2.0;  // another turn rate splits what depends on it
-  Schedule plan = walk_over_positions(limits, dwells_s[k % dwells_s.size()], 20261122U + k);
-  if (k % dwells_s.size() == 1) {  // and dwells that differ what depends on time since a turn
+  limits.rotation_s *= turn_times[k % turn_times.size()];  // another turn rate splits what depends on it
+  Schedule plan = walk_over_positions(limits, dwells_s[(k + k / dwells_s.size()) % dwells_s.size()], 20261122U + k);
+  if (k / dwells_s.size() % 2 == 1) {  // and dwells that differ what depends on time since a turn
     for (std::size_t d = 0; d < plan.dwell_s.size(); ++d) {
       plan.dwell_s[d] = dwells_s[d % dwells_s.size()];
     }
+  }
+  while (plan.duration_s() > limits.duration_s && plan.positions.size() > fewest_positions) {
+    plan.positions.pop_back();
+    plan.dwell_s.pop_back();
   }
   return plan;
 }
@@ -34,10 +40,14 @@ class Changes {
  public:
   explicit Changes(const ExperimentLimits& limits) : limits_(limits) {}
 
-  // One position elsewhere, or some time of one dwell given to another; the plan itself where that cannot be.
+  // One position elsewhere, some time of one dwell given to another, or another rate of the turns, the dwells giving the time; the
+  // plan itself where that cannot be.
   Schedule change(Schedule plan) {
     const auto count = static_cast<int>(plan.positions.size());
-    if (below(3) > 0) {
+    const int what = below(8);
+    if (what == 0) {
+      turn_at_another_rate(plan);
+    } else if (what < 6) {
       const std::size_t k = 1U + static_cast<std::size_t>(below(count - 1));
       GimbalPosition to = plan.positions[k];
       double& angle = below(2) == 0 ? to.outer_deg : to.inner_deg;
@@ -60,6 +70,20 @@ class Changes {
   }
 
  private:
+  void turn_at_another_rate(Schedule& plan) {
+    const double rotation_s = limits_.rotation_s * turn_times[static_cast<std::size_t>(below(turn_times.size()))];
+    const double less_s = (rotation_s - plan.rotation_s) * static_cast<double>(plan.dwell_s.size() - 1) /
+                          static_cast<double>(plan.dwell_s.size());
+    const double shortest = *std::min_element(plan.dwell_s.begin(), plan.dwell_s.end());
+    if (shortest - less_s >= least_dwell_s) {
+      plan.rotation_s = rotation_s;
+      for (double& dwell : plan.dwell_s) {
+        dwell = std::floor(dwell - less_s);
+      }
+    }
+  }
+
+  int below(std::size_t n) { return below(static_cast<int>(n)); }
   int below(int n) { return static_cast<int>(engine_() % static_cast<unsigned>(n)); }
 
   bool can_move(const GimbalPosition& a, const GimbalPosition& b) const {

@@ -34,17 +34,24 @@ std::string constants_text(const std::vector<Constant>& constants) {
   return text;
 }
 
-// Other words for one function, which no rotation tells apart.
+// Other words for one function, which no rotation tells apart: anywhere, or as long as the base stands as it does.
 std::string also_text(const ClassMember& m, const char* indent) {
   constexpr std::size_t most = 3;
-  if (m.also.empty()) {
-    return {};
+  std::string text;
+  for (const bool here : {false, true}) {
+    std::vector<std::string> some;
+    for (const discovery::OtherWords& other : m.also) {
+      if (other.only_here == here) {
+        some.push_back(some.size() < most ? other.expression : "...");
+      }
+    }
+    some.resize(std::min(some.size(), most + 1));
+    if (!some.empty()) {
+      text += fmt::format("{}the same as {}{}\n", indent, fmt::join(some, ", "),
+                          here ? ", as long as the base stands as it does" : "");
+    }
   }
-  std::vector<std::string> some;
-  for (std::size_t k = 0; k < std::min(most, m.also.size()); ++k) {
-    some.push_back(m.also[k].expression);
-  }
-  return fmt::format("{}the same as {}{}\n", indent, fmt::join(some, ", "), m.also.size() > most ? ", ..." : "");
+  return text;
 }
 
 bool is_itself(const ClassMember& m, const DiscoveredLaw& law) {

@@ -46,5 +46,14 @@ TEST(OneFunction, NotOfTwoAxesAndNotWhereNothingIsSeen) {
   EXPECT_FALSE(one_function(unseen, {law(1, 1.0), law(1, 1.0)}, 0, 1));
 }
 
+// A level base: the gimbal cannot tell them apart, another attitude of the base can.
+TEST(OneFunction, OnlyAsLongAsTheBaseStandsAsItDoes) {
+  const std::vector<PossibleLaw> laws = {law(1, 1.0), law(1, 1.0)};
+  CarryOver elsewhere = two_laws(30.0, 0.3);
+  elsewhere.here = two_laws(30.0, 1e-6).information;
+  EXPECT_FALSE(one_function(elsewhere, laws, 0, 1));
+  EXPECT_TRUE(one_function_here(elsewhere, laws, 0, 1));
+}
+
 }  // namespace
 }  // namespace selfcal::discovery

@@ -15,12 +15,15 @@ function lawSizes(laws) {
   ], {class: 'laws'});
 }
 
-// No rotation tells these apart.
+// No rotation tells these apart; some of them another attitude of the base would.
 function otherWords(member) {
   const most = 3;
   const some = listOf(member.also);
   const cell = element('span', {}, some.length === 0 ? '–' : '');
-  some.slice(0, most).forEach((text, k) => cell.append(k > 0 ? ', ' : '', lawAsMath(textOf(text))));
+  const here = listOf(member.only_here).map(textOf);
+  some.slice(0, most).forEach((text, k) => {
+    cell.append(k > 0 ? ', ' : '', lawAsMath(textOf(text)), here.includes(textOf(text)) ? ' (on this base)' : '');
+  });
   cell.append(some.length > most ? ` and ${some.length - most} more` : '');
   return cell;
 }
