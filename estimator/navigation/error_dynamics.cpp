@@ -41,6 +41,30 @@ Matrix9 transition(const SiteModel& site, const Vector3& f_n, double length_s, d
   return Matrix9::Identity() + F.lazyProduct(sum);
 }
 
+namespace {
+
+// Of the upper triangle. A zero density leaves zero columns.
+ProcessNoise factored(Matrix9 Q) {
+  Q.triangularView<Eigen::StrictlyLower>() = Q.transpose();
+  // L D L^T without pivoting.
+  ProcessNoise noise{Matrix9::Identity(), Vector9::Zero()};
+  for (int j = 0; j < 9; ++j) {
+    noise.q(j) = std::max(Q(j, j), 0.0);
+    for (int i = j + 1; i < 9; ++i) {
+      noise.L(i, j) = noise.q(j) > 0.0 ? Q(i, j) / noise.q(j) : 0.0;
+    }
+    for (int i = j + 1; i < 9; ++i) {
+      for (int k = j + 1; k <= i; ++k) {
+        Q(i, k) -= noise.L(i, j) * noise.q(j) * noise.L(k, j);
+        Q(k, i) = Q(i, k);
+      }
+    }
+  }
+  return noise;
+}
+
+}  // namespace
+
 ProcessNoise process_noise(const SiteModel& site, double gyro_arw, double accel_vrw, double T, double sign) {
   // phi = sign * int(-C n_g), dv = sign * (int C n_a + int f_n x phi), dp = sign * int dv: the sign patterns of the
   // cross terms follow (D5).
@@ -56,23 +80,21 @@ ProcessNoise process_noise(const SiteModel& site, double gyro_arw, double accel_
   Q.block<3, 3>(3, 3) = qa * T * I + qg * T * T * T / 3.0 * SSt;
   Q.block<3, 3>(0, 3) = sign * (qa * T * T / 2.0 * I + qg * std::pow(T, 4) / 8.0 * SSt);
   Q.block<3, 3>(0, 0) = qa * T * T * T / 3.0 * I + qg * std::pow(T, 5) / 20.0 * SSt;
-  Q.triangularView<Eigen::StrictlyLower>() = Q.transpose();
+  return factored(Q);
+}
 
-  // L D L^T without pivoting; a zero density leaves zero columns.
-  ProcessNoise noise{Matrix9::Identity(), Vector9::Zero()};
-  for (int j = 0; j < 9; ++j) {
-    noise.q(j) = std::max(Q(j, j), 0.0);
-    for (int i = j + 1; i < 9; ++i) {
-      noise.L(i, j) = noise.q(j) > 0.0 ? Q(i, j) / noise.q(j) : 0.0;
-    }
-    for (int i = j + 1; i < 9; ++i) {
-      for (int k = j + 1; k <= i; ++k) {
-        Q(i, k) -= noise.L(i, j) * noise.q(j) * noise.L(k, j);
-        Q(k, i) = Q(i, k);
-      }
-    }
-  }
-  return noise;
+ProcessNoise process_noise(const SiteModel& site, const WhiteNoise& noise, double T, double sign) {
+  const Matrix3 S = skew(-site.gravity_n);
+  const Matrix3 SG = S * noise.rate;
+  const Matrix3 SGSt = SG * S.transpose();
+  Matrix9 Q = Matrix9::Zero();
+  Q.block<3, 3>(6, 6) = T * noise.rate;
+  Q.block<3, 3>(3, 6) = sign * T * T / 2.0 * SG;
+  Q.block<3, 3>(0, 6) = T * T * T / 6.0 * SG;
+  Q.block<3, 3>(3, 3) = T * noise.force + T * T * T / 3.0 * SGSt;
+  Q.block<3, 3>(0, 3) = sign * (T * T / 2.0 * noise.force + std::pow(T, 4) / 8.0 * SGSt);
+  Q.block<3, 3>(0, 0) = T * noise.velocity + T * T * T / 3.0 * noise.force + std::pow(T, 5) / 20.0 * SGSt;
+  return factored(Q);
 }
 
 }  // namespace selfcal

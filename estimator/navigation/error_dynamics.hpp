@@ -37,4 +37,12 @@ struct ProcessNoise {
 // `length_s` under the specific force of a base at rest.
 ProcessNoise process_noise(const SiteModel& site, double gyro_arw, double accel_vrw, double length_s, double sign);
 
+// Spectral densities of white noise along the axes of n, where those of b are not alike.
+struct WhiteNoise {
+  Matrix3 rate = Matrix3::Zero();      // (rad/s)^2/Hz
+  Matrix3 force = Matrix3::Zero();     // (m/s^2)^2/Hz
+  Matrix3 velocity = Matrix3::Zero();  // (m/s)^2/Hz, of the accelerometers' integral: the position walks by it
+};
+ProcessNoise process_noise(const SiteModel& site, const WhiteNoise& noise, double length_s, double sign);
+
 }  // namespace selfcal

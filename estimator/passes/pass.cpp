@@ -21,8 +21,7 @@ struct DynamicModel {
     L = MatrixX::Identity(d, d);  // motion and biases are driven one by one
     q = VectorX::Zero(d);
     drive = VectorX::Zero(d);
-    L.topLeftCorner<9, 9>() = noise.L;
-    q.head<9>() = noise.q;
+    set(noise);
     int at = StateLayout::navigation_count;
     for (int axis = 0; axis < 3; ++axis) {
       VectorX& row = h[static_cast<std::size_t>(axis)];
@@ -35,7 +34,21 @@ struct DynamicModel {
       }
     }
   }
+
+  void set(const ProcessNoise& noise) {
+    L.topLeftCorner<9, 9>() = noise.L;
+    q.head<9>() = noise.q;
+  }
 };
+
+// Mean over an interval that begins and ends at these attitudes: exact where nothing turns.
+WhiteNoise along_n(const AxisDensities& axes, const Matrix3& C_first, const Matrix3& C_last) {
+  const auto mean = [&](const Vector3& density) -> Matrix3 {
+    const auto D = density.cwiseAbs2().asDiagonal();
+    return 0.5 * (C_first * D * C_first.transpose() + C_last * D * C_last.transpose());
+  };
+  return {mean(axes.gyro_arw), mean(axes.accel_vrw), mean(axes.accel_integral)};
+}
 
 // Noise of an interval without observation: position and velocity are as unknown as where a pass begins, and the attitude
 // wanders no less than if the gyros had held it.
@@ -195,8 +208,9 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   }
   turns.before(navigator.C_nb(), filter.mean());
   std::size_t replayed = 0;
-  Matrix3 C_nb = navigator.C_nb();
+  Matrix3 C_nb = navigator.C_nb(), C_before = C_nb;
   const auto next = [&] {
+    C_before = C_nb;
     if (input.navigated == nullptr) {
       const bool more = navigator.next(interval);
       C_nb = navigator.C_nb();
@@ -216,6 +230,10 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     }
     model.drive.head<9>() = interval.drive;
     Gamma.topRows<9>() = interval.Gamma;
+    if (input.noise.axes) {
+      model.set(
+          process_noise(navigator.site(), along_n(*input.noise.axes, C_before, C_nb), input.interval_s, input.sign));
+    }
     const double inflation = input.noise.inflation(0.5 * (interval.start_s + interval.end_s));
     MatrixX& L = interval.coasted ? coast_noise.L() : model.L;
     VectorX q = interval.coasted ? coast_noise.q(interval) : VectorX(inflation * model.q);

@@ -23,9 +23,18 @@ struct Disturbance {
   double factor = 1.0;
 };
 
+// White noise of each sensor axis by itself. That of the accelerometers' integral (a coarse quantum, dither that leaks through)
+// makes the position walk.
+struct AxisDensities {
+  Vector3 gyro_arw = Vector3::Zero();        // rad/s/sqrt(Hz)
+  Vector3 accel_vrw = Vector3::Zero();       // m/s^2/sqrt(Hz)
+  Vector3 accel_integral = Vector3::Zero();  // m/s/sqrt(Hz)
+};
+
 struct NoiseModel {
-  double gyro_arw = 0.0;   // rad/s/sqrt(Hz)
-  double accel_vrw = 0.0;  // m/s^2/sqrt(Hz)
+  double gyro_arw = 0.0;              // rad/s/sqrt(Hz); of a triad, root of the mean square of its axes
+  double accel_vrw = 0.0;             // m/s^2/sqrt(Hz)
+  std::optional<AxisDensities> axes;  // in the place of both, where the axes of a triad are not alike
   ObservationModel observation;
   std::vector<BiasNoise> biases;       // that change with time
   std::vector<Disturbance> disturbed;  // chronological, no two overlap
