@@ -51,10 +51,11 @@ void linearise(const std::vector<Pose>& poses, AccelModel& m) {
     const Vector3 d = poses[static_cast<std::size_t>(k)].accel - m.bias;
     const Vector3 u = m.T * d;
     const Vector3 e = u.normalized();
-    m.residual(k) = u.norm() - 1.0;
-    m.jacobian.block<1, 3>(k, 0) = -(e.transpose() * m.T);
+    m.residual(k) = m.weight(k) * (u.norm() - 1.0);
+    m.jacobian.block<1, 3>(k, 0) = -m.weight(k) * (e.transpose() * m.T);
     for (std::size_t j = 0; j < free_elements.size(); ++j) {
-      m.jacobian(k, 3 + static_cast<Eigen::Index>(j)) = e(free_elements[j].first) * d(free_elements[j].second);
+      m.jacobian(k, 3 + static_cast<Eigen::Index>(j)) =
+          m.weight(k) * e(free_elements[j].first) * d(free_elements[j].second);
     }
   }
 }
@@ -104,6 +105,21 @@ double noise_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
   return std::sqrt(square / static_cast<double>(poses.size()));
 }
 
+// Variance of a pose's |u|: what the poses scatter by, and the white noise of its own mean. Both beside those of a usual pose.
+Eigen::VectorXd weights_of(const AccelModel& m, const std::vector<Pose>& poses, double noise) {
+  Eigen::VectorXd white(static_cast<Eigen::Index>(poses.size()));  // variances
+  for (Eigen::Index k = 0; k < white.size(); ++k) {
+    const Pose& p = poses[static_cast<std::size_t>(k)];
+    const Vector3 along = m.T.transpose() * m.direction(p.accel).normalized();
+    white(k) = along.cwiseProduct(p.accel_white).squaredNorm();
+  }
+  std::vector<double> sorted(white.begin(), white.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double others = std::max(0.0, noise * noise - *middle);
+  return ((others + *middle) / (others + white.array()).max(1e-300)).sqrt().min(1.0);
+}
+
 }  // namespace
 
 AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& poses) {
@@ -111,6 +127,7 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
   const Nine start = values_of(m);
   const auto n = static_cast<double>(poses.size());
   double noise = 1e-3;
+  m.weight = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(poses.size()));
   for (int round = 0; round < 30; ++round) {
     linearise(poses, m);
     // In units of what is assumed before, one observation of the noise's size has the weight of the prior's one.
@@ -126,6 +143,7 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
     const double seen = std::sqrt(m.residual.squaredNorm() / std::max(1.0, m.free));
     constexpr double enough = 3.0, least = 1e-7;  // of g
     noise = std::max(least, std::max(noise_of_means(m, poses), m.free >= enough ? seen : 0.0));
+    m.weight = weights_of(m, poses, noise);
   }
   linearise(poses, m);
   return m;

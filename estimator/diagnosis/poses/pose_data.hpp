@@ -13,10 +13,10 @@ struct Pose {
   std::size_t first = 0, last = 0;                         // samples
   std::vector<std::pair<std::size_t, std::size_t>> quiet;  // of them those without a disturbance
   double middle_s = 0.0;
-  Vector3 gyro, accel;            // means, raw
-  Vector3 gyro_white;             // sigma of the mean by white noise, raw
-  Vector3 gyro_half, accel_half;  // half the difference between the means of both halves, raw
-  Vector3 u = Vector3::Zero();    // calibrated, g
+  Vector3 gyro, accel;              // means, raw
+  Vector3 gyro_white, accel_white;  // sigma of the mean by white noise, raw
+  Vector3 gyro_half, accel_half;    // half the difference between the means of both halves, raw
+  Vector3 u = Vector3::Zero();      // calibrated, g
 };
 
 Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i);
@@ -35,8 +35,9 @@ std::vector<Clipping> find_clipping(const PoseInput& input);
 struct AccelModel {
   Matrix3 T = Matrix3::Identity();
   Vector3 bias = Vector3::Zero();
-  Eigen::VectorXd residual;            // |u| - 1 of the poses
-  Eigen::MatrixXd jacobian;            // of the residual, [poses x 9]: bias, then T's xx yy zz xy xz yz
+  Eigen::VectorXd weight;    // of the poses, 1 for one as usual: a mean over a second counts less than one over twenty
+  Eigen::VectorXd residual;  // |u| - 1 of the poses, times weight
+  Eigen::MatrixXd jacobian;  // of the residual, [poses x 9]: bias, then T's xx yy zz xy xz yz
   Eigen::Matrix<double, 9, 1> sigma;   // of the nine, noise and what was assumed before together
   Eigen::Matrix<double, 9, 1> before;  // sigma of what is assumed before
   Eigen::Array<bool, 9, 1> held =

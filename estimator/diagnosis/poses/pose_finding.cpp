@@ -44,7 +44,7 @@ void take_means(const PoseInput& input, Pose& p) {
   }
   std::array<Vector3, 2> gyro = {Vector3::Zero(), Vector3::Zero()}, accel = gyro;
   std::array<double, 2> count{};
-  Vector3 steps = Vector3::Zero();
+  Vector3 steps = Vector3::Zero(), accel_steps = Vector3::Zero();
   double middle = 0.0, stepped = 0.0;
   std::size_t k = 0;
   for (const auto& [first, last] : p.quiet) {
@@ -56,6 +56,7 @@ void take_means(const PoseInput& input, Pose& p) {
       middle += input.time_s[i] - input.time_s.front();
       if (i > first) {
         steps += (at(input.gyro, i) - at(input.gyro, i - 1)).cwiseAbs2();
+        accel_steps += (at(input.accel, i) - at(input.accel, i - 1)).cwiseAbs2();
         stepped += 1.0;
       }
     }
@@ -67,6 +68,7 @@ void take_means(const PoseInput& input, Pose& p) {
   p.gyro_half = 0.5 * (gyro[1] / count[1] - gyro[0] / count[0]);
   p.accel_half = 0.5 * (accel[1] / count[1] - accel[0] / count[0]);
   p.gyro_white = (0.5 * steps / stepped / n).cwiseSqrt();
+  p.accel_white = (0.5 * accel_steps / stepped / n).cwiseSqrt();
 }
 
 Pose pose_of(const PoseInput& input, std::size_t first, std::size_t last) {

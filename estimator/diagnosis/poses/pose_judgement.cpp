@@ -228,8 +228,8 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
       if (trial.columns.cols() == 0) {
         continue;
       }
-      const Comparison c =
-          compare(model.jacobian, trial.columns, model.residual, time_s, changes_with_time(effect, duration_s, 3));
+      const Comparison c = compare(model.jacobian, model.weight.asDiagonal() * trial.columns, model.residual, time_s,
+                                   changes_with_time(effect, duration_s, 3));
       PoseEffect p;
       p.effect = &effect;
       p.constant = constant;
