@@ -73,7 +73,7 @@ class Diagnoser {
   DiagnosisOutcome run();
 
  private:
-  CorrectedRecording quiet_dwells();
+  CorrectedRecording quiet_dwells(std::vector<VibrationLine>& lines) const;
   void name();
   void leave_unjudged();
   void judge_noise_alone();
@@ -94,36 +94,38 @@ class Diagnoser {
 };
 
 // The recording without the lines that alias into the filter beside white noise of the accelerometers' integral.
-CorrectedRecording Diagnoser::quiet_dwells() {
+CorrectedRecording Diagnoser::quiet_dwells(std::vector<VibrationLine>& lines) const {
   AngleVelocity theta(data_.delta_theta.begin(), data_.delta_theta.end());
   AngleVelocity velocity(data_.delta_v.begin(), data_.delta_v.end());
-  const std::vector<VibrationLine> lines =
-      subtract_dwell_lines(data_, observed(find_segments(data_), data_), theta, velocity);
-  d_.noise.lines.insert(d_.noise.lines.end(), lines.begin(), lines.end());
+  lines = subtract_dwell_lines(data_, observed(find_segments(data_), data_), theta, velocity);
   return {data_, std::move(theta), std::move(velocity)};
 }
 
 void Diagnoser::name() {
   CorrectedRecording recording(data_);
   PassInput input = forward_pass(recording.data(), d_.calibration);
-  if (fit_velocity_noise(input, d_.noise)) {
-    recording = quiet_dwells();
-    input = forward_pass(recording.data(), d_.calibration);
-    beats_ = fit_velocity_noise(input, d_.noise);
+  if (colours_innovations(input, d_.noise)) {
+    std::vector<VibrationLine> lines;
+    CorrectedRecording quiet = quiet_dwells(lines);
+    PassInput without_lines = forward_pass(quiet.data(), d_.calibration);
+    beats_ = fit_velocity_noise(without_lines, d_.noise, find_segments(data_));
+    if (beats_) {
+      recording = std::move(quiet);
+      input = without_lines;
+      input.data = &recording.data();
+      d_.noise.lines.insert(d_.noise.lines.end(), lines.begin(), lines.end());
+    }
   }
   RecordingContext context(recording.data());
   d_.mean_temperature_c = context.has_temperature() ? context.mean_temperature() : 0.0;
   say("signatures");
-  PassInput as_recorded = input;  // turns hold the slow lines still
-  as_recorded.data = &data_;
   if (beats_) {
-    context.set_colour(colour_of_rows(SignaturePass(context, {}, false).run(as_recorded), context));
+    context.set_colour(colour_of_rows(SignaturePass(context, {}, false).run(input), context));
   }
   SearchResult found = search(context, input, {log_names_, say_, options_.stop});
   if (beats_ && !found.empty()) {  // what was left out coloured the innovations too
     context.set_colour({});
-    const CorrectedRecording whole(data_);
-    const LinearModel model = LinearModel::about(context, {as_recorded, whole}, found.stage.hypothesis(), {}, false);
+    const LinearModel model = LinearModel::about(context, {input, recording}, found.stage.hypothesis(), {}, false);
     SignatureRows left = model.rows();
     left.residual = model.residual_after(columns_of(model.terms()));
     context.set_colour(colour_of_rows(left, context));

@@ -1,5 +1,7 @@
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -11,64 +13,96 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr double colours = 0.1;          // share of an interval's position variance from which it is modelled
-constexpr double least_log_gain = 10.0;  // of the likelihood, for three densities more
+constexpr double least_log_gain = 10.0;  // of the likelihood, for densities of nine axes in the place of two
 
-// Velocity and position trade against each other along a ridge: that takes many moves and rounds.
-Summit<3> top_of(const NoiseDensities& start, std::vector<double> factors,
-                 const std::function<double(const NoiseDensities&)>& log_likelihood) {
-  constexpr int many = 1000;
-  return climb<3>(start, {.factors = std::move(factors), .most_rounds = 20, .most_moves = many}, log_likelihood);
+// ARW, VRW and noise of the integral, of x, y and z each; how much larger the variance is in turns.
+using Sizes = std::array<double, 10>;
+
+double root_mean_square(const Vector3& v) { return std::sqrt(v.squaredNorm() / 3.0); }
+
+Sizes sizes_of(const NoiseModel& noise) {
+  const AxisDensities& a = *noise.axes;
+  const double turns = noise.disturbed.empty() ? 1.0 : noise.disturbed.front().factor;
+  return {a.gyro_arw(0),  a.gyro_arw(1),       a.gyro_arw(2),       a.accel_vrw(0),      a.accel_vrw(1),
+          a.accel_vrw(2), a.accel_integral(0), a.accel_integral(1), a.accel_integral(2), turns};
+}
+
+NoiseModel with_sizes(NoiseModel noise, const Sizes& s) {
+  noise.axes = {Vector3(s[0], s[1], s[2]), Vector3(s[3], s[4], s[5]), Vector3(s[6], s[7], s[8])};
+  noise.gyro_arw = root_mean_square(noise.axes->gyro_arw);
+  noise.accel_vrw = root_mean_square(noise.axes->accel_vrw);
+  for (Disturbance& turn : noise.disturbed) {
+    turn.factor = s[9];
+  }
+  return noise;
+}
+
+// Densities trade against each other along ridges: that takes many moves and rounds. What does not matter any more is not followed to zero.
+Summit<10> top_of(const Sizes& start, std::vector<double> factors,
+                  const std::function<double(const Sizes&)>& log_likelihood) {
+  const Climb how{.factors = std::move(factors), .most_rounds = 20, .most_moves = 4, .enough = 0.1, .farthest = 30.0};
+  return climb<10>(start, how, log_likelihood);
+}
+
+double integral_density(const NoiseCheck& noise, std::size_t axis, double rate_hz) {
+  constexpr std::size_t accelerometers = 3;
+  return noise.axes[accelerometers + axis].increment_sigma / std::sqrt(rate_hz);
 }
 
 }  // namespace
 
-NoiseModel with_velocity_noise(NoiseModel noise, const NoiseDensities& d) {
-  noise.gyro_arw = d[0];
-  noise.accel_vrw = d[1];
-  noise.observation.motion.fill(position_walk(d[2]));
-  return noise;
-}
-
-bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise) {
-  constexpr int accelerometers = 3;
-  double variance = 0.0;  // of the integral's white noise, mean of the axes
-  for (std::size_t axis = accelerometers; axis < noise.axes.size(); ++axis) {
-    variance += noise.axes[axis].increment_sigma * noise.axes[axis].increment_sigma / 3.0;
+bool colours_innovations(const PassInput& input, const NoiseCheck& noise) {
+  double square = 0.0;  // mean of the axes
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double density = integral_density(noise, axis, input.data->sample_rate_hz);
+    square += density * density / 3.0;
   }
-  const double density = std::sqrt(variance / input.data->sample_rate_hz);
   const double T = input.interval_s;
   const double of_force = input.noise.accel_vrw * input.noise.accel_vrw * T * T * T / 3.0;
-  if (input.noise.observation.state_count() > 0 || density * density * T < colours * of_force) {
-    return false;
+  return input.noise.observation.state_count() == 0 && square * T >= colours * of_force;
+}
+
+bool fit_velocity_noise(PassInput& input, const NoiseCheck& check, const std::vector<Segment>& segments) {
+  const NoiseModel& given = input.noise;
+  NoiseModel start = given;
+  start.axes = {Vector3::Constant(given.gyro_arw), Vector3::Constant(given.accel_vrw), Vector3::Zero()};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    start.axes->accel_integral(static_cast<Eigen::Index>(axis)) =
+        std::max(1e-9, integral_density(check, axis, input.data->sample_rate_hz));
   }
-  const double before = run_pass(input).log_likelihood;
-  const auto log_likelihood = [&](const NoiseDensities& d) {
+  for (const Segment& s : segments) {
+    if (s.rotation) {
+      start.disturbed.push_back({s.start_s, s.end_s, 1.0});
+    }
+  }
+  const Navigated navigated = navigate(input);
+  const auto log_likelihood = [&](const NoiseModel& noise) {
     PassInput trial = input;
-    trial.noise = with_velocity_noise(input.noise, d);
+    trial.noise = noise;
+    trial.navigated = &navigated;
     return run_pass(trial).log_likelihood;
   };
-  const Summit<3> top =
-      top_of({input.noise.gyro_arw, input.noise.accel_vrw, density}, {2.0, 1.25, 1.06}, log_likelihood);
-  if (top.log_likelihood < before + least_log_gain) {
+  const Summit<10> top =
+      top_of(sizes_of(start), {2.0, 1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(start, s)); });
+  if (top.log_likelihood < log_likelihood(given) + least_log_gain) {
     return false;
   }
-  input.noise = with_velocity_noise(input.noise, top.at);
+  input.noise = with_sizes(start, top.at);
   return true;
 }
 
 std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
                                                const std::function<double(const NoiseModel&)>& log_likelihood) {
-  const double density = walk_density(noise.observation.motion.front());
-  if (density == 0.0) {
+  if (!noise.axes) {
     return std::nullopt;
   }
-  const NoiseDensities before = {noise.gyro_arw, noise.accel_vrw, density};
-  const auto of_densities = [&](const NoiseDensities& d) { return log_likelihood(with_velocity_noise(noise, d)); };
-  const NoiseDensities best = top_of(before, {1.25, 1.06}, of_densities).at;
+  const Sizes before = sizes_of(noise);
+  const Sizes best =
+      top_of(before, {1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(noise, s)); }).at;
   if (best == before) {
     return std::nullopt;
   }
-  return with_velocity_noise(noise, best);
+  return with_sizes(noise, best);
 }
 
 }  // namespace selfcal::diagnosis

@@ -2,26 +2,26 @@
 // that the calibration's filter does not have, and takes for white noise of force and of the base.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "estimator/diagnosis/noise/noise_check.hpp"
+#include "estimator/models/segments.hpp"
 #include "estimator/passes/pass.hpp"
 
 namespace selfcal::diagnosis {
 
-// Of angle (rad/sqrt(s)), of velocity (m/s/sqrt(s)), and of position, which walks with the integral's noise (m/sqrt(s)).
-using NoiseDensities = std::array<double, 3>;
-NoiseModel with_velocity_noise(NoiseModel noise, const NoiseDensities& densities);
+// Whether it is large enough to colour the innovations.
+bool colours_innovations(const PassInput& input, const NoiseCheck& noise);
 
-// Where it is large enough to colour the innovations it becomes a walk of the position observed (exactly its effect on
-// a filter that observes nothing else), and all densities those of the greatest likelihood, to 3 %. True where `input`
-// changed.
-bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise);
+// Where it does, it becomes noise of the filter. Sensors with such noise are seldom alike (a dither leaks into one axis more than
+// into another, a gyro ages): each axis has densities of its own, those of the greatest likelihood, to 3 %, and so has the noise
+// in turns, whose lines no dwell tells, in proportion to that in dwells. True where `input` changed.
+bool fit_velocity_noise(PassInput& input, const NoiseCheck& noise, const std::vector<Segment>& segments);
 
 // The densities that were fitted before anything was named hold what was left out, shared among them as it fits best: beside
-// the names they are fitted again, from where they are, to `log_likelihood`. None where there is no such walk, or it is at the top
+// the names they are fitted again, from where they are, to `log_likelihood`. None where there is no such noise, or it is at the top
 // already.
 std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
                                                const std::function<double(const NoiseModel&)>& log_likelihood);

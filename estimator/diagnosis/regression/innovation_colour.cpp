@@ -76,7 +76,7 @@ std::vector<double> autocovariances(const Eigen::VectorXd& innovations, Eigen::I
   return c;
 }
 
-// Levinson's recursion; the order with the least of Akaike's criterion.
+// Levinson's recursion; the order with the least of Schwarz's criterion.
 AxisColour autoregression(const std::vector<double>& c, double epochs) {
   AxisColour best{{}, std::sqrt(c[0]), std::sqrt(c[0])};
   double least = epochs * std::log(c[0]), variance = c[0];
@@ -97,7 +97,7 @@ AxisColour autoregression(const std::vector<double>& c, double epochs) {
     longer.push_back(next);
     phi = std::move(longer);
     variance *= 1.0 - next * next;
-    const double criterion = epochs * std::log(variance) + 2.0 * static_cast<double>(order);
+    const double criterion = epochs * std::log(variance) + std::log(epochs) * static_cast<double>(order);
     if (criterion < least) {
       least = criterion;
       best.phi = phi;

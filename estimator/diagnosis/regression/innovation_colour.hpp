@@ -1,7 +1,7 @@
 // Innovations that are not white: an autoregression of each axis, and rows from which it was taken.
 //
 // A coarse quantum and the sensors' own lines leave more than white noise holds: sampled once an interval, a line far above the
-// filter's rate falls to a slow one. Yule and Walker's equations give the autoregression, Akaike's criterion its order; rows filtered
+// filter's rate falls to a slow one. Yule and Walker's equations give the autoregression, Schwarz's criterion its order; rows filtered
 // by it are white again, and a regression on them has the sigma that the noise allows (Cochrane and Orcutt, J. Am. Stat.
 // Assoc. 44, 1949).
 #pragma once

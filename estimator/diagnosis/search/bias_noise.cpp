@@ -1,11 +1,13 @@
 #include "estimator/diagnosis/search/bias_noise.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
 
+#include "estimator/diagnosis/search/remains.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/statistics/climb.hpp"
 
@@ -134,6 +136,30 @@ double fit(const NoiseLikelihood& likelihood, std::vector<BiasProcess>& processe
   return top.log_likelihood;
 }
 
+// Of a few sizes and times the best: from where a fit may begin.
+BiasProcess roughly(const NoiseLikelihood& likelihood, const Stage& stage, const std::vector<int>& axes,
+                    double without) {
+  BiasProcess best;
+  best.axes = axes;
+  const NoiseModel& noise = stage.hypothesis().noise;
+  std::vector<BiasProcess> processes = stage.hypothesis().processes;
+  processes.push_back(best);
+  BiasProcess& p = processes.back();
+  for (const double time_s : {20.0, 60.0, 180.0}) {
+    // The white noise's mean over its time, once and three times.
+    const double white = (p.of_gyro() ? noise.gyro_arw : noise.accel_vrw) / std::sqrt(time_s) / map_unit(axes.front());
+    for (const double size : {white, 3.0 * white}) {
+      p.kernel = {Kind::instability, time_s};
+      p.size = size;
+      p.delta_chi2 = 2.0 * (likelihood.of(processes) - without);
+      if (p.delta_chi2 > best.delta_chi2) {
+        best = p;
+      }
+    }
+  }
+  return best;
+}
+
 // Process i as the kind that it is, fitted, with the other one beside it. Returns twice what it gains over none.
 double fit_kinds(const SearchGround& ground, const Stage& stage, const NoiseLikelihood& likelihood,
                  std::vector<BiasProcess>& processes, std::size_t i) {
@@ -155,6 +181,17 @@ double fit_kinds(const SearchGround& ground, const Stage& stage, const NoiseLike
 
 }  // namespace
 
+std::vector<std::vector<int>> open_axes(const Hypothesis& hypothesis) {
+  // Sensors of one kind are alike: what each axis may do alone, a triad may do with one size.
+  std::vector<std::vector<int>> all = {{0}, {1}, {2}, {3}, {4}, {5}, {0, 1, 2}, {3, 4, 5}};
+  std::erase_if(all, [&](const std::vector<int>& axes) {
+    return std::any_of(hypothesis.processes.begin(), hypothesis.processes.end(), [&](const BiasProcess& p) {
+      return std::find_first_of(p.axes.begin(), p.axes.end(), axes.begin(), axes.end()) != p.axes.end();
+    });
+  });
+  return all;
+}
+
 NoiseModel with_processes(NoiseModel noise, const std::vector<BiasProcess>& processes) {
   noise.biases.clear();
   for (const BiasProcess& p : processes) {
@@ -172,8 +209,8 @@ NoiseModel with_processes(NoiseModel noise, const std::vector<BiasProcess>& proc
   return noise;
 }
 
-std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage,
-                                  const std::vector<BiasProcess>& found) {
+std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage, const std::vector<BiasProcess>& found,
+                                  const Significance& significance) {
   const NoiseLikelihood likelihood(ground, stage);
   std::vector<BiasProcess> best;
   for (const BiasProcess& one : found) {
@@ -184,10 +221,36 @@ std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage
       best = std::move(processes);
     }
   }
-  if (best.empty() || !ground.significance.holds(ground.significance.corrected(best.back().log_p()))) {
+  if (best.empty() || !significance.holds(significance.corrected(best.back().log_p()))) {
     return std::nullopt;
   }
   return with_these(ground, stage, std::move(best));
+}
+
+std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& stage) {
+  constexpr double rate = 0.01;  // of what remains, and of the process that is to explain it
+  if (!stage.hypothesis().noise.axes || ground.context.reference()) {
+    return std::nullopt;
+  }
+  const Map map = locate(stage.given_forms(), stage.model.map(), stage.model.first_map_column(), stage.columns());
+  const bool remains = log_corrected(log_normal_tail(map.largest_sigma), std::max(1, map.tests)) < std::log(rate) ||
+                       structure_left(stage).log_p() < std::log(rate);
+  const std::vector<std::vector<int>> open = open_axes(stage.hypothesis());
+  if (!remains || open.empty()) {
+    return std::nullopt;
+  }
+  const NoiseLikelihood likelihood(ground, stage);
+  const double without = likelihood.of(stage.hypothesis().processes);
+  std::vector<BiasProcess> best(2);  // of either triad
+  for (const std::vector<int>& axes : open) {
+    const BiasProcess p = roughly(likelihood, stage, axes, without);
+    BiasProcess& of_triad = best[p.of_gyro() ? 0 : 1];
+    if (p.delta_chi2 > of_triad.delta_chi2) {
+      of_triad = p;
+    }
+  }
+  std::erase_if(best, [](const BiasProcess& p) { return p.axes.empty(); });
+  return with_process(ground, stage, best, {std::log(rate), 1.5 * static_cast<double>(open.size()), 0.0});
 }
 
 double gain_of_process(const SearchGround& ground, const Stage& stage, std::size_t i) {

@@ -8,14 +8,22 @@
 
 namespace selfcal::diagnosis {
 
+// Axes and triads that no process of the hypothesis takes.
+std::vector<std::vector<int>> open_axes(const Hypothesis& hypothesis);
+
 // `noise` with these as states, and no others.
 NoiseModel with_processes(NoiseModel noise, const std::vector<BiasProcess>& processes);
 
 // The stage with one of `found` as states besides, that which the filter likes best, as a walk or as an instability: a walk unless the
 // other is more likely by 20:1. Sizes and times are those of the greatest likelihood. None where the filter does not find what the
-// columns showed.
-std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage,
-                                  const std::vector<BiasProcess>& found);
+// columns showed, to this significance.
+std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage, const std::vector<BiasProcess>& found,
+                                  const Significance& significance);
+
+// Beside white noise of the accelerometers' integral, which hides from the columns of whole dwells what the filter sees inside them: where
+// something remains in dwells, rotations or times (1 %), with the process that explains most of it, if by chance one would in 1 %. That
+// something is there is not asked again: only what.
+std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& stage);
 
 // Twice the log-likelihood that process i of the stage's hypothesis gains beside all else.
 double gain_of_process(const SearchGround& ground, const Stage& stage, std::size_t i);

@@ -97,6 +97,8 @@ Stage course(const SearchGround& ground, Stage s, const SearchOptions& options) 
   // Under noise that no longer holds them the names are tested again; where one falls the noise is fitted without it.
   while (taken(s, refit_noise(ground, s)) && taken(s, drop_weak(ground, s))) {
   }
+  while (room() && taken(s, explain_remainder(ground, s))) {
+  }
   while (room() && taken(s, add_best(ground, s))) {
   }
   return s;

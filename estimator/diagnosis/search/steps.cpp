@@ -1,7 +1,6 @@
 #include "estimator/diagnosis/search/steps.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "estimator/diagnosis/noise/process_check.hpp"
@@ -11,9 +10,6 @@
 
 namespace selfcal::diagnosis {
 namespace {
-
-// Sensors of one kind are alike: what each axis may do alone, a triad may do with one size.
-const std::array<std::vector<int>, 8> process_axes = {{{0}, {1}, {2}, {3}, {4}, {5}, {0, 1, 2}, {3, 4, 5}}};
 
 // Square of what an equation leaves that is right to 3 % of its amplitude, over its own.
 constexpr double form_square = 1e-3;
@@ -84,18 +80,10 @@ Term term_of(const Variant& variant) {
 }
 
 std::vector<BiasProcess> processes_to_test(const Stage& stage) {
-  const std::vector<BiasProcess>& named = stage.hypothesis().processes;
   std::vector<BiasProcess> processes;
-  const auto taken = [&](int axis) {
-    return std::any_of(named.begin(), named.end(), [&](const BiasProcess& p) {
-      return std::find(p.axes.begin(), p.axes.end(), axis) != p.axes.end();
-    });
-  };
-  for (const std::vector<int>& axes : process_axes) {
-    if (std::none_of(axes.begin(), axes.end(), taken)) {
-      processes.push_back(test_bias_process(stage.given_forms(), stage.model.map(), stage.model.first_map_column(),
-                                            axes, stage.columns()));
-    }
+  for (const std::vector<int>& axes : open_axes(stage.hypothesis())) {
+    processes.push_back(test_bias_process(stage.given_forms(), stage.model.map(), stage.model.first_map_column(), axes,
+                                          stage.columns()));
   }
   std::erase_if(processes, [&](const BiasProcess& w) { return within_form(stage, w); });
   return processes;
@@ -159,7 +147,7 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
     return std::nullopt;
   }
   if (found->process) {
-    return with_process(ground, stage, best_of_triads(ground, *found->process, processes));
+    return with_process(ground, stage, best_of_triads(ground, *found->process, processes), ground.significance);
   }
   Selection selection = stage.selection;
   selection.hypothesis.terms.push_back(term_of(variant_of(stage, *found->term)));
@@ -206,7 +194,7 @@ std::optional<Stage> drop_weak_process(const SearchGround& ground, const Stage& 
 std::optional<Stage> sharpen_observation(const SearchGround& ground, const Stage& stage) {
   constexpr double factor = 1.0 / 3.0, least = 0.9e-6;  // m
   NoiseModel noise = stage.hypothesis().noise;
-  if (stage.hypothesis().empty() || noise.observation.state_count() > 0) {
+  if (stage.hypothesis().empty() || noise.observation.state_count() > 0 || noise.axes) {
     return std::nullopt;
   }
   const double before = noise.observation.sigma;
