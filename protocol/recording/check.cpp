@@ -187,6 +187,10 @@ Expected<std::optional<std::string>> check_specific_force(const Recording& recor
   return bad(words);
 }
 
+bool stands_still(const std::vector<double>& angle) {
+  return std::all_of(angle.begin(), angle.end(), [&](double a) { return a == angle.front(); });
+}
+
 Expected<std::optional<std::string>> check_gimbal(const Recording& recording, const CheckPolicy& policy) {
   const auto found = find_gimbal_contradiction(recording);
   if (!found) {
@@ -199,6 +203,12 @@ Expected<std::optional<std::string>> check_gimbal(const Recording& recording, co
       found->disagreement_deg, found->tolerance_deg);
   if (policy.gimbal_contradiction_is_error) {
     return bad(words);
+  }
+  if (stands_still(recording.gimbal_outer_rad) && stands_still(recording.gimbal_inner_rad)) {
+    return std::optional<std::string>{fmt::format(
+        "gimbal_outer_rad, gimbal_inner_rad: stand still in all rows while delta_theta_rad turns by {:.1f} deg in "
+        "rows {} to {}: none were recorded, or a hand turned the sensor",
+        found->gyro_turn_deg, found->first_row, found->last_row)};
   }
   return std::optional<std::string>{words};
 }

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -15,7 +16,9 @@ namespace {
 
 using test::sample_recording;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -147,6 +150,20 @@ TEST_F(GimbalCheck, StandsStillWhileTheGyrosTurn) {
     angle = 0.0;
   }
   EXPECT_THAT(error_of(r), HasSubstr("read-outs turned 0.0 and 0.0 deg"));
+}
+
+// A log of a sensor that a hand turned has no read-outs: neither of them is wrong.
+TEST_F(GimbalCheck, NoReadOutsAreNoneThatIsWrong) {
+  const CheckPolicy lenient{.gimbal_contradiction_is_error = false};
+  std::fill(r.gimbal_inner_rad.begin(), r.gimbal_inner_rad.end(), 0.0);
+  const auto outer_turns = check_recording(r, lenient);
+  ASSERT_TRUE(outer_turns);
+  EXPECT_THAT(*outer_turns, ElementsAre(HasSubstr("tells which of them is wrong")));
+  std::fill(r.gimbal_outer_rad.begin(), r.gimbal_outer_rad.end(), 0.0);
+  const auto by_hand = check_recording(r, lenient);
+  ASSERT_TRUE(by_hand);
+  EXPECT_THAT(*by_hand, ElementsAre(AllOf(HasSubstr("none were recorded, or a hand turned the sensor"),
+                                          Not(HasSubstr("wrong")))));
 }
 
 // A read-out that goes from 0.0 past zero to 359.4 deg has turned by -0.6.
