@@ -109,15 +109,22 @@ std::optional<Settling> find_settling(const PoseInput& input, const std::vector<
       if (axes.empty()) {
         continue;
       }
-      const Regression fit = regress(X(Eigen::all, axes), r);
       Regression nothing;
       nothing.square = r.squaredNorm();
-      const double log_p = log_p_of(nothing, fit, r.size());
-      ++tried;
-      if (!best || log_p < best->log_p) {
-        best = Settling{tau, with_change, Vector3::Zero(), Vector3::Zero(), log_p};
-        best->size_g(axes) = fit.value;
-        best->sigma_g(axes) = fit.sigma;
+      // Sensors of one kind are alike: one size for all, which few poses tell better than three.
+      for (const bool alike : {false, true}) {
+        const Eigen::MatrixXd columns =
+            alike ? Eigen::MatrixXd(X(Eigen::all, axes).rowwise().sum()) : X(Eigen::all, axes);
+        const Regression fit = regress(columns, r);
+        const double log_p = log_p_of(nothing, fit, r.size());
+        ++tried;
+        if (!best || log_p < best->log_p) {
+          best = Settling{tau, with_change, Vector3::Zero(), Vector3::Zero(), log_p};
+          for (std::size_t k = 0; k < axes.size(); ++k) {
+            best->size_g(axes[k]) = fit.value(alike ? 0 : static_cast<Eigen::Index>(k));
+            best->sigma_g(axes[k]) = fit.sigma(alike ? 0 : static_cast<Eigen::Index>(k));
+          }
+        }
       }
     }
   }

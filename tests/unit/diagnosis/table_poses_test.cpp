@@ -192,6 +192,16 @@ TEST(TablePoses, SettlingAfterTurnsIsNamed) {
   EXPECT_NEAR(d.settling->tau_s, 10.0, 5.1);  // the grid's neighbours are 5 and 20
 }
 
+// Three sizes of five amplitudes leave two degrees of freedom; sensors that are alike have one size, and four. A creep of 0.6 of what a sample
+// scatters by; without it nothing is named (above).
+TEST(TablePoses, AWeakSettlingOfSensorsThatAreAlikeIsNamed) {
+  const PoseDiagnosis d = diagnose_poses(faces(3.2e-5, false).input, 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  ASSERT_TRUE(d.settling);
+  EXPECT_NEAR(d.settling->tau_s, 10.0, 5.1);
+  EXPECT_NEAR(d.settling->size_g.x() / 3.2e-5, 1.0, 0.2);  // five amplitudes of 60 blocks of 100 samples: 4 %
+}
+
 TEST(TablePoses, ClippingIsNamed) {
   Table t = faces(0.0, false);
   for (std::array<double, 3>& rate : t.input.gyro) {
