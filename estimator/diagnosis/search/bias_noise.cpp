@@ -227,6 +227,21 @@ std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage
   return with_these(ground, stage, std::move(best));
 }
 
+std::vector<BiasProcess> best_in_filter(const SearchGround& ground, const Stage& stage) {
+  const NoiseLikelihood likelihood(ground, stage);
+  const double without = likelihood.of(stage.hypothesis().processes);
+  std::vector<BiasProcess> best(2);  // of either triad
+  for (const std::vector<int>& axes : open_axes(stage.hypothesis())) {
+    const BiasProcess p = roughly(likelihood, stage, axes, without);
+    BiasProcess& of_triad = best[p.of_gyro() ? 0 : 1];
+    if (p.delta_chi2 > of_triad.delta_chi2) {
+      of_triad = p;
+    }
+  }
+  std::erase_if(best, [](const BiasProcess& p) { return p.axes.empty(); });
+  return best;
+}
+
 std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& stage) {
   constexpr double rate = 0.01;  // of what remains, and of the process that is to explain it
   if (!stage.hypothesis().noise.axes || ground.context.reference()) {
@@ -239,18 +254,8 @@ std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& 
   if (!remains || open.empty()) {
     return std::nullopt;
   }
-  const NoiseLikelihood likelihood(ground, stage);
-  const double without = likelihood.of(stage.hypothesis().processes);
-  std::vector<BiasProcess> best(2);  // of either triad
-  for (const std::vector<int>& axes : open) {
-    const BiasProcess p = roughly(likelihood, stage, axes, without);
-    BiasProcess& of_triad = best[p.of_gyro() ? 0 : 1];
-    if (p.delta_chi2 > of_triad.delta_chi2) {
-      of_triad = p;
-    }
-  }
-  std::erase_if(best, [](const BiasProcess& p) { return p.axes.empty(); });
-  return with_process(ground, stage, best, {std::log(rate), 1.5 * static_cast<double>(open.size()), 0.0});
+  return with_process(ground, stage, best_in_filter(ground, stage),
+                      {std::log(rate), 1.5 * static_cast<double>(open.size()), 0.0});
 }
 
 double gain_of_process(const SearchGround& ground, const Stage& stage, std::size_t i) {

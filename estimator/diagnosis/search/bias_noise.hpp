@@ -20,6 +20,10 @@ NoiseModel with_processes(NoiseModel noise, const std::vector<BiasProcess>& proc
 std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage, const std::vector<BiasProcess>& found,
                                   const Significance& significance);
 
+// Of either triad the process that gains most as states of the filter besides: of one axis or of all, roughly fitted. A coarse quantum's noise hides
+// from the columns of whole dwells what the filter sees inside them.
+std::vector<BiasProcess> best_in_filter(const SearchGround& ground, const Stage& stage);
+
 // Beside white noise of the accelerometers' integral, which hides from the columns of whole dwells what the filter sees inside them: where
 // something remains in dwells, rotations or times (1 %), with the process that explains most of it, if by chance one would in 1 %. That
 // something is there is not asked again: only what.

@@ -147,7 +147,10 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
     return std::nullopt;
   }
   if (found->process) {
-    return with_process(ground, stage, best_of_triads(ground, *found->process, processes), ground.significance);
+    const bool in_filter = stage.hypothesis().noise.axes && !ground.context.reference();
+    return with_process(ground, stage,
+                        in_filter ? best_in_filter(ground, stage) : best_of_triads(ground, *found->process, processes),
+                        ground.significance);
   }
   Selection selection = stage.selection;
   selection.hypothesis.terms.push_back(term_of(variant_of(stage, *found->term)));
