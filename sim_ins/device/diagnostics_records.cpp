@@ -163,7 +163,7 @@ Diagnostics::Reply Diagnostics::write_memory(View request) {
   begun_->record.insert(begun_->record.end(), write->data.begin(), write->data.end());
   if (begun_->record.size() == region.bytes) {
     const Begun whole = *std::exchange(begun_, std::nullopt);
-    if (const Reply written = write_record(*id, whole.record); !written) {
+    if (Reply written = write_record(*id, whole.record); !written) {
       return written;
     }
   }

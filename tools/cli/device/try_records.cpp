@@ -116,7 +116,8 @@ void try_refusals_of_identifiers(Conformance& c) {
 void try_records(Conformance& c) {
   const profile::Profile& p = c.profile();
   for (const auto& [name, did] : {std::pair("serial", p.serial), std::pair("software", p.software)}) {
-    try_record(c, name, did, May::be_there, [&](ByteView b) { return fault_of_text(b, in_memory(p, did)); });
+    try_record(c, name, did, May::be_there,
+               [filled = in_memory(p, did)](ByteView b) { return fault_of_text(b, filled); });
   }
   try_record(c, "state", p.state.did, May::be_there, [&](ByteView b) { return fault_of(profile::decode_state(p, b)); });
   try_record(c, "schedule", p.schedule.did, May::be_absent,
