@@ -10,6 +10,9 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "protocol/document/document_head.hpp"
 #include "protocol/document/summary.hpp"
@@ -57,12 +60,55 @@ struct Analysis {
     const auto found = result().at("diagnosis").find("discovered");
     return found == result().at("diagnosis").end() ? none : *found;
   }
+  // Equations that explain as well as those that are told.
+  std::size_t others() const {
+    std::size_t count = 0;
+    for (const ordered_json& law : laws()) {
+      count += law.at("class").size() - std::min<std::size_t>(1, law.at("class").size());
+    }
+    return count;
+  }
   // One equation in each class.
-  bool settled() const {
-    return std::all_of(laws().begin(), laws().end(),
-                       [](const ordered_json& law) { return law.at("class").size() < 2; });
+  bool settled() const { return others() == 0; }
+  // Whether another attitude of the base would part what no rotation of the gimbal does.
+  bool on_this_base_only() const {
+    return std::any_of(laws().begin(), laws().end(), [](const ordered_json& law) { return !here_only(law).empty(); });
+  }
+  static std::vector<std::string> here_only(const ordered_json& law) {
+    std::vector<std::string> words;
+    for (const ordered_json& member : law.at("class")) {
+      const auto some = member.find("only_here");
+      if (some != member.end()) {
+        words.insert(words.end(), some->begin(), some->end());
+      }
+    }
+    return words;
   }
 };
+
+// "2 others explain it too (odds): wi*so 0.12, wy*fz 0.031"
+std::string rivals_text(const ordered_json& law) {
+  constexpr std::size_t most = 3;
+  std::vector<std::pair<double, std::string>> rivals;
+  for (const ordered_json& member : law.at("class")) {
+    if (member.at("expression") != law.at("expression") || member.at("axis") != law.at("axis")) {
+      const bool same_axis = member.at("axis") == law.at("axis");
+      rivals.emplace_back(-member.at("odds").get<double>(),
+                          fmt::format("{}{}", same_axis ? "" : member.at("axis").get<std::string>() + " ",
+                                      member.at("expression").get<std::string>()));
+    }
+  }
+  if (rivals.empty()) {
+    return "nothing else explains it as well";
+  }
+  std::sort(rivals.begin(), rivals.end());
+  std::vector<std::string> some;
+  for (std::size_t k = 0; k < std::min(most, rivals.size()); ++k) {
+    some.push_back(fmt::format("{} {:.2g}", rivals[k].second, -rivals[k].first));
+  }
+  return fmt::format("{} other{} explain{} it too (odds): {}{}", rivals.size(), rivals.size() > 1 ? "s" : "",
+                     rivals.size() > 1 ? "" : "s", fmt::join(some, ", "), rivals.size() > most ? ", ..." : "");
+}
 
 Schedule schedule_in(const ordered_json& next) {
   Schedule schedule;
@@ -150,10 +196,16 @@ class Investigation {
   // Empty: another rotation is to come.
   std::string why_it_ends(const Analysis& a) const {
     if (a.acceptable() && a.settled()) {
-      return a.laws().empty() ? "the catalogue explains it" : "one equation is left";
+      return a.laws().empty()        ? "the catalogue explains it"
+             : a.on_this_base_only() ? "one equation is left as long as the base stands as it does"
+                                     : "one equation is left";
     }
     if (!a.next) {
-      return "no further rotation would tell more";
+      return a.settled()
+                 ? "no further rotation would tell more"
+                 : fmt::format(
+                       "no further rotation would tell apart the equations that are left ({} told, {} beside them)",
+                       a.laws().size(), a.others());
     }
     if (a.next->duration_s() > left_s_) {
       return fmt::format("the next rotation takes {:.0f} min, {:.0f} min are left", a.next->duration_s() / 60.0,
@@ -191,15 +243,15 @@ class Investigation {
     say(fmt::format("{}. run{} {}: {}\n", story_.size() + 1, a.runs.size() > 1 ? "s" : "", fmt::join(a.runs, ", "),
                     summary.verdict));
     for (const ordered_json& law : a.laws()) {
-      const std::size_t others = law.at("class").size() - 1;
       say(fmt::format("   {} = ({:.4g} +- {:.2g} {}) * {}; {}\n", law.at("axis").get<std::string>(),
                       law.at("coefficient").get<double>(), law.at("sigma").get<double>(),
-                      law.at("unit").get<std::string>(), law.at("expression").get<std::string>(),
-                      others == 0 ? "nothing else explains it as well"
-                                  : fmt::format("{} other{} explain{} it too", others, others > 1 ? "s" : "",
-                                                others > 1 ? "" : "s")));
+                      law.at("unit").get<std::string>(), law.at("expression").get<std::string>(), rivals_text(law)));
+      if (const auto words = Analysis::here_only(law); !words.empty()) {
+        say(fmt::format("   no rotation parts that from {}{}; another attitude of the base would\n", words.front(),
+                        words.size() > 1 ? fmt::format(" and {} more", words.size() - 1) : std::string()));
+      }
     }
-    if (a.next && why_it_ends(a).empty()) {
+    if (a.next && !(a.acceptable() && a.settled())) {
       const ordered_json& next = a.result().at("next_experiment");
       step["next_experiment"] = next;
       say(fmt::format("   next: {} positions, {:.0f} min, {}\n", a.next->positions.size(), a.next->duration_s() / 60.0,

@@ -72,7 +72,7 @@ function whyNext(step) {
   if (splits.length === 0) {
     return 'To see the same in other positions: what one recording alone shows is not written.';
   }
-  return element('span', {}, `Of all rotations of that length this one parts the equations best: ${significant(next.separation_sigma, 3)} σ are expected between the best and `,
+  return element('span', {}, `Of the rotations that were tried this one most probably leaves one equation: ${significant(next.separation_sigma, 3)} σ are expected between the best and `,
                  lawAsMath(textOf(splits[0])), Number.isFinite(next.separation_now_sigma) ? `; these recordings alone have ${significant(next.separation_now_sigma, 3)} σ.` : '.');
 }
 
@@ -106,7 +106,7 @@ function showStep(steps, k) {
   if (laws.length > 0) {
     section.append(lawSizes(laws));
     for (const law of laws) {
-      section.append(element('h3', {}, classOf(law).length > 1 ? `What explains ${textOf(law.axis)} as well` : `Nothing else explains ${textOf(law.axis)} as well`),
+      section.append(element('h3', {}, classOf(law).length > 1 ? `What explains ${textOf(law.axis)} as well` : `Nothing else ${classOf(law).some((m) => listOf(m.only_here).length > 0) ? 'that a rotation could part ' : ''}explains ${textOf(law.axis)} as well`),
                      classTable(law, before));
     }
     const texts = [...laws, ...before].flatMap(classOf).map((m) => textOf(m.expression));
