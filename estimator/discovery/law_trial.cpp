@@ -2,16 +2,42 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "estimator/discovery/piece_model.hpp"
 #include "estimator/discovery/scene.hpp"
+#include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
 namespace {
 
 constexpr int constant_rounds = 12;
+// What an expression may be as large as: squares of it are summed, and a coefficient stands for the rest.
+constexpr double smallest_size = 1e-50, largest_size = 1e50;
+// Sigma from which a law is not seen: three of it make, rms over the recording, what no such sensor is off by.
+constexpr double sigmas_to_see = 3.0;
+
+std::string short_text(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+// Root mean square of a law's expression over all recordings.
+double rms_of(const LawTerm& law, const std::vector<std::unique_ptr<Scene>>& scenes) {
+  double square = 0.0, time = 0.0;
+  for (const auto& scene : scenes) {
+    const Eigen::ArrayXd values = law.expression.evaluate(scene->table.channels, law.constants);
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      const double dt = scene->table.nodes[static_cast<std::size_t>(i)].dt;
+      square += values(i) * values(i) * dt;
+      time += dt;
+    }
+  }
+  return std::sqrt(square / time);
+}
 
 std::optional<LawTrialFailure> missing_channel(const LawMotion& motion, const std::vector<LawTerm>& laws) {
   for (std::size_t k = 0; k < laws.size(); ++k) {
@@ -33,6 +59,13 @@ std::optional<LawTrialFailure> not_finite(const NodeTable& table, const std::vec
         const double t = table.nodes[static_cast<std::size_t>(i)].time_s;
         return LawTrialFailure{k, "not finite at " + std::to_string(t) + " s after the start"};
       }
+    }
+    const double largest = values.abs().maxCoeff();
+    if (largest == 0.0) {
+      return LawTrialFailure{k, "zero all along the recording"};
+    }
+    if (largest < smallest_size || largest > largest_size) {
+      return LawTrialFailure{k, "as large as " + short_text(largest) + ": no coefficient makes a sensor error of that"};
     }
   }
   return std::nullopt;
@@ -195,6 +228,9 @@ tl::expected<std::vector<TriedLaw>, LawTrialFailure> try_laws(std::span<const Un
     law.share = std::clamp(law.gain / std::max(1.0, fit.square_before - fit.rows), 0.0, 1.0);
     law.stated = stated[k];
     law.collinear = fit.collinear[k];
+    const int bias = law.term.axis < 3 ? parameter::gyro_drift : parameter::accel_bias;
+    law.least_sigma_unseen =
+        plausible_limit()(bias) / unit_of(law.term.axis) / (sigmas_to_see * rms_of(law.term, scenes));
     tried.push_back(std::move(law));
   }
   return tried;

@@ -19,8 +19,10 @@ struct TriedLaw {
   std::vector<Constant> constants;        // the k-th `?` is "constant k"
   double significance = 0.0;              // sigma, corrected for the peaks that free constants had to choose from
   double gain = 0.0, held_out_gain = 0.0, share = 0.0;
-  double stated = 0.0;     // the file's coefficient; NaN: none
-  double collinear = 0.0;  // share of its information that the other laws and the constants take, 0 to 1
+  double stated = 0.0;              // the file's coefficient; NaN: none
+  double collinear = 0.0;           // share of its information that the other laws and the constants take, 0 to 1
+  double least_sigma_unseen = 0.0;  // with a larger one the 24 hold all of it, or it hardly acts
+  bool seen() const { return sigma < least_sigma_unseen; }
   double log_peaks = 0.0;  // of the peaks that free constants had to choose from
   std::vector<std::string>
       shares_with;  // "effect coefficient": of an effect that was named, where the data tell a combination

@@ -274,6 +274,11 @@ std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {
       text += fmt::format("    shares its evidence with {}: its sigma holds what they leave open\n",
                           fmt::join(law.shares_with, ", "));
     }
+    if (!law.seen()) {
+      text +=
+          "    these recordings cannot show it: a bias, a scale factor or a misalignment does the same, or it hardly "
+          "acts\n";
+    }
     if (law.collinear > 0.99) {
       text += "    nearly collinear with the other laws or with its own constants: its sigma says how little is seen\n";
     }
@@ -294,7 +299,8 @@ ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried) {
                       {"held_out_gain", law.held_out_gain},
                       {"share", law.share},
                       {"collinear", law.collinear},
-                      {"shares_with", law.shares_with}};
+                      {"shares_with", law.shares_with},
+                      {"seen", law.seen()}};
     if (std::isfinite(law.stated)) {
       j["stated"] = law.stated;
     }
