@@ -75,8 +75,10 @@ Places find_columns(const ImportMap& map, Columns& columns) {
     places.gyro[k] = columns.place(map.gyro.columns[k], "gyro.columns");
     places.accelerometer[k] = columns.place(map.accelerometer.columns[k], "accelerometer.columns");
   }
-  if (map.gimbal.outer && map.gimbal.inner) {
+  if (map.gimbal.outer) {
     places.outer = columns.place(*map.gimbal.outer, "gimbal.outer");
+  }
+  if (map.gimbal.inner) {
     places.inner = columns.place(*map.gimbal.inner, "gimbal.inner");
   }
   for (const ColumnRef& ref : map.temperature) {
@@ -124,9 +126,14 @@ std::vector<double> read_out(const GimbalMap& map, std::size_t which, const std:
 
 void set_gimbal(const GimbalMap& map, const Places& places, const ColumnData& data, Imported& imported) {
   Recording& recording = imported.recording;
-  if (map.outer && map.inner) {
-    recording.gimbal_outer_rad = read_out(map, 0, data.values[places.outer]);
-    recording.gimbal_inner_rad = read_out(map, 1, data.values[places.inner]);
+  if (map.outer || map.inner) {
+    const std::vector<double> none(data.rows, 0.0);  // of a table with one axis
+    recording.gimbal_outer_rad = map.outer ? read_out(map, 0, data.values[places.outer]) : none;
+    recording.gimbal_inner_rad = map.inner ? read_out(map, 1, data.values[places.inner]) : none;
+    if (!map.outer || !map.inner) {
+      imported.notes.push_back(
+          fmt::format("one read-out: that of the {} axis is written as 0", map.outer ? "inner" : "outer"));
+    }
     return;
   }
   const std::array<double, 2> fixed = map.fixed_deg.value_or(std::array<double, 2>{});

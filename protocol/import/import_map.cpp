@@ -302,8 +302,9 @@ void read_gimbal(Section& section, GimbalMap& gimbal) {
   }
   section.flag("absent", gimbal.absent);
   const int ways = (gimbal.outer || gimbal.inner ? 1 : 0) + (gimbal.fixed_deg ? 1 : 0) + (gimbal.absent ? 1 : 0);
-  if (ways != 1 || gimbal.outer.has_value() != gimbal.inner.has_value()) {
-    section.miss("gimbal", "one of these is expected: outer and inner, fixed_deg = [outer, inner], absent = true");
+  if (ways != 1) {
+    section.miss("gimbal",
+                 "one of these is expected: outer and inner or one of them, fixed_deg = [outer, inner], absent = true");
   }
   for (const double sign : gimbal.signs) {
     if (std::abs(sign) != 1.0) {

@@ -158,12 +158,16 @@ void write_gimbal(Writer& out, const GimbalMap& gimbal) {
   if (gimbal.fixed_deg) {
     return out.line("fixed_deg", list(*gimbal.fixed_deg, number));
   }
-  if (!gimbal.outer || !gimbal.inner) {
-    out.open("outer", "8            # and inner = 9; or fixed_deg = [0, 0]; or absent = true");
+  if (!gimbal.outer && !gimbal.inner) {
+    out.open("outer", "8            # and inner = 9, or one of them; or fixed_deg = [0, 0]; or absent = true");
     return;
   }
-  out.line("outer", column(gimbal.outer.value_or(ColumnRef{})));
-  out.line("inner", column(gimbal.inner.value_or(ColumnRef{})));
+  if (gimbal.outer) {
+    out.line("outer", column(*gimbal.outer));
+  }
+  if (gimbal.inner) {
+    out.line("inner", column(*gimbal.inner));
+  }
   out.line("unit", toml_text(gimbal.unit));
   out.line("signs", list(gimbal.signs, number));
   if (gimbal.offsets_deg != std::array<double, 2>{}) {

@@ -115,6 +115,22 @@ columns = ["temperature_c_0"]
   EXPECT_EQ(built->recording.gimbal_inner_rad, expected.gimbal_inner_rad);
 }
 
+// A table with one axis: what it does not have stands still, and that is said.
+TEST_F(Build, OneReadOutIsEnough) {
+  const std::string sensors(counts, std::string_view(counts).find("[gimbal]"));
+  for (const bool outer : {true, false}) {
+    const std::string map = std::string(site) + sensors + "[gimbal]\n" + (outer ? "outer" : "inner") + " = 7\n";
+    const auto built = build("0 0 0 0 0 1 10\n0 0 0 0 0 1 20\n", map);
+    ASSERT_TRUE(built) << built.error().message;
+    const Recording& r = built->recording;
+    const std::vector<double>& turned = outer ? r.gimbal_outer_rad : r.gimbal_inner_rad;
+    ASSERT_EQ(turned.size(), 2u);
+    EXPECT_DOUBLE_EQ(turned[1], 20.0 * units::degree);
+    EXPECT_EQ(outer ? r.gimbal_inner_rad : r.gimbal_outer_rad, std::vector<double>(2, 0.0));
+    EXPECT_THAT(built->notes, ::testing::Contains(::testing::HasSubstr("one read-out")));
+  }
+}
+
 // Jitter of half an interval either way: the sums are those of before, the intervals are even.
 TEST_F(Build, ResamplesOnlyWhenAskedAndSaysSo) {
   std::string text;

@@ -73,7 +73,7 @@ TEST(ImportMap, RefusesWithLineAndKey) {
         Case{with("kind = \"rates\"", "kind = \"rate\""), "gyro.kind: \"rate\" is none of rates, increments"},
         Case{with("scale = 125", "scales = 125"), "accelerometer.scales: unknown key; did you mean scale?"},
         Case{with("signs = [1, -1]", "signs = [1, 2]"), "gimbal.signs: 2 is neither 1 nor -1"},
-        Case{with("inner = 9\n", ""), "gimbal: one of these is expected"},
+        Case{with("outer = 8\ninner = 9\n", ""), "gimbal: one of these is expected"},
         Case{with("[gyro]", "[gyros]"), "gyros: unknown key; did you mean gyro?"},
         Case{with("column = \"t\"\n", ""), "time: neither a column nor recording.sample_rate_hz"},
         Case{with("scale = 125", "scale = nan"), "accelerometer.scale: a finite number"}}) {
