@@ -62,6 +62,19 @@ InnovationColour colour_of_rows(const SignatureRows& rows, const RecordingContex
   return colour_of(rows.residual, segment);
 }
 
+// The densities fitted beside what was named: what was left out had taken its share of them.
+NoiseModel beside(const Stage& stage) {
+  const NoiseModel& noise = stage.hypothesis().noise;
+  PassInput trial = stage.point.pass(noise);
+  const Navigated navigated = navigate(trial);
+  trial.navigated = &navigated;
+  const auto fitted = refit_velocity_noise(noise, [&](const NoiseModel& other) {
+    trial.noise = other;
+    return run_pass(trial).log_likelihood;
+  });
+  return fitted.value_or(noise);
+}
+
 class Diagnoser {
  public:
   Diagnoser(ImuData data, const DiagnosisOptions& options, const std::function<void(const std::string&)>& say)
@@ -125,7 +138,11 @@ void Diagnoser::name() {
   SearchResult found = search(context, input, {log_names_, say_, options_.stop});
   if (beats_ && !found.empty()) {  // what was left out coloured the innovations too
     context.set_colour({});
-    const LinearModel model = LinearModel::about(context, {input, recording}, found.stage.hypothesis(), {}, false);
+    Hypothesis named = found.stage.hypothesis();
+    named.noise = beside(found.stage);
+    input.noise = named.noise;
+    input.noise.biases.clear();
+    const LinearModel model = LinearModel::about(context, found.stage.point, named, {}, false);
     SignatureRows left = model.rows();
     left.residual = model.residual_after(columns_of(model.terms()));
     context.set_colour(colour_of_rows(left, context));

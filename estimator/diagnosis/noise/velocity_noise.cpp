@@ -98,7 +98,7 @@ std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
   }
   const Sizes before = sizes_of(noise);
   const Sizes best =
-      top_of(before, {1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(noise, s)); }).at;
+      top_of(before, {2.0, 1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(noise, s)); }).at;
   if (best == before) {
     return std::nullopt;
   }

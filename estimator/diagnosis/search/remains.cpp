@@ -58,8 +58,9 @@ bool any_collinear(const LinearModel& model, const Hypothesis& named) {
       }
     }
     for (const BiasProcess& process : named.processes) {
-      // A walk follows any slow curve. An instability is noise of the filter, beside which the term is significant or not.
-      if (process.kernel.kind == BiasKernel::Kind::random_walk &&
+      // A walk follows any slow curve. An instability is noise of the filter, beside which the term is significant or not; so is a walk
+      // beside a coarse quantum, where the filter was asked inside the dwells.
+      if (process.kernel.kind == BiasKernel::Kind::random_walk && !named.noise.axes &&
           stands_for(model, columns_of_triad(model, process), terms[i], z)) {
         return true;
       }
