@@ -117,10 +117,10 @@ class Search {
       const Scene& scene = *scenes_[r];
       const diagnosis::CorrectedRecording rest =
           without_laws(scene.motion, scene.table, scene.input, state_.terms, state_.fit.coefficient);
-      PassInput input = scenes_[r]->input;
+      PassInput input = scene.input;
       input.data = &rest.data();
       all.push_back(
-          sum_over_pieces(scenes_[r]->motion, input, trace_pass(input, options_.stop), options_.stop, pieces_each()));
+          sum_over_pieces(scene.motion, input, trace_pass(input, options_.stop), options_.stop, pieces_each()));
     }
     return join(std::move(all));
   }
