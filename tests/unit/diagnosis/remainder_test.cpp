@@ -2,6 +2,7 @@
 // something there.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
@@ -10,18 +11,23 @@
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr NoiseDensities start = {1e-6, 4e-5, 3e-5};
+using Densities = std::array<double, 9>;  // angle random walk, velocity random walk, integral; of x, y, z each
+constexpr Densities start = {1e-6, 2e-6, 1.5e-6, 4e-5, 3e-5, 5e-5, 3e-5, 2e-5, 6e-5};
 
-NoiseDensities densities(const NoiseModel& noise, const NoiseDensities& of_walk) {
-  // The walk's density is seen through the variance that it drives: linear in its sigma.
-  const double scale = noise.observation.motion.front().oscillations.front().sigma /
-                       with_velocity_noise(noise, of_walk).observation.motion.front().oscillations.front().sigma;
-  return {noise.gyro_arw, noise.accel_vrw, scale * of_walk[2]};
+NoiseModel with(const Densities& d) {
+  NoiseModel noise;
+  noise.axes = {Vector3(d[0], d[1], d[2]), Vector3(d[3], d[4], d[5]), Vector3(d[6], d[7], d[8])};
+  return noise;
+}
+
+Densities densities(const NoiseModel& noise) {
+  const Vector3 &g = noise.axes->gyro_arw, &a = noise.axes->accel_vrw, &v = noise.axes->accel_integral;
+  return {g(0), g(1), g(2), a(0), a(1), a(2), v(0), v(1), v(2)};
 }
 
 // Log likelihood with its top at `top`; the densities' logarithms are known to 1/100 and independent.
-double likelihood(const NoiseModel& noise, const NoiseDensities& top) {
-  const NoiseDensities d = densities(noise, start);
+double likelihood(const NoiseModel& noise, const Densities& top) {
+  const Densities d = densities(noise);
   double sum = 0.0;
   for (std::size_t k = 0; k < d.size(); ++k) {
     const double off = std::log(d[k] / top[k]) / 0.01;
@@ -32,19 +38,24 @@ double likelihood(const NoiseModel& noise, const NoiseDensities& top) {
 
 // The last steps are of 6 %: half of one remains at most where the densities do not hang together.
 TEST(RefitVelocityNoise, GoesToTheTop) {
-  const NoiseDensities top = {start[0] / 1.67, start[1] * 1.16, start[2] * 1.06};
-  const auto refitted = refit_velocity_noise(with_velocity_noise({}, start),
-                                             [&](const NoiseModel& trial) { return likelihood(trial, top); });
+  Densities top = start;
+  top[0] /= 1.67;  // one axis of each kind
+  top[4] *= 1.16;
+  top[8] *= 1.06;
+  const auto refitted =
+      refit_velocity_noise(with(start), [&](const NoiseModel& trial) { return likelihood(trial, top); });
   ASSERT_TRUE(refitted);
-  const NoiseDensities found = densities(*refitted, start);
+  const Densities found = densities(*refitted);
   for (std::size_t k = 0; k < found.size(); ++k) {
     EXPECT_LT(std::abs(std::log(found[k] / top[k])), 0.501 * std::log(1.06)) << k;
   }
+  // Of a triad the filter is told the root of the mean square.
+  EXPECT_DOUBLE_EQ(refitted->gyro_arw, std::sqrt(refitted->axes->gyro_arw.squaredNorm() / 3.0));
+  EXPECT_DOUBLE_EQ(refitted->accel_vrw, std::sqrt(refitted->axes->accel_vrw.squaredNorm() / 3.0));
 }
 
 TEST(RefitVelocityNoise, StaysAtTheTop) {
-  EXPECT_FALSE(refit_velocity_noise(with_velocity_noise({}, start),
-                                    [](const NoiseModel& trial) { return likelihood(trial, start); }));
+  EXPECT_FALSE(refit_velocity_noise(with(start), [](const NoiseModel& trial) { return likelihood(trial, start); }));
 }
 
 // A base that sways has oscillations of its own in the filter, a still one none: neither is the walk of a quantum.
