@@ -24,7 +24,7 @@ struct CarryOver {
   std::vector<double> probability;  // [laws] that at most a tenth of the misfit's power is left on another plan
   std::vector<double> merit;        // [laws] the same with a soft limit: what is compared
   Eigen::MatrixXd information;      // [laws x laws] of the coefficients, on both plans together
-  Eigen::MatrixXd here;             // the same with the vehicle as it stands
+  Eigen::MatrixXd here;             // the same on the first of them with the vehicle as it stands
 };
 
 // Whether the two are one function in other words: fitted in each other's place they leave less than 1 sigma and less than a
