@@ -139,7 +139,10 @@ void Diagnoser::name() {
   if (beats_ && !found.empty()) {  // what was left out coloured the innovations too
     context.set_colour({});
     Hypothesis named = found.stage.hypothesis();
-    named.noise = beside(found.stage);
+    if (!named.terms
+             .empty()) {  // a process alone is noise itself: what it is not stationary in stays with the densities
+      named.noise = beside(found.stage);
+    }
     input.noise = named.noise;
     input.noise.biases.clear();
     const LinearModel model = LinearModel::about(context, found.stage.point, named, {}, false);
