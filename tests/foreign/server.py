@@ -1,5 +1,6 @@
 """What the servers of this folder share, whatever they speak: refusals, checksums, a gimbal that turns by the clock, the dialogue."""
 import signal
+import struct
 import sys
 import time
 
@@ -113,6 +114,8 @@ def serve(ins, interface, request_id, response_id, functional_id, wide=True):
             response = ins.answer(request)
         except Refused as refusal:
             response = b"" if for_all else bytes([0x7F, request[0], refusal.args[0]])
+        except (IndexError, struct.error):  # a request that is too short to be read: incorrectMessageLengthOrInvalidFormat
+            response = b"" if for_all else bytes([0x7F, request[0], 0x13])
         if response is None:
             time.sleep(ins.AWAY_S)
             ins.power_on()

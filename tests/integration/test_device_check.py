@@ -15,6 +15,7 @@ import case
 import profile_case
 
 VIRTUAL = ("selfcal.toml", "example.toml", "memory.toml", "addresses.toml", "extended.toml", "mixed.toml")
+ABOUT_TIME = ("timing.p2", "isotp.n_bs")  # what an INS fails that comes late
 NOBODYS = "vcan0"  # where no INS is
 PROFILES = profile_case.PROFILES
 SERVER = case.ROOT / "tests" / "foreign" / "deviating_ins.py"
@@ -33,6 +34,7 @@ class DeviceCheck(unittest.TestCase):
         cls.key.write_text(secrets.token_hex(16) + "\n", encoding="ascii")
         for name, bus in (("extended", profile_case.EXTENDED), ("mixed", profile_case.MIXED)):
             (Path(cls.folder.name) / f"{name}.toml").write_text(profile_case.addressed(bus), encoding="utf-8")
+        cls.children = {}  # process of each server in Python
         # All at once: each waits most of the time for what an INS must not do. One interpreter is all of them, by fork.
         names = sorted(p.name for p in Path("/sys/class/net").iterdir() if p.name.startswith("vcan") and p.name != NOBODYS)
         interfaces = iter(names)
@@ -64,6 +66,7 @@ class DeviceCheck(unittest.TestCase):
                 deviating_ins.main()
             finally:
                 os._exit(1)
+        cls.children[deviation] = child
         cls.addClassCleanup(os.waitpid, child, 0)
         cls.addClassCleanup(os.kill, child, signal.SIGKILL)
         os.close(writer)
@@ -94,7 +97,7 @@ class DeviceCheck(unittest.TestCase):
     def judged_of_sound(self, name):
         """All at once on two processors and one disk, a sound INS may be late. Alone it must be in time."""
         document = self.found[name].result()
-        if any(r["id"] == "timing.p2" and r["verdict"] == "fails" for r in document["requirements"]):
+        if any(r["id"] in ABOUT_TIME and r["verdict"] == "fails" for r in document["requirements"]):
             concurrent.futures.wait(self.found.values())
             print(f"{name or 'the sound server'}: late beside {len(self.found) - 1} others; alone:", flush=True)
             document = self.check(*self.where[name])
@@ -133,6 +136,21 @@ class DeviceCheck(unittest.TestCase):
             self.assertEqual([(r["id"], r["verdict"]) for r in rest], [("memory.page" if profile == "memory.toml" else "upload.begin", "not tried")], rest)
             self.assertEqual("isotp.address" in {r["id"] for r in document["requirements"]}, profile in ("extended.toml", "mixed.toml"))
             print(f"sim_ins under {profile}: {document['holds']} requirements hold, 0 fail", flush=True)
+
+    def test_ends_where_an_ins_falls_silent(self):
+        """Three sessions in a row without an answer are enough: what is behind them is not tried, and not waited for."""
+        concurrent.futures.wait(self.found.values())
+        pool = concurrent.futures.ThreadPoolExecutor(1)
+        self.addCleanup(pool.shutdown)
+        cut_off = pool.submit(self.check, *self.where["wrong_nrc"])
+        time.sleep(3.0)  # a check of all requirements takes 20 s and more
+        os.kill(self.children["wrong_nrc"], signal.SIGKILL)
+        requirements = cut_off.result()["requirements"]
+        silent = [r for r in requirements if "the INS fell silent after" in r.get("why", "")]
+        self.assertTrue(any(r["verdict"] == "holds" for r in requirements))
+        self.assertGreater(len(silent), 20)
+        self.assertEqual({r["verdict"] for r in silent}, {"not tried"})
+        print(f"an INS that falls silent: {len(silent)} requirements are not tried, {silent[0]['why']}", flush=True)
 
     def test_no_answer_is_an_error(self):
         done = subprocess.run([case.bench.BIN / "selfcal", "device", "check", NOBODYS], capture_output=True,

@@ -12,6 +12,8 @@ namespace {
 
 // Long enough for an answer that must not come.
 constexpr double silence_s = 0.25;
+// Sessions in a row that were not answered: one answer may be lost, and one that is seconds late is waited for each time.
+constexpr int most_unanswered = 3;
 
 std::string codes_text(std::initializer_list<uds::Nrc> codes) {
   std::string text = "7F, the service, ";
@@ -82,8 +84,13 @@ bool Conformance::unlock() {
 }
 
 bool Conformance::enter(Mode mode) {
+  if (unanswered_ >= most_unanswered) {
+    why_not_ = fmt::format("the INS fell silent after {}", answered_last_);
+    return false;
+  }
   const auto session = mode == Mode::standard ? uds::Session::standard : static_cast<uds::Session>(profile_.session);
   const Exchange entered = tester_.ask(uds::session_request(session));
+  unanswered_ = entered.kind == Exchange::Kind::silent ? unanswered_ + 1 : 0;
   if (entered.kind != Exchange::Kind::positive) {
     why_not_ = fmt::format("session {:02X} is not entered: {}", static_cast<unsigned>(session), words(entered));
     return false;
@@ -103,6 +110,7 @@ bool Conformance::ready(const Requirement& requirement) {
     not_tried(requirement, why_not_);
     return false;
   }
+  answered_last_ = requirement.id;
   return true;
 }
 

@@ -63,7 +63,8 @@ class Conformance {
   void judged(const Requirement& requirement, std::string sent, std::string expected, std::string came, bool holds);
   void not_tried(const Requirement& requirement, std::string why);
 
-  bool enter(Mode mode);  // false: why_not() says why
+  // False: why_not() says why. An INS that answered several sessions in a row with nothing is not asked again.
+  bool enter(Mode mode);
   const std::string& why_not() const { return why_not_; }
   bool unlock();
   Expected<Bytes> key_to(const Bytes& seed) const;
@@ -80,6 +81,8 @@ class Conformance {
   Permission permission_;
   std::vector<Result> results_;
   std::string why_not_;
+  int unanswered_ = 0;         // sessions in a row
+  std::string answered_last_;  // requirement whose session was entered
 };
 
 std::string words(const Exchange& exchange);
