@@ -36,7 +36,7 @@ class Investigate(case.OnBench):
         self.assert_one_line(unit.selfcal("investigate", run["run"], "--time", "soon", check=False).stderr, "--time soon")
         self.assert_one_line(unit.selfcal("investigate", 99, check=False).stderr, "no run 99")
 
-        story = json.loads(unit.selfcal("investigate", run["run"], "--time", "110m", "--json", check=False, timeout=400).stdout)
+        story = json.loads(unit.selfcal("investigate", run["run"], "--time", "110m", "--json", check=False, timeout=800).stdout)
         self.assertEqual(story["exit_status"], case.DONE, story["ended"])
         self.assertGreaterEqual(len(story["steps"]), 2)
         experiment = story["steps"][0]["experiment"]
