@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/ins/pass_events.hpp"
 #include "protocol/profile/names.hpp"
 #include "protocol/uds/services.hpp"
 
@@ -9,16 +10,7 @@ namespace selfcal {
 
 MemoryPort::MemoryPort(std::shared_ptr<InsPort> ins, profile::ProfilePtr profile)
     : ins_(std::move(ins)), profile_(std::move(profile)) {
-  ins_->on_bus_event = [this](can::BusEvent event) {
-    if (on_bus_event) {
-      on_bus_event(event);
-    }
-  };
-  ins_->on_status = [this](const ins::Status& status) {
-    if (on_status) {
-      on_status(status);
-    }
-  };
+  pass_events(*ins_, *this);
 }
 
 MemoryPort::~MemoryPort() {

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "daemon/ins/pass_events.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
 
@@ -26,16 +27,7 @@ std::uint16_t number_in(std::span<const std::uint8_t> payload) {
 
 StreamPort::StreamPort(EventLoop& loop, std::unique_ptr<InsPort> ins, const InsConfig& config)
     : loop_(loop), ins_(std::move(ins)), config_(config), stream_(config.profile) {
-  ins_->on_bus_event = [this](can::BusEvent event) {
-    if (on_bus_event) {
-      on_bus_event(event);
-    }
-  };
-  ins_->on_status = [this](const ins::Status& status) {
-    if (on_status) {
-      on_status(status);
-    }
-  };
+  pass_events(*ins_, *this);
   const auto& given = config_.profile->sample_format.given;
   if (const auto rate = given.find("sample_rate"); rate != given.end()) {
     sample_rate_hz_ = rate->second;
