@@ -109,9 +109,12 @@ Expected<int> version_of(Connection& connection) {
 }
 
 Expected<int> migrate(Connection& connection) {
+  // Sets go on sending. A run is stored under the second lock (submit_run), so none is half stored when the first table
+  // is changed: the steps and a run lock the same tables in different orders.
   const auto begun = connection.execute(
       "BEGIN; SET LOCAL lock_timeout = '10s'; SET LOCAL client_min_messages = warning; "
-      "SELECT pg_advisory_xact_lock(hashtext('selfcal.schema'))");
+      "SELECT pg_advisory_xact_lock(hashtext('selfcal.schema')); "
+      "SELECT pg_advisory_xact_lock(hashtext('selfcal.arrivals'))");
   if (!begun) {
     return tl::unexpected(begun.error());
   }
