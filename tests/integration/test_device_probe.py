@@ -13,23 +13,28 @@ import case
 import profile_case
 
 PROFILES = case.ROOT / "config" / "profiles"
+RECEIVE_BUFFER_FORCE = 33  # SO_RCVBUFFORCE, which Python does not name
 
 
 class Bus(threading.Thread):
-    """Every frame of an interface."""
+    """Every frame of an interface, to the last one that was sent before `end`."""
 
     def __init__(self, interface):
         super().__init__(daemon=True)
         self.can = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        self.can.setsockopt(socket.SOL_SOCKET, RECEIVE_BUFFER_FORCE, 4 << 20)  # a busy machine loses none
         self.can.bind((interface,))
         self.can.settimeout(0.2)
         self.frames, self.over = [], False
 
     def run(self):
-        while not self.over:
+        while True:
+            over = self.over  # before the frame is waited for: silence counts from then
             try:
                 frame = self.can.recv(16)
             except TimeoutError:
+                if over:
+                    return
                 continue
             identifier, length = struct.unpack("=IB", frame[:5])
             self.frames.append((identifier, frame[8:8 + length]))
