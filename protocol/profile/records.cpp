@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "protocol/profile/gimbal_axes.hpp"
+
 namespace selfcal::profile {
 namespace {
 
@@ -53,22 +55,6 @@ Expected<void> take_all(const Values& values, const Record& record, std::string_
   } else {
     return {};
   }
-}
-
-// Gimbal angles, outer and inner: our axes in the INS's words, and back.
-template <typename T>
-std::array<T, 2> in_their_axes(const Profile& profile, const std::array<T, 2>& ours) {
-  std::array<T, 2> theirs{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    theirs[profile.raw.gimbal[k]] = static_cast<T>(profile.raw.gimbal_sign[k] * ours[k]);
-  }
-  return theirs;
-}
-
-template <typename T>
-std::array<T, 2> in_our_axes(const Profile& profile, const std::array<T, 2>& theirs) {
-  return {static_cast<T>(profile.raw.gimbal_sign[0] * theirs[profile.raw.gimbal[0]]),
-          static_cast<T>(profile.raw.gimbal_sign[1] * theirs[profile.raw.gimbal[1]])};
 }
 
 void put(Values& values, std::string_view name, long double number) {

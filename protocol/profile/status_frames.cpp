@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "protocol/profile/frame_values.hpp"
+#include "protocol/profile/gimbal_axes.hpp"
 
 namespace selfcal::profile {
 namespace {
@@ -119,8 +120,9 @@ std::array<can::CanFrame, 2> encode_status(const Profile& profile, const ins::St
         std::pair("pages_written", double(status.pages_written)), std::pair("state_alive", double(alive))}) {
     put(state, name, value, frames[0]);
   }
+  const auto angles = in_their_axes<double>(profile, {status.outer_deg, status.inner_deg});
   for (const auto& [name, value] :
-       {std::pair("outer_angle", status.outer_deg), std::pair("inner_angle", status.inner_deg),
+       {std::pair("outer_angle", angles[0]), std::pair("inner_angle", angles[1]),
         std::pair("time_left", status.time_left_s), std::pair("gimbal_alive", double(alive))}) {
     put(gimbal, name, value, frames[1]);
   }
@@ -136,8 +138,12 @@ bool apply_status(const Profile& profile, const can::CanFrame& frame, std::uint3
     return false;
   }
   if (!is_state) {
-    take_angle(kind, "outer_angle", frame, status.outer_deg);
-    take_angle(kind, "inner_angle", frame, status.inner_deg);
+    auto angles = in_their_axes<double>(profile, {status.outer_deg, status.inner_deg});
+    take_angle(kind, "outer_angle", frame, angles[0]);
+    take_angle(kind, "inner_angle", frame, angles[1]);
+    const auto ours = in_our_axes<double>(profile, angles);
+    status.outer_deg = within_turn(ours[0]);
+    status.inner_deg = within_turn(ours[1]);
     take(kind, "time_left", frame, status.time_left_s);
     return true;
   }

@@ -106,6 +106,26 @@ TEST(StatusFramesByProfile, SignalsStandWhereTheProfileSays) {
   EXPECT_EQ(read.state, ins::State::rotating);
 }
 
+// Its outer angle is our inner one, and the other the other way round: gimbal = ["-inner", "outer"].
+TEST(StatusFramesByProfile, AnglesAreInTheInssAxes) {
+  std::string text(built_in_text());
+  const std::string straight = R"(gimbal = ["outer", "inner"])";
+  text.replace(text.find(straight), straight.size(), R"(gimbal = ["-inner", "outer"])");
+  const auto profile = parse_profile(text, "axes.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  ins::Status status;
+  status.outer_deg = 30.0;
+  status.inner_deg = 100.0;
+  const auto frames = encode_status(**profile, status, 1, 0x123, false);
+  const auto told = frames[1].payload();
+  EXPECT_EQ(told[0] | told[1] << 8, 10000);         // outer in the INS's words: our inner
+  EXPECT_EQ(told[2] | told[3] << 8, 36000 - 3000);  // inner: our outer the other way round
+  ins::Status read;
+  EXPECT_TRUE(apply_status(**profile, frames[1], 0x123, false, read));
+  EXPECT_NEAR(read.outer_deg, 30.0, 1e-9);
+  EXPECT_NEAR(read.inner_deg, 100.0, 1e-9);
+}
+
 TEST(StatusFramesByProfile, FaultsAreToldAtTheirLines) {
   std::string text = moved();
   const std::size_t at = text.find("start = 20, length = 4");
