@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "protocol/profile/frame_values.hpp"
+#include "protocol/profile/gimbal_axes.hpp"
 #include "protocol/profile/records.hpp"
 #include "protocol/uds/services.hpp"
 
@@ -23,6 +25,11 @@ using uds::Nrc;
 constexpr auto full_queue_retry = 1ms;  // ENOBUFS has no event
 constexpr auto silence_limit = 5s;      // of the stream, while it is to come
 constexpr int batches_per_turn = 16;
+
+double in_turn_deg(double radians) {
+  const double degrees = radians * 180.0 / std::numbers::pi;
+  return degrees - 360.0 * std::floor(degrees / 360.0);
+}
 
 std::chrono::nanoseconds seconds(double s) { return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9)); }
 
@@ -158,11 +165,34 @@ void FramePort::take_state(const can::CanFrame& frame) {
     }
     positive({});
   }
+  tell_status(state, frame);
   if (wait_ == Wait::state && !unsaid_.empty()) {
     answer(tl::unexpected(trouble(PortError::Kind::protocol, std::exchange(unsaid_, {}))));
   } else if (wait_ == Wait::state) {
     positive(state_record(state, frame));
   }
+}
+
+// As an INS that turns a schedule by itself tells in its status frames.
+void FramePort::tell_status(FrameState told, const can::CanFrame& frame) const {
+  if (!on_status) {
+    return;
+  }
+  ins::Status status;
+  status.state = run_state(told);
+  status.position = static_cast<std::uint8_t>(turning() ? sequence_.position() : 0);
+  status.moving =
+      told == FrameState::moving || sequence_.phase() == Phase::approaching || sequence_.phase() == Phase::moving;
+  status.session = 0;
+  status.pages_written = pages_written();
+  const std::array seen = stream_.gimbal();
+  const auto ours =
+      profile::in_our_axes<double>(*config_.profile, {value(frames().state, "outer", frame).value_or(seen[0]),
+                                                      value(frames().state, "inner", frame).value_or(seen[1])});
+  status.outer_deg = in_turn_deg(ours[0]);
+  status.inner_deg = in_turn_deg(ours[1]);
+  status.time_left_s = sequence_.left_s(stream_s());
+  on_status(status);
 }
 
 void FramePort::take_told(const can::CanFrame& frame) {

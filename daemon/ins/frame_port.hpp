@@ -41,6 +41,7 @@ class FramePort : public InsPort {
   void on_readable();
   void take(const can::CanFrame& frame);
   void take_state(const can::CanFrame& frame);
+  void tell_status(profile::FrameState told, const can::CanFrame& frame) const;
   void take_told(const can::CanFrame& frame);
   void take_identity(const can::CanFrame& frame);
 

@@ -117,7 +117,8 @@ Task<Answer<bool>> RunningSteps::confirm_standing() {
   }
   const double since_s = std::chrono::duration<double>(timers_.now() - heard_at).count() * data_.config.time_scale;
   const double data_s = static_cast<double>(directory->samples) / data_.format.sample_rate_hz;
-  const bool by_moves = data_.config.profile->move.has_value();
+  const profile::Profile& speaks = *data_.config.profile;
+  const bool by_moves = speaks.move.has_value() || speaks.frames.has_value();
   const bool time_fits =
       by_moves || (told_s <= data_s + raw_.page_s() + flash_lag_s && told_s + since_s >= data_s - flash_lag_s);
   const bool ours = answered->state == ins::State::rotating && answered->run_id == journal_.record.rotation;

@@ -1,5 +1,6 @@
 """What the tests of profiles share: benches under a profile, with the virtual INS or with a server of somebody else's."""
 import json
+import math
 import re
 import subprocess
 import sys
@@ -12,6 +13,8 @@ FOREIGN = case.ROOT / "tests" / "foreign"
 SPEED, DWELL_S = 60.0, 20.0
 SLOW = 25.0  # what Python streams in frames beside everything else on one processor
 SITE = {"latitude_deg": 40.0, "longitude_deg": 116.0, "height_m": 50.0}  # the virtual INS's, which memory.toml, frames.toml and moves.toml do not tell
+# What frames.toml says that one count is worth: 0.125e-6 rad, 2e-6 m/s.
+FRAMES_COUNTS = {"gyro_lsb_arcsec": 0.125e-6 * 648000 / math.pi, "accel_lsb_m_per_s": 2e-6}
 # The addressing of selfcal.toml, and others in its place.
 NORMAL = """addressing = "normal"      # identifiers of 11 bits
 request = 0x640

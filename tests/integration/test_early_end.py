@@ -31,8 +31,8 @@ def inline(table):
 
 
 class EarlyEnd(case.OnBench):
-    def ready(self, tolerance, sim_options=(), **ins):
-        unit = self.bench(speed=20.0, ins={"running_estimate_s": 30.0} | ins, sim_options=sim_options)
+    def ready(self, tolerance, sim_options=(), sim=None, **ins):
+        unit = self.bench(speed=20.0, sim=sim or {}, ins={"running_estimate_s": 30.0} | ins, sim_options=sim_options)
         config = unit.folder / "selfcald.toml"
         config.write_text(config.read_text(encoding="utf-8") + f"tolerance = {inline(tolerance)}\n", encoding="utf-8")
         return unit.start()
@@ -80,6 +80,13 @@ class EarlyEnd(case.OnBench):
         """An INS that is turned move by move, and knows of no schedule."""
         self.ends_early(self.ready(TOLERANCE, ["--profile", profile_case.PROFILES / "moves.toml"],
                                    profile=str(profile_case.PROFILES / "moves.toml"), **profile_case.SITE))
+
+    def test_moves_of_an_ins_without_uds_end_when_the_tolerances_are_met(self):
+        """The service tells itself how far the rotation is: no status frame of the INS does."""
+        profile = profile_case.PROFILES / "frames.toml"
+        unit = self.ready(TOLERANCE, ["--profile", profile], {"noise": profile_case.FRAMES_COUNTS}, profile=str(profile),
+                          **profile_case.SITE)
+        self.ends_early(unit)
 
     def test_without_tolerances_met_it_turns_to_the_end(self):
         """Negative control: 100 s at three positions determine next to nothing."""

@@ -1,5 +1,4 @@
 """The virtual INS as one that speaks no UDS (config/profiles/frames.toml): a whole calibration, and its faults."""
-import math
 import socket
 import struct
 import tempfile
@@ -10,13 +9,11 @@ import case
 import profile_case
 
 STATE = 0x310
-# What frames.toml says that one count is worth: 0.125e-6 rad, 2e-6 m/s.
-LEAST_COUNTS = {"gyro_lsb_arcsec": 0.125e-6 * 648000 / math.pi, "accel_lsb_m_per_s": 2e-6}
 
 
 class VirtualFrames(profile_case.UnderProfile):
     def virtual(self, *options):
-        unit = self.bench_of("frames.toml", sim={"noise": LEAST_COUNTS})
+        unit = self.bench_of("frames.toml", sim={"noise": profile_case.FRAMES_COUNTS})
         unit.sim_options += options
         return unit.start()
 
