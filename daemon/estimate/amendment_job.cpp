@@ -153,6 +153,7 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   }
   discovery::DiscoveryOptions options;
   options.stop = stop;
+  options.coloured = taken.front()->diagnosis.before.coloured;
   BeyondAnswer answer;
   answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
   diagnosis::Diagnosis& first = taken.front()->diagnosis;

@@ -16,6 +16,7 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
   if (const auto rest = discovery::UnexplainedRest::of({&recording, 1}, options.stop)) {
     discovery::DiscoveryOptions of_laws;
     of_laws.stop = options.stop;
+    of_laws.coloured = cause.diagnosis->before.coloured;
     cause.beyond = discovery::discover(rest->recordings(), of_laws, step);
   }
   return cause;

@@ -148,6 +148,11 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* 
     diagnosis.covariance = found->average.covariance.front();
     diagnosis.sigma = diagnosis.covariance.diagonal().cwiseSqrt();
   }
+  if (diagnosis.unexplained && explains(found) && found->left) {
+    diagnosis.after = found->left->adequacy;
+    diagnosis.remaining = found->left->places;
+    diagnosis.remaining_by = found->left->by_quantity;
+  }
   return diagnosis;
 }
 

@@ -27,8 +27,8 @@ bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagno
 // Then it is a rejected name, and the recording is unexplained by the catalogue; else nothing is changed.
 void replace_process(diagnosis::Diagnosis& diagnosis, const discovery::Discovery& found);
 
-// The diagnosis with the 24 as fitted with the laws, where laws explain what the catalogue leaves: those of the catalogue's
-// rejected names correct nothing.
+// The diagnosis with the 24 as fitted with the laws, and with what these leave (`after`, `remaining`), where laws explain what the
+// catalogue leaves: the catalogue's rejected names correct nothing.
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
 
 // "accel_y and accel_z take a new offset at each turn"; "gyro_x follows abs(wz) or one of 22 others" where it matters which, for

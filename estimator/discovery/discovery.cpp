@@ -11,6 +11,7 @@
 #include "estimator/discovery/departure.hpp"
 #include "estimator/discovery/known_form.hpp"
 #include "estimator/discovery/law_class.hpp"
+#include "estimator/discovery/laws_leave.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/discovery/stability.hpp"
@@ -439,6 +440,9 @@ Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOpt
   Discovery found = Search(recordings, options, progress).run();
   if (!found.laws.empty() && found.processes.empty()) {
     found.average = average_over_classes(recordings, found, members_averaged, options.stop);
+    if (found.described.empty()) {
+      found.left = left_by_laws(recordings.front(), found.fit, options.coloured);
+    }
   }
   return found;
 }

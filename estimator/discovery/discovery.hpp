@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/discovery/law_fit.hpp"
 #include "estimator/discovery/process.hpp"
 #include "estimator/passes/calibration.hpp"
@@ -22,6 +23,8 @@ struct DiscoveryOptions {
   double departure_rate = 0.01;     // of laws of the true form that are described only, for they seem to depart from it
   int most_terms = 6;
   double least_odds = 0.01;  // of a member of a class against the best
+  bool coloured =
+      false;  // the sensors' quantum colours the innovations: of what the laws leave whiteness is not judged
   std::stop_token stop;
 };
 
@@ -74,6 +77,12 @@ struct ClassAverage {
   std::vector<ParameterMatrix> covariance;  // [recordings], with the spread between the members
 };
 
+// What a recording shows without its laws.
+struct Left {
+  diagnosis::Adequacy adequacy;
+  std::vector<diagnosis::Located> places, by_quantity;  // largest first
+};
+
 struct Discovery {
   std::vector<DiscoveredLaw> laws;  // best first
   // Equations whose axis does something else still (known_form.hpp). The axis' form is none of them, and on another plan they
@@ -88,6 +97,7 @@ struct Discovery {
   std::size_t functions_tried = 0;  // functions times axes
   LawFit fit;                       // of the laws in the order in which they were found, with the 24 of each recording
   ClassAverage average;             // empty where no law is told, and where a process is
+  std::optional<Left> left;  // of the first recording, where equations alone are told; none where some are described
 };
 
 // One recording of the unit that is looked at. Both must outlive it.

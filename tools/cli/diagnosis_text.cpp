@@ -131,6 +131,14 @@ std::string places_text(const char* head, std::vector<Located> places, const std
   return text;
 }
 
+// What is found beyond the catalogue stands below, and may leave nothing.
+const char* remains_head(const discovery::Discovery* beyond) {
+  if (!explains(beyond)) {
+    return "what remains, largest first";
+  }
+  return beyond->left ? "what remains beside the equations, largest first" : "what the catalogue leaves, largest first";
+}
+
 std::string undetectable_text(const Diagnosis& d) {
   if (d.undetectable.empty()) {
     return {};
@@ -147,8 +155,9 @@ std::string undetectable_text(const Diagnosis& d) {
 
 }  // namespace
 
-std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colour, int columns,
+std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject, bool colour, int columns,
                            const discovery::Discovery* beyond) {
+  const Diagnosis d = with_laws(of_catalogue, beyond);
   std::string text = summary_text(summary_of(d, subject, beyond), colour, columns);
   if (!d.faults.empty()) {
     text += "\nfaults of the data:\n";
@@ -166,14 +175,14 @@ std::string diagnosis_text(const Diagnosis& d, const Subject& subject, bool colo
   text += remainder_text(d);
   // Where nothing explains the recording, nothing corrects the 24.
   if (!d.unexplained || explains(beyond)) {
-    text += corrections_text(with_laws(d, beyond));
+    text += corrections_text(d);
   }
   if (!d.before.accepted) {
     text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);
   }
   if (d.unexplained) {
     text += findings_text("tried and rejected by what remains", d.rejected);
-    text += places_text("what remains, largest first", d.remaining, d.remaining_by);
+    text += places_text(remains_head(beyond), d.remaining, d.remaining_by);
   }
   if (!d.suspected.empty()) {
     text += "\ntoo weak to name:\n";

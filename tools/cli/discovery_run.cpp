@@ -142,7 +142,10 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   }
   if (discover) {
     ProgressLine line;
-    result.found = discovery::discover(rest->recordings(), {}, [&line](const std::string& words) { line.show(words); });
+    discovery::DiscoveryOptions options;
+    options.coloured = recordings.front().diagnosis.before.coloured;
+    result.found =
+        discovery::discover(rest->recordings(), options, [&line](const std::string& words) { line.show(words); });
     if (!asked && !replaces_process(*result.found, recordings.front().diagnosis)) {
       result.found.reset();
       return result;
