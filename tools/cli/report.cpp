@@ -14,6 +14,7 @@
 #include "daemon/estimate/left_out.hpp"
 #include "daemon/host/wall_clock.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/laws_leave.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/file_hash.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -85,7 +86,10 @@ Expected<void> add_diagnosis(Json& page, const JudgedResult& judged, const Recor
   Json document = diagnosis_json(*cause.diagnosis, false_alarm_rate, {}, found);
   data.coasts = cause.diagnosis->calibration.coasts;  // with the turns as found
   if (cause.diagnosis->faults.empty()) {
-    document["map"] = report::misfit_map(data, *cause.diagnosis);
+    const bool laws = found != nullptr && found->left.has_value();
+    const auto rest = laws ? discovery::less_laws({data, cause.diagnosis->calibration}, found->fit)
+                           : diagnosis::CorrectedRecording(data);
+    document["map"] = report::misfit_map(data, *cause.diagnosis, laws ? &rest.data() : nullptr);
   }
   page["diagnosis"] = std::move(document);
   page["summary"] = summary_json(summary_of(judged.result, judged.gate, {name, 0}, &*cause.diagnosis, found));

@@ -136,13 +136,16 @@ Json dwells_json(const diagnosis::SignaturePass& pass, const diagnosis::Signatur
 
 }  // namespace
 
-Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d) {
+Json misfit_map(const ImuData& data, const diagnosis::Diagnosis& d, const ImuData* without_laws) {
   const diagnosis::RecordingContext context(data);
   Layout layout = lay_out(context, d.model);
   diagnosis::SignaturePass pass(context, layout.candidates, true);
   add_turns(pass, layout.cells);
   const diagnosis::SignatureRows rows = pass.run(diagnosis::forward_pass(data, d.calibration));
-  const Eigen::VectorXd explained = rows.columns.leftCols(layout.model_size.size()) * layout.model_size;
+  Eigen::VectorXd explained = rows.columns.leftCols(layout.model_size.size()) * layout.model_size;
+  if (without_laws != nullptr) {
+    explained += rows.residual - pass.run(diagnosis::forward_pass(*without_laws, d.calibration)).residual;
+  }
 
   Json position = Json::array(), axis = Json::array(), bin = Json::array(), middle = Json::array();
   Json bias = Json::array(), sigma = Json::array(), signature = Json::array();

@@ -52,22 +52,6 @@ function symbolsNote(findings) {
   return element('p', {class: 'note symbols'}, words.length > 0 ? words.join('; ') + '.' : '');
 }
 
-// Laws and processes that take away all but a tenth of the misfit.
-function explained(d) {
-  return d.unexplained && objectOf(d.discovery).explained_share >= 0.9 && listOf(d.described).length === 0;
-}
-
-function discoveredTable(laws, processes, id) {
-  const all = [...laws, ...processes];
-  return table([
-    {title: 'sensor', cells: all.map((l) => textOf(l.axis)), class: 'left'},
-    {title: 'law', cells: [...laws.map((l) => lawAsMath(textOf(l.expression))), ...processes.map((p) => textOf(p.process))], class: 'words'},
-    {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
-    {title: 'explains it as well', cells: all.map((l) => listOf(l.class).length > 1 ? `${l.class.length - 1} others` : '–'), class: 'words'},
-    {title: 'holds on another plan', cells: all.map((l) => (Number.isFinite(l.carries_over) ? `${significant(100 * l.carries_over, 2)} %` : '–'))},
-  ], {id});
-}
-
 function remainderWords(r) {
   const place = listOf(r.places)[0];
   return element('p', {id: 'remainder'}, `${significant(100 * r.share, 2)} % of the misfit (${significant(r.sigma, 3)} σ) is left: `
@@ -86,10 +70,11 @@ function placesTable(places) {
   ], {}, sorted.map((l) => Math.abs(l.significance) < insignificant));
 }
 
-function adequacyTable(adequacy, named) {
-  const rows = [objectOf(adequacy.before), ...(named ? [objectOf(adequacy.after)] : [])];
+// `after`: what the second row is of; empty: there is none.
+function adequacyTable(adequacy, after) {
+  const rows = [objectOf(adequacy.before), ...(after ? [objectOf(adequacy.after)] : [])];
   return table([
-    {title: 'model', cells: ['24 parameters', 'with the named effects'].slice(0, rows.length), class: 'left'},
+    {title: 'model', cells: ['24 parameters', after].slice(0, rows.length), class: 'left'},
     {title: 'NIS (1 expected)', cells: rows.map((a) => significant(a.nis, 4))},
     {title: 'largest misfit (σ)', cells: rows.map((a) => significant(a.largest_located_sigma, 3))},
     {title: 'innovations white? (p)', cells: rows.map((a) => (a.whiteness_log10_p === null ? 'not judged: quantum and lines' : probabilityText(a.whiteness_log10_p)))},
@@ -161,15 +146,17 @@ function adviceForUnexplained(adequacy) {
 }
 
 // The two axes that the signature moves most, in all their cells.
-function addSignaturePlots(place, map, findings) {
-  const cells = objectOf(map?.cells);
+function addSignaturePlots(place, d) {
+  const cells = objectOf(d.map?.cells);
   if (listOf(cells.axis).length === 0) {
     return;
   }
   const power = [0, 0, 0, 0, 0, 0];
   cells.axis.forEach((axis, k) => { power[axis] += (cells.signature[k] / cells.sigma[k]) ** 2; });
   // An accelerometer's error shows in the gyros' cells too, through the position; the named sensors come first.
-  const named = (axis) => (findings.some((f) => textOf(f.effect).startsWith(axis < 3 ? 'gyro' : 'accel')) ? 1 : 0);
+  const words = [...listOf(d.findings).map((f) => textOf(f.effect)), ...listOf(d.discovered).map((l) => textOf(l.axis))];
+  const axisIds = ['gyro_x', 'gyro_y', 'gyro_z', 'accel_x', 'accel_y', 'accel_z'];
+  const named = (axis) => (words.includes(axisIds[axis]) ? 2 : words.some((w) => w.startsWith(axis < 3 ? 'gyro' : 'accel')) ? 1 : 0);
   const seen = power.map((value, axis) => ({value, axis})).filter(({value}) => value > 25)
       .sort((a, b) => named(b.axis) - named(a.axis) || b.value - a.value).slice(0, 2);
   for (const {axis} of seen) {
@@ -183,12 +170,13 @@ function addSignaturePlots(place, map, findings) {
       x: {label: 'time', unit: 'min', values: pick(cells.middle_s).map((at) => at / 60)},
       y: {label: 'bias', unit: axis < 3 ? 'deg/h' : 'ug'},
       series: [{label: 'recording, ±1 σ', colour: 'x', points: true, values: pick(cells.bias), errors: pick(cells.sigma)},
-               {label: 'signature of the named effects', colour: 'y', dash: [6, 3], values: pick(cells.signature)}],
+               {label: correctedByLaws(d) ? 'the equations found' : 'signature of the named effects', colour: 'y', dash: [6, 3], values: pick(cells.signature)}],
     });
   }
 }
 
-function showMisfitMaps(map) {
+function showMisfitMaps(d) {
+  const map = d.map;
   const cells = objectOf(map?.cells);
   if (listOf(cells.bias).length === 0) {
     return;
@@ -196,7 +184,7 @@ function showMisfitMaps(map) {
   const maps = document.getElementById('misfit-maps');
   addMisfitMap(maps, map, 'misfit-before', 'Misfit of the 24 alone', cells.bias);
   if (cells.signature.some((value) => value !== 0)) {
-    addMisfitMap(maps, map, 'misfit-after', 'What the named effects leave', cells.bias.map((value, k) => value - cells.signature[k]));
+    addMisfitMap(maps, map, 'misfit-after', correctedByLaws(d) ? 'What the equations leave' : 'What the named effects leave', cells.bias.map((value, k) => value - cells.signature[k]));
   }
 }
 
@@ -206,11 +194,16 @@ function showDiagnosisTables(d) {
   const findings = listOf(d.findings);
   const rejected = listOf(d.rejected);
   const suspected = listOf(d.suspected);
-  add(findings.length > 0 ? 'Before and after' : 'Recording against model', adequacyTable(objectOf(d.adequacy), findings.length > 0));
+  const after = correctedByLaws(d) ? 'with the equations below' : findings.length > 0 ? 'with the named effects' : '';
+  add(after ? 'Before and after' : 'Recording against model', adequacyTable(objectOf(d.adequacy), after));
   const found = listOf(d.discovered).length + listOf(d.processes).length > 0;
   if (found) {
     const symbols = lawSymbols(listOf(d.discovered).map((l) => textOf(l.expression)));
-    add('Found beyond the catalogue', discoveredTable(listOf(d.discovered), listOf(d.processes), 'discovered'), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''));
+    add('Found beyond the catalogue', discoveredTable(listOf(d.discovered), listOf(d.processes), 'discovered'), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''),
+        ...classTables(listOf(d.discovered)), nextExperiment(d));
+  }
+  if (correctedByLaws(d)) {
+    add('What the omission did to the 24', element('p', {class: 'note', id: 'corrections'}, correctionWords(listOf(d.parameters))));
   }
   const described = listOf(d.described);
   if (described.length > 0) {
@@ -239,7 +232,7 @@ function showDiagnosisTables(d) {
     add('Largest misfits of the 24 alone, each place tested on its own', placesTable(d.located));
   }
   if (d.unexplained && listOf(d.remaining).length > 0) {
-    add('What remains', placesTable(d.remaining));
+    add(correctedByLaws(d) ? 'What remains beside the equations' : explained(d) ? 'What the catalogue leaves' : 'What remains', placesTable(d.remaining));
   }
   if (listOf(d.undetectable_here).length > 0) {
     place.append(element('p', {class: 'note'}, 'Not detectable here at typical size: ' + d.undetectable_here.map(textOf).join(', ') + '.'));
@@ -261,9 +254,9 @@ function showDiagnosis(report) {
     return;
   }
   showDiagnosisTables(d);
-  if (d.unexplained || d.verdict === 'not enough information') {
+  if ((d.unexplained && !correctedByLaws(d)) || d.verdict === 'not enough information') {
     addDwellPlots(document.getElementById('dwell-plots'), d.map);
   }
-  addSignaturePlots(document.getElementById('signature-plots'), d.map, listOf(d.findings));
-  showMisfitMaps(d.map);
+  addSignaturePlots(document.getElementById('signature-plots'), d);
+  showMisfitMaps(d);
 }

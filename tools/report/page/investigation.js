@@ -15,19 +15,6 @@ function lawSizes(laws) {
   ], {class: 'laws'});
 }
 
-// No rotation tells these apart; some of them another attitude of the base would.
-function otherWords(member) {
-  const most = 3;
-  const some = listOf(member.also);
-  const cell = element('span', {}, some.length === 0 ? '–' : '');
-  const here = listOf(member.only_here).map(textOf);
-  some.slice(0, most).forEach((text, k) => {
-    cell.append(k > 0 ? ', ' : '', lawAsMath(textOf(text)), here.includes(textOf(text)) ? ' (on this base)' : '');
-  });
-  cell.append(some.length > most ? ` and ${some.length - most} more` : '');
-  return cell;
-}
-
 // Every equation that was in a class before or is now, with its odds against the best. A class before of the same law: of that with
 // which it shares an equation.
 function classTable(law, before) {
@@ -36,18 +23,12 @@ function classTable(law, before) {
   const all = [...now, ...earlier.filter((o) => !now.some((n) => sameLaw(n, o)))];
   const odds = (list, one) => list.find((m) => sameLaw(m, one))?.odds;
   const shown = (value, absent) => (value === undefined ? absent : value === 1 ? 'best' : significant(value, 2));
-  const columns = [
-    {title: 'equation', cells: all.map((m) => lawAsMath(textOf(m.expression))), class: 'words'},
-    {title: 'sensor', cells: all.map((m) => textOf(m.axis)), class: 'left'},
-  ];
-  if (all.some((m) => listOf(m.also).length > 0)) {
-    columns.push({title: 'the same in other words', cells: all.map(otherWords), class: 'words'});
-  }
+  const columns = [];
   if (before.length > 0) {
     columns.push({title: 'odds before', cells: all.map((m) => shown(odds(earlier, m), '–'))});
   }
   columns.push({title: before.length > 0 ? 'odds now' : 'odds against the best', cells: all.map((m) => shown(odds(now, m), 'ruled out'))});
-  return table(columns, {class: 'odds'}, all.map((m) => odds(now, m) === undefined));
+  return oddsTable(all, columns, all.map((m) => odds(now, m) === undefined));
 }
 
 // Times and angles of a schedule that dwells at each position in turn.

@@ -45,11 +45,11 @@ function shareBar(share) {
   return element('span', {}, bar, ' ' + significant(share, 2));
 }
 
-// The same parameters as the diagnosis fits them together with the effects that it named; null where it named none, and
-// where the values above are these already.
+// The same parameters as the diagnosis fits them together with the effects that it named or the equations that it found; null where
+// there are none, and where the values above are these already.
 function correctionsOf(report) {
   const d = objectOf(report.diagnosis);
-  if (report.amends || d.verdict !== 'named') {
+  if (report.amends || (d.verdict !== 'named' && !correctedByLaws(d))) {
     return null;
   }
   const known = new Map(listOf(d.parameters).map((p) => [p.name, p]));
@@ -78,8 +78,8 @@ function doubtOf(report) {
   const verdict = objectOf(report.diagnosis).verdict;
   const lead = 'No value is ticked, for recording and model disagree: a σ says nothing where the model is wrong. ';
   if (correctionsOf(report)) {
-    return lead + 'The diagnosis names what was left out; the corrected values are those of the 24 fitted together with it '
-        + '(grey: moved by less than 3 σ).';
+    const what = verdict === 'named' ? 'The diagnosis names what was left out' : 'What was left out is in no catalogue; the diagnosis below found its equation';
+    return lead + what + '; the corrected values are those of the 24 fitted together with it (grey: moved by less than 3 σ).';
   }
   if (explained(objectOf(report.diagnosis))) {
     return lead + 'What was left out is in no catalogue; the diagnosis below says what was found.';

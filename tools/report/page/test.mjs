@@ -1,8 +1,8 @@
 // The pages in a real browser, one for all of them: node test.mjs CHROMIUM [KIND PAGE.html EXPECTED.json]...
 // KIND calibration: EXPECTED is what `selfcal estimate --json` said of the same recording; run: the saved run;
 // failed: a saved run without a result, whose recording is gone; replaced: a saved run whose set is no longer in force;
-// creep: `selfcal diagnose --json` of the same recording, in which an effect is named; unexplained: the same with nothing
-// named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; investigation: the saved
+// creep: `selfcal diagnose --json` of the same recording, in which an effect is named; law: the same where an equation was found that
+// no catalogue holds; unexplained: the same with nothing named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; investigation: the saved
 // story; hostile, thin: any JSON, the
 // page being alter_page.py's. With "not-" before it the page must fail, as it holds other numbers. One line for each failure; status 1.
 // SELFCAL_PICTURES: a folder for screenshots at 1400 and 800 px and the PDF of each page.
@@ -17,7 +17,7 @@ const pictures = process.env.SELFCAL_PICTURES;
 let kind = '';
 let expected = {};
 let failures = [];
-const recording_of = {creep: 'creep.h5', unexplained: 'creep.h5'};
+const recording_of = {creep: 'creep.h5', law: 'law.h5', unexplained: 'creep.h5'};
 const expect = (good, words) => good || failures.push(words);
 
 const largest_page = 3e6;
@@ -79,6 +79,7 @@ const wanted = {
   replaced: ['convergence-accel_bias_x'],
   failed: [],
   creep: ['misfit-before', 'misfit-after', 'convergence-accel_bias_x'],
+  law: ['misfit-before', 'misfit-after', 'signature-4'],
   unexplained: ['dwell-bias-gyros', 'dwell-bias-accelerometers', 'misfit-before'],
   hostile: [],
   thin: [],
@@ -210,7 +211,7 @@ async function check_noise(page) {
 }
 
 // Where recording and model disagree nothing is ticked, and the corrected values stand beside the 24.
-async function check_creep(page) {
+async function check_corrections(page) {
   const rows = await rows_of(page, 'values');
   expect(rows.length === 24 && !rows.flat().some((text) => text.includes('✔')), 'a tick stands beside an inconsistent recording');
   const titles = await page.$$eval('#values th', (cells) => cells.map((cell) => cell.textContent));
@@ -224,9 +225,34 @@ async function check_creep(page) {
     expect(Math.abs(moved - (p.value - p.value_without) / p.sigma_without) < 0.051, `${p.name}: moved by ${rows[k]?.[far]} σ`);
   });
   await check_banner(page, 'bad');
+}
+
+async function check_creep(page) {
+  await check_corrections(page);
   const grey = await page.$$eval('#findings td span.faint', (parts) => parts.map((part) => part.textContent));
   const weak = expected.findings.flatMap((f) => f.parameters.filter((p) => Math.abs(p.value) < 3 * p.sigma));
   expect(grey.length === weak.length, `${grey.length} coefficients are grey, ${weak.length} are below 3 sigma`);
+}
+
+// An equation is set as one, stands beside those that the recording cannot tell from it, and goes through the data. What is said to
+// remain is what it leaves.
+async function check_law(page) {
+  await check_corrections(page);
+  expect(expected.discovered.length === 1 && expected.discovered[0].axis === 'accel_y', 'the recording holds one law of accel_y');
+  expect(await page.$$eval('#discovered math', (all) => all.length) === 1, 'the equation is not set as one');
+  const members = expected.discovered[0].class;
+  const odds = await rows_of(page, 'diagnosis-tables .odds');
+  expect(odds.length === members.length && odds.some((row) => row.at(-1) === 'best'), `${odds.length} of ${members.length} members of the class`);
+  const adequacy = await rows_of(page, 'adequacy');
+  expect(adequacy.length === 2 && shows(adequacy[1][1], expected.adequacy.after.nis), `NIS with the equation: ${adequacy[1]}`);
+  expect(Math.abs(expected.adequacy.after.nis - 1) < 0.15, `NIS with the equation ${expected.adequacy.after.nis}`);
+  // Recording against equation over the stretches after turns: squares of the differences in sigmas are as many as the stretches.
+  const [recording, equation] = await page.evaluate(() => livePlots.find(({spec}) => spec.id === 'signature-4').spec.series);
+  const square = (of) => of.values.reduce((sum, value, k) => sum + (value / recording.errors[k]) ** 2, 0);
+  const left = square({values: recording.values.map((value, k) => value - equation.values[k])});
+  const count = recording.values.length;
+  expect(left < count + 5 * Math.sqrt(2 * count), `chi^2 ${left} of ${count} stretches`);
+  expect(left < 0.2 * square(recording), `the equation leaves ${left} of ${square(recording)}`);
 }
 
 // None of the above: a picture of what remains, with its sigma, and what to do.
@@ -463,7 +489,7 @@ async function check_page(browser, page_file) {
     await check_drawing(page, where);
     await check_width(page, where);
     if (width === 1400) {
-      await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep,
+      await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep, law: check_law,
              unexplained: check_unexplained, plan: check_plan, fleet: check_fleet, investigation: check_investigation,
              overlay: check_overlay}[kind](page);
       if (kind === 'calibration') {
