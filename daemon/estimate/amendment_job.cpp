@@ -15,6 +15,7 @@
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/result_json.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
+#include "estimator/discovery/kept_names.hpp"
 #include "estimator/passes/consistency.hpp"
 
 namespace selfcal {
@@ -158,6 +159,9 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
   diagnosis::Diagnosis& first = taken.front()->diagnosis;
   replace_process(first, answer.found);
+  if (taken.size() == 1 && discovery::say_what_was_rejected(rest->recordings().front(), first, answer.found, stop)) {
+    discovery::keep_rejected_names(first, answer.found);
+  }
   if (taken.size() == 1 && !first.unexplained) {
     return std::nullopt;
   }

@@ -1,6 +1,7 @@
 #include "daemon/estimate/analysis.hpp"
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/discovery/kept_names.hpp"
 #include "estimator/discovery/named_effects.hpp"
 
 namespace selfcal {
@@ -18,6 +19,10 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
     of_laws.stop = options.stop;
     of_laws.coloured = cause.diagnosis->before.coloured;
     cause.beyond = discovery::discover(rest->recordings(), of_laws, step);
+    if (discovery::say_what_was_rejected(rest->recordings().front(), *cause.diagnosis, *cause.beyond, options.stop)) {
+      discovery::keep_rejected_names(*cause.diagnosis, *cause.beyond);
+      cause.beyond.reset();
+    }
   }
   return cause;
 }

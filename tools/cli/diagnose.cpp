@@ -9,6 +9,7 @@
 #include "daemon/estimate/showing_schedule.hpp"
 #include "estimator/diagnosis/poses/poses.hpp"
 #include "estimator/diagnosis/poses/references.hpp"
+#include "estimator/discovery/kept_names.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -331,14 +332,6 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!diagnosis.faults.empty()) {
     return tell_faults(arguments, diagnosis, (*opened)->file);
   }
-  const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
-  if (!holdout) {
-    return tl::unexpected(holdout.error());
-  }
-  const Expected<std::vector<diagnosis::Split>> splits = plan_and_write_splits(arguments, diagnosis, **opened);
-  if (!splits) {
-    return tl::unexpected(splits.error());
-  }
   const Expected<std::vector<diagnosis::Diagnosis>> of_others = diagnose_each(*others, options, arguments.strict);
   if (!of_others) {
     return tl::unexpected(of_others.error());
@@ -347,12 +340,24 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   for (std::size_t k = 0; k < others->size(); ++k) {
     unit.push_back({(*others)[k]->file, (*others)[k]->data, (*of_others)[k]});
   }
-  const Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit);
+  Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit);
   if (!beyond) {
     return tl::unexpected(beyond.error());
   }
+  if (beyond->said_by_catalogue) {
+    discovery::keep_rejected_names(diagnosis, *beyond->found);
+    beyond->found.reset();
+  }
   if (beyond->found) {
     replace_process(diagnosis, *beyond->found);
+  }
+  const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
+  if (!holdout) {
+    return tl::unexpected(holdout.error());
+  }
+  const Expected<std::vector<diagnosis::Split>> splits = plan_and_write_splits(arguments, diagnosis, **opened);
+  if (!splits) {
+    return tl::unexpected(splits.error());
   }
   std::optional<diagnosis::EmpiricalDescription> description;
   if (diagnosis.unexplained && !beyond->explains()) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
+#include "estimator/discovery/kept_names.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -149,6 +150,14 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
     if (!asked && !replaces_process(*result.found, recordings.front().diagnosis)) {
       result.found.reset();
       return result;
+    }
+    const bool alone = recordings.size() == 1;
+    if (alone &&
+        discovery::say_what_was_rejected(rest->recordings().front(), recordings.front().diagnosis, *result.found)) {
+      result.said_by_catalogue = true;
+      if (arguments.next_experiment.empty()) {
+        return result;
+      }
     }
     auto joint = fit_together(*rest, *result.found);
     if (!joint) {

@@ -27,6 +27,7 @@ void add_discovery_options(Options& options, DiscoveryArguments& arguments);
 
 struct BeyondCatalogue {
   std::optional<discovery::Discovery> found;
+  bool said_by_catalogue = false;            // by names that it rejected: nothing else was made of `found`
   std::optional<discovery::JointFit> joint;  // of several recordings, or of effects and laws
   std::optional<Together> together;
   std::optional<discovery::NextExperiment> next;

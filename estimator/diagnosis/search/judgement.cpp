@@ -167,9 +167,11 @@ void write_down(const SearchResult& found, const Judgement& j, Diagnosis& d) {
   // carried over or taken out.
   std::vector<Finding>& destination = j.names_stand ? d.findings : d.rejected;
   destination.insert(destination.end(), j.named.begin(), j.named.end());
-  if (j.names_stand) {
+  const bool by_what_they_leave = j.jumps.empty() && found.processes.empty() && !found.collinear;
+  if (j.names_stand || by_what_they_leave) {
+    std::vector<ModelEffect>& model = j.names_stand ? d.model : d.rejected_model;
     for (const NamedTerm& term : found.named) {
-      d.model.push_back({term.effect, term.constant, term.amplitude, term.covariance});
+      model.push_back({term.effect, term.constant, term.amplitude, term.covariance});
     }
   }
   d.value = found.value;

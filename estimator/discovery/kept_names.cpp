@@ -1,0 +1,89 @@
+#include "estimator/discovery/kept_names.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/discovery/effect_columns.hpp"
+#include "estimator/discovery/scene.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr double most_beside = 0.02;  // of the laws' square, that the effects cannot make
+
+std::vector<EffectTerm> terms_of(const std::vector<diagnosis::ModelEffect>& model) {
+  std::vector<EffectTerm> terms;
+  for (const diagnosis::ModelEffect& effect : model) {
+    terms.push_back({effect.effect, effect.constant, effect.size, !std::isnan(effect.constant)});
+  }
+  return terms;
+}
+
+// Square of the residual that `columns` take up.
+double gain_of(const ColumnSums& sums, const std::vector<int>& columns) {
+  const Eigen::MatrixXd G = sums.information(columns, columns);
+  const Eigen::VectorXd b = sums.score(columns);
+  const Eigen::VectorXd scale = G.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd scaled = scale.asDiagonal() * G * scale.asDiagonal();
+  scaled.diagonal().array() += 1e-9;
+  const Eigen::VectorXd part = scale.cwiseProduct(b);
+  return part.dot(scaled.ldlt().solve(part));
+}
+
+// Share of the square of `signature` (a combination of the first columns) that `columns` cannot make.
+double share_beside(const ColumnSums& sums, const Eigen::VectorXd& signature, const std::vector<int>& columns) {
+  const auto n = signature.size();
+  const double square = signature.dot(sums.information.topLeftCorner(n, n) * signature);
+  ColumnSums as_data;
+  as_data.information = sums.information;
+  as_data.score = sums.information.leftCols(n) * signature;
+  return 1.0 - gain_of(as_data, columns) / square;
+}
+
+}  // namespace
+
+bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& d, const Discovery& found,
+                           const std::stop_token& stop) {
+  const auto of_a_sensor = [](const diagnosis::ModelEffect& e) { return e.effect->sensor != nullptr; };
+  if (!d.unexplained || d.rejected_model.empty() || !found.left || found.laws.empty() ||
+      !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
+    return false;
+  }
+  Scene scene(recording);
+  scene.table = collect_nodes(scene.motion, scene.input);
+  const std::vector<EffectTerm> terms = terms_of(d.rejected_model);
+  LawColumns of_laws(scene.motion, scene.table, found.fit.terms, false);
+  EffectColumns of_effects(scene.context, terms);
+  TwoSources source(of_laws, of_effects);
+  const ColumnSums sums = run_columns(scene.input, scene.trace, source, stop);
+  if (stop.stop_requested()) {
+    return false;
+  }
+  std::vector<int> laws, effects;
+  for (int k = 0; k < source.count(); ++k) {
+    (k < of_laws.count() ? laws : effects).push_back(k);
+  }
+  const double chance = 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, found.functions_tried)));
+  return share_beside(sums, found.fit.coefficient, effects) < most_beside &&
+         gain_of(sums, laws) - gain_of(sums, effects) < chance;
+}
+
+void keep_rejected_names(diagnosis::Diagnosis& d, const Discovery& found) {
+  diagnosis::Remainder remainder;
+  remainder.sigma = std::max(std::sqrt(std::max(0.0, found.misfit_after)), found.left->adequacy.largest_sigma);
+  remainder.share = std::min(1.0, remainder.sigma * remainder.sigma / std::max(1.0, found.misfit_before));
+  remainder.forms = {
+      {d.rejected_model.front().effect->id, "its form departs from the equation", remainder.share}};
+  remainder.places = found.left->places;
+  d.findings.insert(d.findings.begin(), d.rejected.begin(), d.rejected.end());
+  d.rejected.clear();
+  d.model = std::move(d.rejected_model);
+  d.rejected_model.clear();
+  d.remainder = std::move(remainder);
+  d.after.accepted = true;
+  d.unexplained = false;
+  d.verdict = diagnosis::DiagnosisVerdict::named;
+}
+
+}  // namespace selfcal::discovery

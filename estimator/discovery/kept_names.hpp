@@ -1,0 +1,20 @@
+// Names of the catalogue that were rejected by what they leave, where the search finds nothing better: it tells the same function once
+// more, as an equation. One in a hundred right names is rejected so, and a form that is slightly off more often.
+#pragma once
+
+#include <stop_token>
+
+#include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/discovery.hpp"
+
+namespace selfcal::discovery {
+
+// The laws that were told alone explain the recording, and the rejected effects of the catalogue, fitted anew, make what they make:
+// as well, but for less than a search among so many functions gains by chance. `recording`: the one that `found` is of.
+bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& diagnosis,
+                           const Discovery& found, const std::stop_token& stop = {});
+
+// Then the names stand, with what they leave as their remainder. `found` holds it (`left`).
+void keep_rejected_names(diagnosis::Diagnosis& diagnosis, const Discovery& found);
+
+}  // namespace selfcal::discovery
