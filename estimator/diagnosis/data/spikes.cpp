@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "estimator/geometry/units.hpp"
@@ -21,6 +22,7 @@ std::string name_of(std::size_t axis) { return std::string(axis < 3 ? "gyro " : 
 // Samples at the extreme value in runs that are entered from a slope. A drive comes up to its rate smoothly, and where
 // the noise is below the quantum the rate is one count all along: no clipping. Over the last 0.05 s before a rate is
 // reached with continuous acceleration, ramps of a second and more change it by less than 0.7 %; a clipped ramp by 3 %.
+// A count or two up and down are no slope: of an axis that turns by a hundred counts they are that many per cent.
 struct Clipping {
   std::size_t met = 0, first = 0;
   std::vector<FaultyStretch> runs;
@@ -28,14 +30,16 @@ struct Clipping {
 
 template <typename Value>
 Clipping clipping(const ImuData& data, const Value& value, std::size_t first, std::size_t last, bool gyro) {
-  constexpr double steep = 0.01;
+  constexpr double steep = 0.01, more_than_noise = 4.0;
   Clipping found;
-  double largest = 0.0;
+  double largest = 0.0, count = std::numeric_limits<double>::infinity();
   for (std::size_t i = first; i < last; ++i) {
     if (std::abs(value(i)) > largest) {
       largest = std::abs(value(i));
       found.first = i;
     }
+    const double step = i > first ? std::abs(value(i) - value(i - 1)) : 0.0;
+    count = step > 0.0 ? std::min(count, step) : count;
   }
   const double rest = gyro ? 0.5 * units::degree : 11.0;  // below it the largest count of a gyro is only noise
   if (largest * data.sample_rate_hz <= rest) {
@@ -46,7 +50,8 @@ Clipping clipping(const ImuData& data, const Value& value, std::size_t first, st
   for (std::size_t i = first; i < last; ++i) {
     const bool extreme = std::abs(value(i)) == largest;
     if (extreme && !run) {
-      counts = i > back && std::abs(value(i - 1) - value(i - 1 - back)) > steep * largest;
+      counts =
+          i > back && std::abs(value(i - 1) - value(i - 1 - back)) > std::max(steep * largest, more_than_noise * count);
       if (counts) {
         found.runs.push_back({i, i, gyro});
       }

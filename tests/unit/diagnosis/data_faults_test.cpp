@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "estimator/geometry/units.hpp"
 
@@ -17,7 +18,10 @@ struct Turning {
   std::vector<double> time;
   std::vector<std::array<double, 3>> theta, velocity;
 
-  explicit Turning(double rate_hz, double clip_deg_per_s) {
+  // `across`: share of the turns that y has; it is noisy by a count.
+  explicit Turning(double rate_hz, double clip_deg_per_s, double across = 0.0) {
+    std::mt19937 random(1);
+    std::uniform_int_distribution<int> noise(-1, 1);
     constexpr double quantum = 0.1 * units::arcsecond, plateau = 90.0 / 3.5 * units::degree;
     double carried = 0.0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(250.0 * rate_hz); ++i) {
@@ -28,7 +32,8 @@ struct Turning {
       const double count = std::round(carried / quantum);
       carried -= count * quantum;
       time.push_back(static_cast<double>(i + 1) / rate_hz);
-      theta.push_back({0.0, 0.0, count * quantum});
+      const double y = across > 0.0 ? std::round(across * count) + noise(random) : 0.0;
+      theta.push_back({0.0, y * quantum, count * quantum});
       velocity.push_back({1e-7 * static_cast<double>(i % 7), 0.0, 9.8 / rate_hz + 1e-6 * static_cast<double>(i % 5)});
     }
   }
@@ -47,6 +52,14 @@ struct Turning {
 TEST(DataFaults, ASteadyRateIsNotSaturation) {
   for (const double rate_hz : {50.0, 100.0, 200.0}) {
     EXPECT_FALSE(Turning(rate_hz, 100.0).saturated()) << rate_hz << " Hz";
+  }
+}
+
+// An axis across the turns has 2 % of them, some hundred counts: two counts of noise are no slope that the top cuts off.
+TEST(DataFaults, AFewCountsOfNoiseAreNoSlope) {
+  for (const double rate_hz : {50.0, 100.0, 200.0}) {
+    EXPECT_FALSE(Turning(rate_hz, 100.0, 0.02).saturated()) << rate_hz << " Hz";
+    EXPECT_FALSE(Turning(rate_hz, 100.0, 0.03).saturated()) << rate_hz << " Hz";
   }
 }
 
