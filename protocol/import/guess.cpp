@@ -8,6 +8,7 @@
 
 #include "protocol/import/guess_orientation.hpp"
 #include "protocol/import/guess_roles.hpp"
+#include "protocol/import/guess_table.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/psins.hpp"
@@ -180,8 +181,14 @@ class Guesser {
       const std::string& unit = named_[(*roles_.gimbal)[0]].unit;
       input.gimbal_unit = find_unit(unit) && find_unit(unit)->quantity == Quantity::angle ? unit : std::string();
     }
-    const Orientation orientation = find_orientation(input, guess_.remarks);
-    set_gimbal(orientation);
+    const std::vector<Table> tables = tables_of(input);
+    input.on_a_table = !tables.empty();
+    Orientation orientation = find_orientation(input, guess_.remarks);
+    if (tables.empty()) {
+      set_gimbal(orientation);
+    } else {
+      set_table(tables, orientation);
+    }
     if (psins_) {
       return set_psins();
     }
@@ -250,10 +257,61 @@ class Guesser {
                                       roles_.gimbal_named ? ", by their names" : ": so gravity and the turns fit"));
     } else if (orientation.moves) {
       gimbal.absent = true;
-      say("gimbal", "no read-outs in the file, though the sensor turns: good for `selfcal poses`, not for the 24");
+      say("gimbal", fmt::format("no read-outs {}, though the sensor turns: good for `selfcal poses`, not for the 24",
+                                roles_.angle ? "that fit" : "in the file"));
     } else {
       gimbal.fixed_deg = {0.0, 0.0};
-      say("gimbal", "nothing turns: read-outs are written as 0");
+      say("gimbal", orientation.turns ? "read-outs are written as 0, though the gyros show turns"
+                                      : "nothing turns: read-outs are written as 0");
+    }
+  }
+
+  // Empty: no column of angles, or the gyros do not follow it.
+  std::vector<Table> tables_of(const OrientationInput& input) {
+    if (!roles_.angle || psins_) {
+      return {};
+    }
+    const std::size_t gyro = roles_.gyro->front();
+    TableFit fit = fit_table(input.gyro, input.accelerometer, values_[*roles_.angle], named_[*roles_.angle].unit,
+                             {named_[gyro].unit, named_[gyro].increment}, interval_s_);
+    if (fit.ways.empty()) {
+      doubt("gimbal", fit.good ? fmt::format("{}: the gyros show its turns, but not in the unit of their names",
+                                             source_.title(*roles_.angle))
+                               : fmt::format("{}: angles by the name, but they explain {:.0f} % of the gyros' turns",
+                                             source_.title(*roles_.angle), 100.0 * fit.explained));
+    }
+    return std::move(fit.ways);
+  }
+
+  void set_table(const std::vector<Table>& tables, Orientation& orientation) {
+    const TableAxis& axis = tables.front().axis;
+    const Vector3 about = orientation.gyro * axis.per_rad.normalized();
+    Eigen::Index along = 0;
+    about.cwiseAbs().maxCoeff(&along);
+    GimbalMap& gimbal = guess_.map.gimbal;
+    const bool inner = along == 1;  // outer turns about z, inner about y
+    (inner ? gimbal.inner : gimbal.outer) = reference(*roles_.angle);
+    gimbal.signs[inner ? 1 : 0] = about(along) < 0.0 ? -1.0 : 1.0;
+    gimbal.unit = tables.front().unit;
+    const std::string title = source_.title(*roles_.angle);
+    say(inner ? "gimbal.inner" : "gimbal.outer",
+        fmt::format("{}, a table with one axis: its turns are {:.1f} % of what the gyros show{}, mostly about {}{}",
+                    title, 100.0 * axis.explained,
+                    axis.turns > 0 ? fmt::format(" in {} turns", axis.turns) : std::string(),
+                    about(along) < 0.0 ? "-" : "", "xyz"[along]));
+    say("gimbal", "one read-out: good for `selfcal poses`, not for the 24; that of the other axis is written as 0");
+    if (along == 0) {
+      doubt("gimbal.outer", "it turns about x, which is neither the outer nor the inner axis: taken for the outer one");
+    }
+    if (tables.size() > 1) {
+      doubt("gimbal.unit",
+            fmt::format("{} or {}: the gyros' unit is not known either", tables[0].unit, tables[1].unit));
+    }
+    if (!roles_.angle_of_a_table) {
+      doubt("gimbal", fmt::format("{} may be an attitude that was computed from these gyros, and no read-out", title));
+    }
+    if (!orientation.rad_per_sample && tables.size() == 1) {
+      orientation.rad_per_sample = 1.0 / axis.per_rad.norm();
     }
   }
 

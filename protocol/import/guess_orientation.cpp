@@ -173,13 +173,14 @@ class Finder {
       fit = slow && slow->explained > fit->explained ? slow : fit;
     }
     out_.moves = out_.moves || gravity_turns();
+    out_.turns = quick.turns;
     if (in_.axes_by_format) {
       return;
     }
     if (!fit || fit->explained < fair_turns || !gravity_turns()) {
       const char* why = quick.turns ? "what turns does not show in the accelerometers" : "nothing turns";
       doubt("gyro.axes", fmt::format("taken as they stand; {}, so that order and signs cannot be checked", why));
-      if (quick.turns && !out_.moves) {
+      if (quick.turns && !out_.moves && !in_.on_a_table) {
         doubt("gimbal", "the gyros show turns and gravity none: disturbed, or turned about the vertical");
       }
       return;

@@ -20,6 +20,7 @@ struct OrientationInput {
   std::optional<double> interval_s;
   std::optional<double> latitude_deg;
   bool axes_by_format = false;  // the file's format says how its axes lie
+  bool on_a_table = false;      // a read-out of one axis shows what the gyros show
 };
 
 struct Orientation {
@@ -28,6 +29,7 @@ struct Orientation {
   std::array<double, 2> signs{1.0, 1.0};
   bool swapped = false;  // the gimbal's second column is the outer one
   bool moves = false;    // gimbal or hand
+  bool turns = false;    // by the gyros, though gravity may not show it
   std::string gimbal_unit = "deg";
   std::optional<double> rad_per_sample;  // of a gyro's count
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numeric>
 
@@ -380,32 +381,46 @@ class Assigner {
     }
   }
 
-  bool is_angle(std::size_t column) const {
-    const std::string& unit = named_[column].unit;
+  bool says(std::size_t column, std::initializer_list<std::string_view> words) const {
     const std::string& name = source_.names()[column];
-    const auto says = [&name](std::string_view word) {
+    return std::any_of(words.begin(), words.end(), [&name](std::string_view word) {
       return std::search(name.begin(), name.end(), word.begin(), word.end(),
                          [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; }) != name.end();
-    };
-    return unit == "deg" || unit == "rad" || says("gimbal") || says("outer") || says("inner") || says("axis") ||
-           says("angle") || says("azimuth") || says("pitch") || says("yaw") || says("roll") || says("encoder");
+    });
+  }
+  bool is_read_out(std::size_t column) const {
+    return named_[column].role == Role::gimbal ||
+           says(column, {"gimbal", "outer", "inner", "axis", "angle", "table", "encoder"});
+  }
+  bool is_angle(std::size_t column) const {
+    const std::string& unit = named_[column].unit;
+    return unit == "deg" || unit == "rad" || is_read_out(column) || says(column, {"azimuth", "pitch", "yaw", "roll"});
   }
 
   void tell_unused() {
     std::string rest;
-    std::string angle;
+    std::vector<std::size_t> angles;
+    const auto is_free = [this](std::size_t k) { return std::find(taken_.begin(), taken_.end(), k) == taken_.end(); };
+    for (std::size_t k = 0; k < values_.size() && !roles_.gimbal; ++k) {
+      if (is_free(k) && is_angle(k)) {
+        angles.push_back(k);
+      }
+    }
+    if (angles.size() == 1 && all_finite(values_[angles.front()])) {
+      roles_.angle = angles.front();
+      roles_.angle_of_a_table = is_read_out(angles.front());
+      take(angles.front());
+    } else if (!angles.empty()) {
+      doubt("gimbal", fmt::format("{}: angles by the name, but no two columns side by side fit gravity and the turns",
+                                  source_.title(angles.front())));
+    }
     for (std::size_t k = 0; k < values_.size(); ++k) {
-      if (std::find(taken_.begin(), taken_.end(), k) == taken_.end()) {
+      if (is_free(k)) {
         rest += fmt::format("{}{}", rest.empty() ? "" : ", ", source_.title(k));
-        angle = angle.empty() && is_angle(k) ? source_.title(k) : angle;
       }
     }
     if (!rest.empty()) {
       say("columns", fmt::format("not taken over: {}", rest));
-    }
-    if (!angle.empty() && !roles_.gimbal) {
-      doubt("gimbal",
-            fmt::format("{}: angles by the name, but no two columns side by side fit gravity and the turns", angle));
     }
   }
 

@@ -22,6 +22,8 @@ struct Roles {
   std::optional<std::array<std::size_t, 3>> accelerometer;
   std::optional<std::array<std::size_t, 2>> gimbal;  // outer, inner where `gimbal_named`; else as they stand
   bool gimbal_named = false;
+  std::optional<std::size_t> angle;  // the only free column that its name calls an angle, where there is no pair
+  bool angle_of_a_table = false;     // and its name says that it is a read-out, no attitude that somebody computed
   std::vector<std::size_t> temperature;
 };
 
