@@ -443,8 +443,9 @@ Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& know
   const std::size_t columns = source.names().size();
   if (columns < fewest_columns) {
     return fail(ErrorKind::bad_input,
-                fmt::format("{}: {}: {} columns; three gyros and three accelerometers are expected", file,
-                            source.form(), columns));
+                fmt::format("{}: {}: {} columns; three gyros and three accelerometers are expected: a recording "
+                            "holds both triads; 'selfcal poses --only' answers for a log of one",
+                            file, source.form(), columns));
   }
   ColumnRequest request;
   request.tolerant = true;

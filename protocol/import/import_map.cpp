@@ -213,7 +213,11 @@ void read_axes(Section& section, TriadMap& triad) {
 
 void read_triad(Section& section, bool gyro, TriadMap& triad) {
   if (!section.there()) {
-    return section.miss(gyro ? "gyro" : "accelerometer", "table missing");
+    return section.miss(
+        gyro ? "gyro" : "accelerometer",
+        fmt::format("table missing: a recording holds both triads; 'selfcal poses --only {}' answers for a "
+                    "log of one",
+                    gyro ? "accelerometers" : "gyros"));
   }
   const std::vector<ColumnRef> columns = section.columns("columns", 3);
   std::string kind;

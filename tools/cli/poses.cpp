@@ -15,19 +15,44 @@
 namespace selfcal::cli {
 namespace {
 
+constexpr WholeRange known_columns{1, 1000};
+
 struct PosesArguments {
   std::string file;
   double gyro_unit = 1.0;
   double false_alarm_rate = 0.01;
   bool json = false;
+  std::string only;
+  std::optional<std::uint64_t> angle_column;
 };
+
+RawColumns raw_columns(const PosesArguments& arguments) {
+  RawColumns columns;
+  columns.sensors = arguments.only == "gyros"            ? diagnosis::Sensors::gyros
+                    : arguments.only == "accelerometers" ? diagnosis::Sensors::accelerometers
+                                                         : diagnosis::Sensors::both;
+  columns.angle = static_cast<std::size_t>(arguments.angle_column.value_or(0));
+  return columns;
+}
+
+// What says how a CSV's columns stand says nothing of a recording, whose datasets have names.
+Expected<void> check_columns(const PosesArguments& arguments, bool is_recording) {
+  if (is_recording && (!arguments.only.empty() || arguments.angle_column)) {
+    return fail(ErrorKind::usage,
+                fmt::format("{}: --only and --angle-column are of CSV of raw values", arguments.file));
+  }
+  return {};
+}
 
 Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   const bool is_recording = arguments.file.ends_with(".h5") || arguments.file.ends_with(".hdf5");
+  if (const auto columns = check_columns(arguments, is_recording); !columns) {
+    return tl::unexpected(columns.error());
+  }
   Expected<diagnosis::PoseInput> input =
       is_recording
           ? read_hdf5(arguments.file, lenient).map([](const auto& loaded) { return pose_input_of(loaded.recording); })
-          : read_raw_poses(arguments.file);
+          : read_raw_poses(arguments.file, raw_columns(arguments));
   if (!input) {
     return tl::unexpected(input.error());
   }
@@ -53,6 +78,10 @@ CommandRun configure(Options& options) {
   options.text("FILE", arguments->file,
                "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw; or a recording (.h5)",
                Needed::yes);
+  options.choice("--only", arguments->only, {"gyros", "accelerometers"},
+                 "the CSV holds one triad: time in s, then its x y z");
+  options.whole("--angle-column", arguments->angle_column, known_columns,
+                "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
   options.flag("--json", arguments->json, "one JSON document on standard output");

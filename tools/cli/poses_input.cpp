@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 
 namespace selfcal::cli {
@@ -37,7 +38,7 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
   return input;
 }
 
-Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path) {
+Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path, const RawColumns& columns) {
   constexpr std::size_t limit = 256U << 20U;
   const Expected<std::string> text = read_text_file(path, limit);
   if (!text) {
@@ -46,6 +47,9 @@ Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path) {
   diagnosis::PoseInput input;
   std::string_view rest = *text;
   std::size_t line_number = 0;
+  const bool both = columns.sensors == diagnosis::Sensors::both;
+  std::vector<double> row(std::max<std::size_t>(both ? 7 : 4, columns.angle));
+  input.sensors = columns.sensors;
   while (!rest.empty()) {
     const std::size_t end = rest.find('\n');
     std::string_view line = rest.substr(0, end);
@@ -53,7 +57,7 @@ Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path) {
     if (++line_number == 1 || line.empty()) {
       continue;
     }
-    std::array<double, 7> row{};
+    std::fill(row.begin(), row.end(), 0.0);
     for (std::size_t k = 0; k < row.size(); ++k) {
       const auto [stop, error] = std::from_chars(line.data(), line.data() + line.size(), row[k]);
       if (error != std::errc{} || !std::isfinite(row[k])) {
@@ -68,8 +72,15 @@ Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path) {
                   fmt::format("{}: line {}: time {} does not increase", path, line_number, row[0]));
     }
     input.time_s.push_back(row[0]);
-    input.gyro.push_back({row[1], row[2], row[3]});
-    input.accel.push_back({row[4], row[5], row[6]});
+    const std::array<double, 3> first{row[1], row[2], row[3]}, none{};
+    input.gyro.push_back(columns.sensors == diagnosis::Sensors::accelerometers ? none : first);
+    input.accel.push_back(both                                                    ? std::array{row[4], row[5], row[6]}
+                          : columns.sensors == diagnosis::Sensors::accelerometers ? first
+                                                                                  : none);
+    if (columns.angle > 0) {
+      input.outer.push_back(row[columns.angle - 1] * units::degree);
+      input.inner.push_back(0.0);
+    }
   }
   return input;
 }

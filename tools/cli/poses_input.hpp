@@ -11,7 +11,12 @@ namespace selfcal::cli {
 
 // Increments to rates, rad/s and m/s^2; read-outs where they are not 0 throughout.
 diagnosis::PoseInput pose_input_of(const Recording& recording);
-// CSV: one header line, then time, three gyros, three accelerometers, raw; further columns are ignored.
-Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path);
+// CSV: one header line, then time, three gyros, three accelerometers, or one triad of them alone, raw; further columns are ignored but
+// for the angle of a table with one axis.
+struct RawColumns {
+  diagnosis::Sensors sensors = diagnosis::Sensors::both;
+  std::size_t angle = 0;  // its column, from 1, in deg; 0: none
+};
+Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path, const RawColumns& columns);
 
 }  // namespace selfcal::cli

@@ -327,6 +327,38 @@ std::string read_outs_text(const diagnosis::ReadOuts& r, const Units& shown) {
   return text;
 }
 
+Json noise_json(const std::vector<diagnosis::RestNoise>& all) {
+  Json points = Json::array();
+  for (const diagnosis::RestNoise& n : all) {
+    points.push_back({{"tau_s", n.tau_s}, {"deviation", n.deviation}, {"freedom", n.freedom}});
+  }
+  return points;
+}
+
+std::string noise_text(const std::vector<diagnosis::RestNoise>& all, const char* triad, double unit, const char* name) {
+  std::string text;
+  for (const diagnosis::RestNoise& n : all) {
+    text += fmt::format("  {:6.4g} s  {} {}, +- {:.0f} %\n", n.tau_s, three(n.deviation, unit), name,
+                        100.0 / std::sqrt(2.0 * n.freedom));
+  }
+  return text.empty() ? text : fmt::format("Allan deviation of the {} at rest, x/y/z:\n{}", triad, text);
+}
+
+// Of a log with one triad: what both together would say is left out.
+std::string one_triad_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+  if (d.sensors == diagnosis::Sensors::accelerometers) {
+    return (d.by_poses ? accelerometers_text(d, shown) : std::string()) +
+           noise_text(d.accel_noise, "accelerometers", shown.accel, shown.accel_name);
+  }
+  std::string text;
+  if (d.poses > 0) {
+    text += fmt::format("gyros at rest, {}: mean {} +- {} by what {} stand{} scatter\n", shown.gyro_name,
+                        three(d.gyro_bias, shown.gyro), three(d.gyro_bias_sigma, shown.gyro), d.poses,
+                        d.poses == 1 ? "" : "s");
+  }
+  return text + noise_text(d.gyro_noise, "gyros", shown.gyro, shown.gyro_name);
+}
+
 }  // namespace
 
 nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
@@ -340,7 +372,11 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
   for (const diagnosis::Confounded& c : d.confounded) {
     confounded.push_back({{"effect", c.effect->id}, {"with", c.with->id}, {"shared", c.shared}});
   }
+  const char* sensors = d.sensors == diagnosis::Sensors::gyros            ? "gyros"
+                        : d.sensors == diagnosis::Sensors::accelerometers ? "accelerometers"
+                                                                          : "both";
   return {{"mismatch", poses_mismatch(d)},
+          {"sensors", sensors},
           {"poses", d.poses},
           {"static_s", d.static_seconds},
           {"by_poses", d.by_poses},
@@ -352,6 +388,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"accelerometers",
            {{"adequate", d.accel_adequate},
             {"tested", d.accel_tested},
+            {"noise_at_rest", noise_json(d.accel_noise)},
             {"rms_g", d.accel_rms_g},
             {"held_out_rms_g", d.accel_held_out_rms_g},
             {"force_at_rest_g", d.force_at_rest_g},
@@ -364,6 +401,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"bias_sigma", d.gyro_bias_sigma},
             {"held_out_rms", d.gyro_held_out_rms},
             {"white_rms", d.gyro_white_rms},
+            {"noise_at_rest", noise_json(d.gyro_noise)},
             {"parameters", to_json(d.gyro_parameters)},
             {"tried", to_json(d.gyro_tried)},
             {"findings", to_json(d.gyro_named)},
@@ -399,7 +437,9 @@ std::string poses_text(const diagnosis::PoseDiagnosis& d, bool si) {
   if (d.read_outs) {
     text += read_outs_text(*d.read_outs, shown);
   }
-  if (d.by_poses) {
+  if (d.sensors != diagnosis::Sensors::both) {
+    text += one_triad_text(d, shown);
+  } else if (d.by_poses) {
     text += accelerometers_text(d, shown);
     text += gyros_text(d, shown);
     text += turns_text(d, shown);

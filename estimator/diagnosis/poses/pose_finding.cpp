@@ -154,8 +154,9 @@ bool same_pose(const PoseInput& input, const Pose& a, const Pose& b, double raw_
 
 std::vector<Pose> put_together(const PoseInput& input, const std::vector<Pose>& stretches) {
   std::vector<Pose> poses;
-  if (stretches.empty()) {
-    return poses;
+  // Without gravity nothing but the gyros' unit, which may not be known, tells a knock from a turn: two stands are no harm.
+  if (stretches.empty() || input.sensors == Sensors::gyros) {
+    return stretches;
   }
   const double raw_per_g = raw_gravity(input, stretches);
   for (const Pose& next : stretches) {
@@ -171,22 +172,38 @@ std::vector<Pose> put_together(const PoseInput& input, const std::vector<Pose>& 
   return poses;
 }
 
+// Of a gyro's sample, by white noise: of the usual pose.
+double sample_sigma(const std::vector<Pose>& poses, Eigen::Index axis) {
+  std::vector<double> all;
+  for (const Pose& p : poses) {
+    double samples = 0.0;
+    for (const auto& [first, last] : p.quiet) {
+      samples += static_cast<double>(last - first);
+    }
+    all.push_back(p.gyro_white(axis) * std::sqrt(samples));
+  }
+  return quantile(all, 0.5);
+}
+
 // A steady turn is as quiet as a pose. Gyros that read a degree a second, and twenty times the usual deviation, away from
-// where they mostly are turn; so do read-outs that move.
+// where they mostly are turn; so do read-outs that move. Of gyros alone, whose unit need not be known, ten times the noise of a sample counts as much
+// as a degree a second.
 void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
-  Vector3 middle, spread;
+  Vector3 middle, spread, least;
+  constexpr double rate = units::degree, of_a_sample = 10.0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values, off;
     for (const Pose& p : poses) {
       values.push_back(p.gyro(axis));
     }
     middle(axis) = quantile(values, 0.5);
+    least(axis) = input.sensors == Sensors::gyros ? of_a_sample * sample_sigma(poses, axis) : rate / input.gyro_unit;
     for (const double v : values) {
       off.push_back(std::abs(v - middle(axis)));
     }
     spread(axis) = quantile(off, 0.5);
   }
-  constexpr double rate = units::degree, deviations = 20.0, read_out = 0.1 * units::degree;
+  constexpr double deviations = 20.0, read_out = 0.1 * units::degree;
   std::erase_if(poses, [&](const Pose& p) {
     const std::size_t third = (p.last - p.first) / 3;  // read-outs may be late or early by the rest
     for (const std::vector<double>* angle : {&input.outer, &input.inner}) {
@@ -195,7 +212,25 @@ void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
       }
     }
     const Vector3 off = (p.gyro - middle).cwiseAbs();
-    return ((off * input.gyro_unit).array() > rate && off.array() > deviations * spread.array()).any();
+    return (off.array() > least.array() && off.array() > deviations * spread.array()).any();
+  });
+}
+
+// Gyros alone that turn all the time are quietest where their rate is at its largest, and no gravity says that they turn. What rests scatters by
+// little more than from sample to sample; what turns changes its rate by many times that.
+void drop_what_turns(const PoseInput& input, std::vector<Pose>& poses) {
+  constexpr double most = 5.0;  // coloured noise of a sensor: 3
+  std::erase_if(poses, [&](const Pose& p) {
+    Vector3 square = Vector3::Zero();
+    double count = 0.0;
+    for (const auto& [first, last] : p.quiet) {
+      for (std::size_t i = first; i < last; ++i) {
+        square += (at(input.gyro, i) - p.gyro).cwiseAbs2();
+        count += 1.0;
+      }
+    }
+    // gyro_white is of the mean of as many.
+    return ((square / count).array() > most * most * count * p.gyro_white.array().square()).any();
   });
 }
 
@@ -214,6 +249,9 @@ std::vector<Pose> find_poses(const PoseInput& input) {
   std::vector<Pose> poses = put_together(input, quiet_stretches(input, window));
   if (!poses.empty()) {
     drop_steady_turns(input, poses);
+  }
+  if (input.sensors == Sensors::gyros) {
+    drop_what_turns(input, poses);
   }
   return poses;
 }
@@ -239,6 +277,9 @@ std::vector<LeftOut> find_left_out(const PoseInput& input) {
       inside = now;
     }
   };
+  if (input.sensors != Sensors::both) {  // three axes of a coarse sensor may well stand still in a pose
+    return all;
+  }
   runs([&](std::size_t i) { return input.accel[i] == zero; }, 0.0, "the accelerometers give zero");
   runs(
       [&](std::size_t i) {

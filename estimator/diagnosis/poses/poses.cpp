@@ -5,6 +5,7 @@
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
+#include "estimator/diagnosis/poses/pose_noise.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 #include "estimator/diagnosis/poses/read_outs.hpp"
 #include "estimator/geometry/units.hpp"
@@ -31,14 +32,29 @@ void add_noise(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagn
       d.static_seconds += input.time_s[last - 1] - input.time_s[first];
     }
   }
+  if (input.sensors != Sensors::accelerometers) {
+    d.gyro_noise = noise_at_rest(input, input.gyro, poses);
+  }
+  if (input.sensors != Sensors::gyros) {
+    d.accel_noise = noise_at_rest(input, input.accel, poses);
+  }
   white = (white / static_cast<double>(poses.size())).cwiseSqrt();
   d.gyro_white_rms = {white.x(), white.y(), white.z()};
   d.poses = static_cast<int>(poses.size());
 }
 
+constexpr double narrow_deg = 20.0;
+
+void add_untested(PoseDiagnosis& d) {
+  if (!d.accel_tested) {
+    d.invisible.emplace_back(
+        "nonlinearity of the accelerometers: it takes 12 poses and more in directions that determine bias, scale and "
+        "misalignment first");
+  }
+}
+
 void add_invisible(PoseDiagnosis& d) {
-  constexpr double narrow = 20.0;  // deg
-  if (d.gravity_span_deg < narrow) {
+  if (d.gravity_span_deg < narrow_deg) {
     d.invisible.emplace_back(
         "bias, scale and misalignment of the accelerometers, gyro_g_sensitivity: gravity hardly moves in the sensor");
   } else {
@@ -49,11 +65,14 @@ void add_invisible(PoseDiagnosis& d) {
   d.invisible.emplace_back(
       "gyro_magnetic_sensitivity: without heading it cannot be told from the field's vertical part, so it is "
       "not excluded");
-  if (!d.accel_tested) {
-    d.invisible.emplace_back(
-        "nonlinearity of the accelerometers: it takes 12 poses and more in directions that determine bias, scale and "
-        "misalignment first");
+  add_untested(d);
+}
+
+void add_invisible_of_accelerometers(PoseDiagnosis& d) {
+  if (d.gravity_span_deg < narrow_deg) {
+    d.invisible.emplace_back("bias, scale and misalignment of the accelerometers: gravity hardly moves in the sensor");
   }
+  add_untested(d);
 }
 
 void calibrate(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
@@ -89,6 +108,14 @@ void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses,
   add_invisible(d);
 }
 
+void add_read_outs(const PoseInput& input, PoseDiagnosis& d) {
+  if (d.read_outs) {
+    d.supports.emplace_back("angle read-outs: gyros that turn about the table's axes, and the table's clock");
+  } else if (!input.outer.empty()) {
+    d.invisible.emplace_back("scale factors by the read-outs: no turn that they and the gyros both show");
+  }
+}
+
 // What the recording is a reference for.
 void add_supports(const PoseInput& input, PoseDiagnosis& d) {
   if (d.by_poses) {
@@ -97,10 +124,71 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
       d.supports.push_back("gravity carried through " + std::to_string(d.turns) + " turns: gyros that turn");
     }
   }
-  if (d.read_outs) {
-    d.supports.emplace_back("angle read-outs: gyros that turn about the table's axes, and the table's clock");
-  } else if (!input.outer.empty()) {
-    d.invisible.emplace_back("scale factors by the read-outs: no turn that they and the gyros both show");
+  add_read_outs(input, d);
+}
+
+std::string counted(int count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+// Gyros alone: nothing says where down is, so that only rest and a table's angles are left to hold them against.
+void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
+  d.read_outs = judge_read_outs(input, poses, alpha);
+  d.accel_adequate = true;
+  if (poses.empty() && !d.read_outs) {
+    d.failure = "gyros alone, that neither stand still nor turn with read-outs: nothing to hold them against";
+    return;
+  }
+  const auto n = static_cast<double>(poses.size());
+  for (std::size_t axis = 0; axis < 3 && !poses.empty(); ++axis) {
+    double mean = 0.0, square = 0.0;
+    for (const Pose& p : poses) {
+      mean += p.gyro(static_cast<Eigen::Index>(axis)) / n;
+    }
+    for (const Pose& p : poses) {
+      const double off = p.gyro(static_cast<Eigen::Index>(axis)) - mean;
+      square += off * off;
+    }
+    d.gyro_bias[axis] = mean;
+    d.gyro_bias_sigma[axis] = poses.size() > 1 ? std::sqrt(square / (n - 1.0) / n) : d.gyro_white_rms[axis];
+    d.gyro_held_out_rms[axis] = poses.size() > 1 ? std::sqrt(square / n) * n / (n - 1.0) : 0.0;
+  }
+  if (!poses.empty()) {
+    d.supports.push_back("rest in " + counted(d.poses, "stand") + ": bias and noise of the gyros");
+  }
+  add_read_outs(input, d);
+  d.invisible.emplace_back("accelerometers: the log holds none");
+  d.invisible.emplace_back(
+      "the Earth's rate apart from the bias, gyro_g_sensitivity, how the axes lie: no accelerometer says where down "
+      "is");
+  if (!d.read_outs) {
+    d.invisible.emplace_back(
+        "scale factors and misalignment of the gyros: neither angle read-outs nor gravity say how far a turn went");
+  }
+}
+
+// Accelerometers alone: gravity in poses as ever, but nothing shows a turn.
+void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
+  d.accel_adequate = true;
+  if (poses.empty()) {
+    d.failure = "accelerometers alone, that never stand still: gravity is no reference then";
+    return;
+  }
+  if (d.by_poses) {
+    calibrate(input, alpha, poses, d);
+    d.supports.push_back("gravity in " + std::to_string(d.poses) + " poses: accelerometers");
+    add_invisible_of_accelerometers(d);
+  } else {
+    d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise of the accelerometers");
+    d.invisible.push_back("bias, scale and misalignment of the accelerometers: fewer than 6 static poses: " +
+                          std::to_string(d.poses));
+  }
+  d.invisible.emplace_back("gyros: the log holds none");
+  d.invisible.emplace_back(
+      "turns: without gyros nothing carries gravity from pose to pose, and a turn about the vertical is not seen at "
+      "all");
+  if (!input.outer.empty()) {
+    d.invisible.emplace_back("delay and scale of the read-outs: they are held against gyros, and the log holds none");
   }
 }
 
@@ -113,16 +201,25 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
     d.failure = "too few samples";
     return d;
   }
+  d.sensors = input.sensors;
   d.clipped = find_clipping(input);
   d.left_out = find_left_out(input);
   std::vector<Pose> poses = find_poses(input);
   if (!poses.empty()) {
     add_noise(input, poses, d);
   }
+  constexpr std::size_t least = 6;  // biases and scale factors
+  d.by_poses = poses.size() >= least && input.sensors != Sensors::gyros;
+  if (input.sensors == Sensors::gyros) {
+    judge_gyros_alone(input, alpha, poses, d);
+    return d;
+  }
+  if (input.sensors == Sensors::accelerometers) {
+    judge_accelerometers_alone(input, alpha, poses, d);
+    return d;
+  }
   constexpr double of_read_outs = 0.2;
   d.read_outs = judge_read_outs(input, poses, of_read_outs * alpha);
-  constexpr std::size_t least = 6;  // biases and scale factors
-  d.by_poses = poses.size() >= least;
   if (!d.by_poses && !d.read_outs) {
     d.failure = "fewer than 6 static poses: " + std::to_string(poses.size());
     return d;

@@ -16,12 +16,17 @@
 
 namespace selfcal::diagnosis {
 
+// What a log holds.
+enum class Sensors { both, gyros, accelerometers };
+
 struct PoseInput {
-  std::vector<double> time_s;                      // increasing
-  std::vector<std::array<double, 3>> gyro, accel;  // raw, any unit
-  double gyro_unit = 1.0;                          // nominal rad/s per raw unit
-  double accel_unit = 0.0;                         // nominal m/s^2 per raw unit; 0: not known
-  std::vector<double> outer, inner;                // angle read-outs, rad; empty: none
+  std::vector<double> time_s;  // increasing
+  std::vector<std::array<double, 3>> gyro,
+      accel;  // raw, any unit; zero throughout of a triad that the log does not hold
+  Sensors sensors = Sensors::both;
+  double gyro_unit = 1.0;            // nominal rad/s per raw unit
+  double accel_unit = 0.0;           // nominal m/s^2 per raw unit; 0: not known
+  std::vector<double> outer, inner;  // angle read-outs, rad; empty: none
 };
 
 struct PoseEffect {
@@ -109,7 +114,15 @@ struct ReadOuts {
   int disagreeing = 0;  // turns that read-outs and gyros disagree about
 };
 
+// Allan deviation of a triad at rest (IEEE Std 952, annex C), raw units.
+struct RestNoise {
+  double tau_s = 0.0;
+  std::array<double, 3> deviation{};
+  double freedom = 0.0;  // means that do not overlap
+};
+
 struct PoseDiagnosis {
+  Sensors sensors = Sensors::both;
   int poses = 0;
   bool by_poses =
       false;  // whether they are enough for a reference: what follows of accelerometers and gyros is then filled
@@ -139,10 +152,11 @@ struct PoseDiagnosis {
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
   std::optional<ReadOuts> read_outs;
-  std::string not_by_position;         // why position at rest is no reference, if somebody asked
-  std::vector<std::string> supports;   // what the recording is a reference for, in words
-  std::vector<std::string> invisible;  // in words
-  std::string failure;                 // empty: done
+  std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first
+  std::string not_by_position;                     // why position at rest is no reference, if somebody asked
+  std::vector<std::string> supports;               // what the recording is a reference for, in words
+  std::vector<std::string> invisible;              // in words
+  std::string failure;                             // empty: done
 };
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double false_alarm_rate);

@@ -303,7 +303,7 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
   const double duration_s = input.time_s.back() - input.time_s.front();
   answer.clock =
       clock_of(by_rates ? delays_of_steps(input, rates, answer) : delays_of_turns(input, rows, answer), duration_s);
-  if (!poses.empty()) {
+  if (!poses.empty() && input.sensors == Sensors::both) {
     double raw_per_g = 0.0;
     for (const Pose& p : poses) {
       raw_per_g += p.accel.norm() / static_cast<double>(poses.size());
