@@ -84,6 +84,9 @@ ordered_json law_json(const DiscoveredLaw& law) {
                            {"significance", law.significance},
                            {"held_out_gain", law.held_out_gain},
                            {"share", law.share}};
+  if (!law.effect.empty()) {
+    document["effect"] = law.effect;
+  }
   if (law.carries_over > 0.0) {  // else its class was not looked at
     document["stability"] = law.stability;
     document["carries_over"] = law.carries_over;
@@ -160,8 +163,9 @@ std::string discovered_words(const Discovery& found) {
   std::vector<std::string> all;
   for (const DiscoveredLaw& law : found.laws) {
     const std::size_t others = law.carries_over < sure ? others_elsewhere(law) : 0;
-    all.push_back(fmt::format("{} follows {}{}", name_of_axis(law.term.axis), law.expression,
-                              others > 0 ? fmt::format(" or one of {} others", others) : std::string()));
+    all.push_back(fmt::format("{} follows {}{}{}", name_of_axis(law.term.axis), law.expression,
+                              others > 0 ? fmt::format(" or one of {} others", others) : std::string(),
+                              law.effect.empty() ? std::string() : fmt::format(" ({})", law.effect)));
   }
   for (std::string words : {processes_words(found, ProcessKind::jump_per_turn, "takes a new offset at each turn",
                                             "take a new offset at each turn"),
@@ -174,6 +178,12 @@ std::string discovered_words(const Discovery& found) {
   const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
   all.resize(all.size() - more);
   return fmt::format("{}{}", fmt::join(all, "; "), more > 0 ? fmt::format("; and {} more", more) : std::string());
+}
+
+const char* beyond_what(const Discovery& found) {
+  const bool known =
+      std::any_of(found.laws.begin(), found.laws.end(), [](const DiscoveredLaw& law) { return !law.effect.empty(); });
+  return known ? "what the catalogue alone does not explain" : "what no catalogue holds";
 }
 
 std::string discovered_figures(const Discovery& found) {

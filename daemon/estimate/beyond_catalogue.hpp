@@ -32,10 +32,14 @@ void replace_process(diagnosis::Diagnosis& diagnosis, const discovery::Discovery
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
 
 // "accel_y and accel_z take a new offset at each turn"; "gyro_x follows abs(wz) or one of 22 others" where it matters which, for
-// they differ on another plan; empty where nothing was found.
+// they differ on another plan; empty where nothing was found. "(accel_relaxation)" behind an equation that this effect of the catalogue
+// makes too.
 std::string discovered_words(const discovery::Discovery& found);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
 std::string discovered_figures(const discovery::Discovery& found);
+
+// "what no catalogue holds"; "what the catalogue alone does not explain" where an effect of it makes some of the laws.
+const char* beyond_what(const discovery::Discovery& found);
 
 // "discovered", "described", "processes" and "discovery" of the document.
 void add_discovery(nlohmann::ordered_json& document, const discovery::Discovery& found);

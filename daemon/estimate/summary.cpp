@@ -239,7 +239,7 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
   } else if (d != nullptr && d->unexplained) {
     s.verdict =
         explains(beyond)
-            ? fmt::format("These 24 values are biased by what no catalogue holds: {}.", discovered_words(*beyond))
+            ? fmt::format("These 24 values are biased by {}: {}.", beyond_what(*beyond), discovered_words(*beyond))
             : "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.";
     s.cause = unexplained_cause(*d, beyond);
     s.next = command("diagnose", subject);
@@ -260,7 +260,7 @@ Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discove
   const bool ambiguous = std::any_of(beyond->laws.begin(), beyond->laws.end(),
                                      [](const discovery::DiscoveredLaw& law) { return law.ambiguous.size() > 1; });
   return {SummaryStanding::bad,
-          fmt::format("The model leaves out what no catalogue holds: {}.", discovered_words(*beyond)),
+          fmt::format("The model leaves out {}: {}.", beyond_what(*beyond), discovered_words(*beyond)),
           unexplained_cause(d, beyond),
           command("diagnose", subject, ambiguous ? "--next-experiment next.toml" : "--amended amended")};
 }

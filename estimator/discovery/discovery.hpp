@@ -50,6 +50,8 @@ struct Constant {
 
 struct DiscoveredLaw {
   LawTerm term;
+  std::string
+      effect;  // of the catalogue, named and rejected for what else is there, that makes the same (kept_names.hpp)
   std::string expression;                 // constants as numbers
   double coefficient = 0.0, sigma = 0.0;  // in unit_of(axis)
   std::vector<Constant> constants;

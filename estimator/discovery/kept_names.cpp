@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "estimator/discovery/effect_columns.hpp"
 #include "estimator/discovery/scene.hpp"
@@ -43,29 +44,44 @@ double share_beside(const ColumnSums& sums, const Eigen::VectorXd& signature, co
 
 }  // namespace
 
-bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& d, const Discovery& found,
+bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& d, Discovery& found,
                            const std::stop_token& stop) {
   const auto of_a_sensor = [](const diagnosis::ModelEffect& e) { return e.effect->sensor != nullptr; };
-  if (!d.unexplained || d.rejected_model.empty() || !found.left || found.laws.empty() ||
+  if (!d.unexplained || d.rejected_model.empty() || found.laws.empty() ||
       !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
     return false;
   }
   Scene scene(recording);
   scene.table = collect_nodes(scene.motion, scene.input);
   const std::vector<EffectTerm> terms = terms_of(d.rejected_model);
-  LawColumns of_laws(scene.motion, scene.table, found.fit.terms, false);
+  std::vector<LawTerm> told;
+  Eigen::VectorXd coefficient(static_cast<Eigen::Index>(found.laws.size()));
+  for (const DiscoveredLaw& law : found.laws) {
+    coefficient(static_cast<Eigen::Index>(told.size())) = law.coefficient;
+    told.push_back(law.term);
+  }
+  LawColumns of_laws(scene.motion, scene.table, told, false);
   EffectColumns of_effects(scene.context, terms);
   TwoSources source(of_laws, of_effects);
   const ColumnSums sums = run_columns(scene.input, scene.trace, source, stop);
   if (stop.stop_requested()) {
     return false;
   }
-  std::vector<int> laws, effects;
-  for (int k = 0; k < source.count(); ++k) {
-    (k < of_laws.count() ? laws : effects).push_back(k);
+  std::vector<int> laws(told.size()), effects;
+  std::iota(laws.begin(), laws.end(), 0);
+  for (const EffectTerm& term : terms) {
+    std::vector<int> own(static_cast<std::size_t>(term.count()));
+    std::iota(own.begin(), own.end(), of_laws.count() + static_cast<int>(effects.size()));
+    effects.insert(effects.end(), own.begin(), own.end());
+    for (std::size_t k = 0; k < told.size(); ++k) {
+      const Eigen::VectorXd alone = Eigen::VectorXd::Unit(coefficient.size(), static_cast<Eigen::Index>(k));
+      if (share_beside(sums, alone, own) < most_beside) {
+        found.laws[k].effect = term.effect->id;
+      }
+    }
   }
   const double chance = 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, found.functions_tried)));
-  return share_beside(sums, found.fit.coefficient, effects) < most_beside &&
+  return found.left && share_beside(sums, coefficient, effects) < most_beside &&
          gain_of(sums, laws) - gain_of(sums, effects) < chance;
 }
 
@@ -73,8 +89,7 @@ void keep_rejected_names(diagnosis::Diagnosis& d, const Discovery& found) {
   diagnosis::Remainder remainder;
   remainder.sigma = std::max(std::sqrt(std::max(0.0, found.misfit_after)), found.left->adequacy.largest_sigma);
   remainder.share = std::min(1.0, remainder.sigma * remainder.sigma / std::max(1.0, found.misfit_before));
-  remainder.forms = {
-      {d.rejected_model.front().effect->id, "its form departs from the equation", remainder.share}};
+  remainder.forms = {{d.rejected_model.front().effect->id, "its form departs from the equation", remainder.share}};
   remainder.places = found.left->places;
   d.findings.insert(d.findings.begin(), d.rejected.begin(), d.rejected.end());
   d.rejected.clear();

@@ -9,10 +9,11 @@
 
 namespace selfcal::discovery {
 
-// The laws that were told alone explain the recording, and the rejected effects of the catalogue, fitted anew, make what they make:
-// as well, but for less than a search among so many functions gains by chance. `recording`: the one that `found` is of.
-bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& diagnosis,
-                           const Discovery& found, const std::stop_token& stop = {});
+// Looks for laws that are what a rejected effect of the catalogue makes, fitted anew, and says so in them (`effect`). True where the laws
+// alone explain the recording and the rejected effects make all of them, as well but for less than a search among so many functions
+// gains by chance. `recording`: the one that `found` is of.
+bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& diagnosis, Discovery& found,
+                           const std::stop_token& stop = {});
 
 // Then the names stand, with what they leave as their remainder. `found` holds it (`left`).
 void keep_rejected_names(diagnosis::Diagnosis& diagnosis, const Discovery& found);

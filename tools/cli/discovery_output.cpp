@@ -87,6 +87,8 @@ std::string law_text(const DiscoveredLaw& law) {
       fmt::format("  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit, held-out gain {:.0f}\n",
                   name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
                   law.expression, law.significance, 100.0 * law.share, law.held_out_gain);
+  text += law.effect.empty() ? std::string()
+                             : fmt::format("    as the catalogue's {}, which alone leaves too much\n", law.effect);
   text += constants_text(law.constants) + class_text(law);
   return text + fmt::format(
                     "    on another plan it leaves at most a tenth with a probability of {:.2f};\n"

@@ -68,13 +68,15 @@ class KeptNames : public testing::Test {
     term.constants = std::move(constants);
     found.fit.terms = {term};
     found.fit.coefficient = Eigen::VectorXd::Constant(1, coefficient);
-    found.laws.emplace_back();
+    found.laws.resize(1);
+    found.laws.front().term = term;
+    found.laws.front().coefficient = coefficient;
     found.left.emplace();
     found.functions_tried = 50'000;
     return found;
   }
 
-  bool says(const Discovery& found) const {
+  bool says(Discovery found) const {
     return say_what_was_rejected({recording_.data(), calibration_}, diagnosis_, found);
   }
 
@@ -98,6 +100,18 @@ TEST_F(KeptNames, WhatFitsFarBetterIsAnother) {
   EXPECT_TRUE(says(told(by_sense, size_ug, {tau_s})));  // which the recording does not hold
   recorded(by_sense);
   EXPECT_FALSE(says(told(by_sense, size_ug, {tau_s})));
+}
+
+// Beside a law that no catalogue holds the creep is marked as the catalogue's, and the whole is not what was rejected.
+TEST_F(KeptNames, OneOfTwoLawsIsMarked) {
+  Discovery found = told("exp(-since/?)", size_ug, {tau_s});
+  const Discovery other = told("sin(inner)*fz", 50.0, {});
+  found.laws.push_back(other.laws.front());
+  found.fit.terms.push_back(other.fit.terms.front());
+  found.fit.coefficient = Eigen::Vector2d(size_ug, 50.0);
+  EXPECT_FALSE(say_what_was_rejected({recording_.data(), calibration_}, diagnosis_, found));
+  EXPECT_EQ(found.laws[0].effect, "accel_relaxation");
+  EXPECT_EQ(found.laws[1].effect, "");
 }
 
 TEST_F(KeptNames, NothingIsSaidWhereThereIsNoName) {

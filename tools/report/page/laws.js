@@ -16,6 +16,7 @@ function discoveredTable(laws, processes, id) {
   return table([
     {title: 'sensor', cells: all.map((l) => textOf(l.axis)), class: 'left'},
     {title: 'law', cells: [...laws.map((l) => lawAsMath(textOf(l.expression))), ...processes.map((p) => textOf(p.process))], class: 'words'},
+    ...(laws.some((l) => l.effect) ? [{title: 'as in the catalogue', cells: laws.map((l) => textOf(l.effect) || '–'), class: 'left'}] : []),
     {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
     {title: 'holds on another plan', cells: all.map((l) => (Number.isFinite(l.carries_over) ? `${significant(100 * l.carries_over, 2)} %` : '–'))},
   ], {id});
