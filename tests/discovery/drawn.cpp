@@ -64,7 +64,9 @@ std::string within_grammar(Random& random) {
   return quantity(random);
 }
 
-std::string beyond_grammar(Random& random) {
+// Forms that the search had not when the trial was made. Since then it has quotients of one quantity by another, waves over the count of
+// turns.
+std::string beyond_first_grammar(Random& random) {
   const double form = random.uniform(0.0, 1.0);
   if (form < 0.2) {
     return fmt::format("exp(-sqrt(since/{:.4g}))", log_uniform(random, 3.0, 40.0));
@@ -81,6 +83,34 @@ std::string beyond_grammar(Random& random) {
                        one_of(std::array{"sin(outer)", "fy", "cos(inner)"}, random));
   }
   return fmt::format("sin({:.3g}*n)*{}", random.uniform(0.7, 2.6), one_of(std::array{"fx", "1", "fz"}, random));
+}
+
+// Forms that the search has not: harmonics between the whole ones, thresholds, exponentials of a force, a quotient of two forces by a
+// third, two kernels in one.
+std::string beyond_any_grammar(Random& random) {
+  const double form = random.uniform(0.0, 1.0);
+  const std::string angle = one_of(std::array{"outer", "inner"}, random);
+  if (form < 0.2) {
+    return fmt::format("sin({:.3g}*{}+{:.3g})", random.uniform(1.3, 1.7), angle, random.uniform(-3.0, 3.0));
+  }
+  if (form < 0.4) {
+    return fmt::format("(1+sign(sin({})-{:.3g}))*{}", angle, random.uniform(0.2, 0.8), quantity(random));
+  }
+  if (form < 0.6) {
+    return fmt::format("exp({:.3g}*{})", random.uniform(1.5, 4.0),
+                       one_of(std::array{"fx", "fy", "fz", "fx*fy"}, random));
+  }
+  if (form < 0.8) {
+    return fmt::format("{}/({:.3g}+fz**2)", one_of(std::array{"fx*fy", "fx*so", "fy*si", "wx*wy"}, random),
+                       log_uniform(random, 0.05, 0.3));
+  }
+  return fmt::format("exp(-since/{:.4g})*exp(-t/{:.4g})", log_uniform(random, 8.0, 150.0),
+                     log_uniform(random, 0.06, 0.3));
+}
+
+std::string beyond_grammar(Random& random) {
+  constexpr double first_share = 0.6;
+  return random.uniform(0.0, 1.0) < first_share ? beyond_first_grammar(random) : beyond_any_grammar(random);
 }
 
 sim::Law draw_law(const std::string& kind, Random& random) {
