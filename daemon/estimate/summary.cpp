@@ -159,7 +159,11 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
   }
-  if (beyond != nullptr && !beyond->described.empty()) {
+  if (beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure) {
+    const discovery::DiscoveredLaw& law = beyond->described.front();
+    text += fmt::format("; {} follows one of {} equations, none of which holds elsewhere more probably than not",
+                        name_of_axis(law.term.axis), std::max<std::size_t>(2, law.ambiguous.size()));
+  } else if (beyond != nullptr && !beyond->described.empty()) {
     text += fmt::format("; {} follows no equation that was tried, only a sum of several",
                         name_of_axis(beyond->described.front().term.axis));
   }

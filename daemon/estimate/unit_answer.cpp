@@ -57,10 +57,18 @@ std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::Un
                                                    const discovery::ExperimentLimits& limits,
                                                    const std::stop_token& stop) {
   std::optional<discovery::NextExperiment> next;
-  for (const discovery::DiscoveredLaw& law : found.laws) {
+  const auto plan = [&](const discovery::DiscoveredLaw& law) {
     auto planned = discovery::plan_experiment(unit, law, limits, stop);
     if (planned && (!next || planned->separation_now < next->separation_now)) {
       next = std::move(planned);
+    }
+  };
+  for (const discovery::DiscoveredLaw& law : found.laws) {
+    plan(law);
+  }
+  for (const discovery::DiscoveredLaw& law : found.described) {
+    if (law.unsure) {  // of the others no member is the law
+      plan(law);
     }
   }
   return next;

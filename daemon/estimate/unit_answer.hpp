@@ -47,7 +47,7 @@ tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const
 Together put_together(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,
                       const discovery::JointFit& joint);
 
-// The experiment for the law whose closest rival is nearest now.
+// The experiment for the law whose closest rival is nearest now, told or unsure.
 std::optional<discovery::NextExperiment> plan_next(std::span<const discovery::UnitRecording> unit,
                                                    const discovery::Discovery& found,
                                                    const discovery::ExperimentLimits& limits,

@@ -1,6 +1,7 @@
 #include "estimator/discovery/dictionary.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <map>
@@ -85,23 +86,26 @@ class Builder {
     add_all(all_, {"sin(outer)**2", "cos(outer)**2", "sin(inner)**2", "cos(inner)**2", "T*dT"}, formed, false);
   }
 
-  void add_grid(const char* text, Kernel kernel, std::initializer_list<double> constants, double belief,
-                double unit = 1.0) {
+  void add_grid(std::vector<Choice>& choices, const char* text, Kernel kernel, std::initializer_list<double> constants,
+                double belief, double unit = 1.0) {
     for (const double constant : constants) {
       const int factor = add(text, kernel, unit * constant);
       if (factor >= 0) {
-        decays_.push_back({factor, belief / static_cast<double>(constants.size())});
+        choices.push_back({factor, belief / static_cast<double>(constants.size())});
       }
     }
   }
 
   void kernels() {
-    add_grid("exp(-since/?)", Kernel::creep, {4.0, 7.0, 11.0, 17.0, 26.0, 40.0, 60.0, 90.0, 140.0, 220.0}, 0.5);
+    add_grid(decays_, "exp(-since/?)", Kernel::creep, {4.0, 7.0, 11.0, 17.0, 26.0, 40.0, 60.0, 90.0, 140.0, 220.0},
+             0.5);
     // Nothing creeps before the first turn, where `rest` is 1e9.
-    add_grid("log(1+rest/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
-    add_grid("log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
-    add_grid("exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
+    add_grid(decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
+    add_grid(decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
+    add_grid(decays_, "exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
     waves();
+    turn_waves();
+    quotients();
     for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {
       const Piece& piece = sums_.pieces[k];
       if (!piece.turning) {
@@ -130,6 +134,38 @@ class Builder {
     }
     for (Choice& wave : waves_) {
       wave.belief /= sum;
+    }
+  }
+
+  // Once around in so many turns: whatever lies between the turns, so that dwells of other lengths tell it from a wave over the
+  // time. Half a period of resolution apart; what takes less than two turns is another wave at the turns.
+  void turn_waves() {
+    const double turns = sums_.channels.col(static_cast<Eigen::Index>(laws::Variable::n)).maxCoeff() + 1.0;
+    double sum = 0.0;
+    for (int k = 1; 2.0 * turns / k > 2.0; ++k) {
+      const double period = 2.0 * turns / k;
+      const int sine = add("sin(2*pi*n/?)", Kernel::turn_wave, period);
+      const int cosine = add("cos(2*pi*n/?)", Kernel::turn_wave, period);
+      if (sine >= 0 && cosine >= 0) {
+        turn_waves_.push_back({sine, 1.0 / k});
+        cosine_[sine] = cosine;
+        sum += 1.0 / k;
+      }
+    }
+    for (Choice& wave : turn_waves_) {
+      wave.belief /= sum;
+    }
+  }
+
+  // A response that grows or falls by a share of what it is: a stiffness, a gap. The constant is what the sum of both falls short of at
+  // the most, so that none of its values gives a pole.
+  void quotients() {
+    constexpr std::array texts = {
+        "1/(1+?+fx)",         "1/(1+?+fy)",         "1/(1+?+fz)",         "1/(1+?+sin(outer))", "1/(1+?+cos(outer))",
+        "1/(1+?+sin(inner))", "1/(1+?+cos(inner))", "1/(1+?-fx)",         "1/(1+?-fy)",         "1/(1+?-fz)",
+        "1/(1+?-sin(outer))", "1/(1+?-cos(outer))", "1/(1+?-sin(inner))", "1/(1+?-cos(inner))"};
+    for (const char* text : texts) {
+      add_grid(quotients_, text, Kernel::quotient, {0.1, 0.25, 0.6, 1.5}, 1.0 / static_cast<double>(texts.size()));
     }
   }
 
@@ -177,16 +213,22 @@ class Builder {
 
   // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
   void enumerate() {
-    const std::vector<Draw> nothing(1), one = products(all_, 1), main_two = products(main_, 2);
-    collect(products(all_, 1, true), 0.2);
-    collect(products(all_, 2), 0.3);
+    const std::vector<Draw> nothing(1), one = products(all_, 1), main_one = products(main_, 1),
+                                        main_two = products(main_, 2);
+    collect(products(all_, 1, true), 0.195);
+    collect(products(all_, 2), 0.29);
     collect(products(main_, 3), 0.04 / (plain_share * plain_share * plain_share));
-    collect(times(decays_, nothing), 0.12);
-    collect(times(decays_, one), 0.15);
+    collect(times(decays_, nothing), 0.115);
+    collect(times(decays_, one), 0.145);
     collect(times(decays_, main_two), 0.03 / (plain_share * plain_share));
-    collect(times(waves_, nothing), 0.07);
-    collect(times(waves_, one), 0.05);
-    collect(times(steps_, nothing), 0.04);
+    collect(times(waves_, nothing), 0.066);
+    collect(times(waves_, one), 0.048);
+    // Equal dwells do not tell them from waves over the time: where a sensor goes by the time ten times as often as by the count, that decides.
+    collect(times(turn_waves_, nothing), 0.004);
+    collect(times(turn_waves_, main_one), 0.004 / plain_share);
+    collect(times(quotients_, nothing), 0.01);
+    collect(times(quotients_, main_one), 0.02 / plain_share);
+    collect(times(steps_, nothing), 0.033);
   }
 
   int add_function(const std::vector<int>& factors, double cost) {
@@ -243,7 +285,7 @@ class Builder {
   Dictionary dictionary_;
   std::vector<Eigen::ArrayXd> values_;  // [factors]
   std::vector<double> scales_;
-  std::vector<Choice> main_, all_, decays_, steps_, waves_;
+  std::vector<Choice> main_, all_, decays_, steps_, waves_, turn_waves_, quotients_;
   std::map<int, int> cosine_;  // of a wave's sine
   std::vector<Eigen::VectorXd> means_;
 };

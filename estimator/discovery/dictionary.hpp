@@ -14,7 +14,7 @@
 namespace selfcal::discovery {
 
 // How a function depends on its constant, if it has one.
-enum class Kernel { none, creep, log_creep, warm_up, wave, step };
+enum class Kernel { none, creep, log_creep, warm_up, wave, turn_wave, quotient, step };
 
 struct Factor {
   std::string text;  // of the expression; `?` where the constant stands

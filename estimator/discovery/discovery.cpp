@@ -170,6 +170,11 @@ class Search {
     take_laws();
     if (state_.processes.empty() || log_posterior() < laws_first_posterior) {
       state_ = laws_first;
+      if (state_.processes.empty()) {
+        // What may stand in a law's place is asked of the recording with no process in it.
+        model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+        choose(state_.terms.size());
+      }
     }
   }
 
@@ -345,7 +350,11 @@ class Search {
   LawClass class_of(std::size_t k) {
     Candidate own;
     const std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
-    return {recordings_.back(), std::move(own), others, options_.least_odds, options_.stop};
+    PieceModel& model = raw_model_ ? *raw_model_ : *model_;
+    project_out(model, k);
+    const std::vector<Candidate> own_values = shortlist_.values_of_wave(model, own);
+    project_out(model, state_.terms.size());
+    return {recordings_.back(), std::move(own), others, own_values, options_.least_odds, options_.stop};
   }
 
   // Of the class of term k the equation that holds on another plan with the greatest probability takes its place. Fills the

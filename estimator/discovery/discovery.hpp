@@ -63,6 +63,7 @@ struct DiscoveredLaw {
                                  // cannot be told from it, explains most
   double departure_log_p = 0.0;  // that a true form departs as far (departure.hpp), the logarithm
   double carries_over = 0.0;     // probability that it leaves at most a tenth of the misfit on a plan never used
+  bool unsure = false;           // described only because it more probably fails there than not (known_form.hpp)
   std::vector<ClassMember> ambiguous;  // what this recording cannot tell from it, itself included, simplest first
 };
 

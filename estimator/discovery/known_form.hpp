@@ -21,6 +21,8 @@ struct TellingLaws {
 // - a process of its own stands beside the equation;
 // - three equations share it, or two of which the smaller takes less than half of what the larger does, or of which one
 //   more probably fails on another plan than not: they are more probably one law whose form none of them has;
+// - the only law of all is strong and more probably fails on another plan than not (`unsure`): all that stands in its class is nearly it on
+//   these recordings and something else elsewhere, and none of it is known to be the law;
 // - a law that takes less than a tenth of what its law takes may as well follow this axis: that is what the form lacks.
 // What is weaker than an axis that is only described may be what this one's form leaves, and is described too.
 TellingLaws tell_laws(std::vector<DiscoveredLaw> laws, std::span<const DiscoveredProcess> processes,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace selfcal::discovery {
@@ -23,7 +24,7 @@ bool same_value(const LawTerm& a, const LawTerm& b) { return same_law(a, b) && n
 }  // namespace
 
 LawClass::LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
-                   double least_odds, const std::stop_token& stop)
+                   const std::vector<Candidate>& own_values, double least_odds, const std::stop_token& stop)
     : own_(std::move(own)), tried_(best_of(others)), least_odds_(least_odds), possible_{own_} {
   for (const std::vector<Candidate>& alternatives : others) {
     for (Candidate c : alternatives) {
@@ -33,6 +34,8 @@ LawClass::LawClass(const UnitRecording& like, Candidate own, const std::vector<s
       }
     }
   }
+  std::copy_if(own_values.begin(), own_values.end(), std::back_inserter(possible_),
+               [&](const Candidate& c) { return is_member(c); });
   laws_.reserve(possible_.size());
   for (const Candidate& c : possible_) {
     laws_.push_back({c.term, c.coefficient, odds(c)});

@@ -13,9 +13,10 @@ namespace selfcal::discovery {
 class LawClass {
  public:
   // `others`: every function that was tried in the place of `own`, each with several values of its constant. `like`: the unit,
-  // its noise and its site. Members have at least `least_odds` against `own`.
+  // its noise and its site. Members have at least `least_odds` against `own`. `own_values`: `own` with other values of its
+  // constants, as these leave them open.
   LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
-           double least_odds, const std::stop_token& stop);
+           const std::vector<Candidate>& own_values, double least_odds, const std::stop_token& stop);
 
   // Members with each value of a constant by itself, `own` first, and what holds of them elsewhere.
   const std::vector<Candidate>& possible() const { return possible_; }

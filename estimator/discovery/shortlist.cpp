@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <string_view>
 #include <utility>
 
 #include "estimator/discovery/discovery.hpp"
@@ -12,8 +13,14 @@
 namespace selfcal::discovery {
 namespace {
 
-constexpr const char* wave = "sin(2*pi*t/?)";
-constexpr const char* wave_with_phase = "sin(2*pi*t/?+?)";
+// A wave as the dictionary has it, and with its phase.
+struct WaveForm {
+  std::string_view bare, with_phase, unit;
+};
+constexpr WaveForm over_time = {"sin(2*pi*t/?)", "sin(2*pi*t/?+?)", "h"};
+constexpr WaveForm over_turns = {"sin(2*pi*n/?)", "sin(2*pi*n/?+?)", "turns"};
+const WaveForm& form_of(Kernel kernel) { return kernel == Kernel::turn_wave ? over_turns : over_time; }
+bool is_wave(Kernel kernel) { return kernel == Kernel::wave || kernel == Kernel::turn_wave; }
 
 // Golden section between two neighbours of the grid: `rounds` shrink the interval to 0.618^rounds of itself.
 template <typename F>
@@ -93,6 +100,63 @@ double Shortlist::gain_of(const PieceModel& model, const LawTerm& term) const {
   return model.gain(term.axis, sums_.means(values));
 }
 
+double Shortlist::longest_of(Kernel kernel) const {
+  double longest = 0.0;
+  for (const Factor& factor : dictionary_.factors) {
+    longest = factor.kernel == kernel ? std::max(longest, factor.constant) : longest;
+  }
+  return longest;
+}
+
+Eigen::MatrixXd Shortlist::waves(const std::string& sine, const std::string& cosine, double period) const {
+  Eigen::MatrixXd X(sums_.piece_dt.size(), 2);
+  int column = 0;
+  for (const std::string& text : {sine, cosine}) {
+    X.col(column++) = sums_.means(laws::Expression::parse(text)->evaluate(sums_.channels, std::vector<double>{period}));
+  }
+  return X;
+}
+
+std::vector<Candidate> Shortlist::values_of_wave(const PieceModel& model, const Candidate& own) const {
+  constexpr int steps = 20;     // to either side
+  constexpr double step = 0.1;  // of half a period of resolution
+  std::vector<Candidate> values;
+  for (const auto& [kernel, form] : {std::pair{Kernel::wave, over_time}, std::pair{Kernel::turn_wave, over_turns}}) {
+    std::string sine = own.term.expression.text();
+    const std::size_t at = sine.find(form.with_phase);
+    if (own.term.constants.size() != 2 || at == std::string::npos) {
+      continue;
+    }
+    sine.replace(at, form.with_phase.size(), form.bare);
+    std::string cosine = sine;
+    cosine.replace(at, 3, "cos");
+    const double frequency = 1.0 / own.term.constants[0], apart = step / longest_of(kernel);
+    const double here = model.gain(own.term.axis, waves(sine, cosine, own.term.constants[0]));
+    for (int k = -steps; k <= steps; ++k) {
+      const double period = 1.0 / (frequency + k * apart);
+      if (k != 0 && period > own.term.least && period < own.term.most) {
+        const Eigen::MatrixXd X = waves(sine, cosine, period);
+        const auto [G, b] = model.project(own.term.axis, X);
+        const Eigen::Vector2d size = G.ldlt().solve(b);
+        Candidate value = own;
+        value.term.constants = {period, std::atan2(size(1), size(0))};
+        value.coefficient = size.norm();
+        value.gain += model.gain(own.term.axis, X) - here;
+        values.push_back(std::move(value));
+      }
+    }
+  }
+  return values;
+}
+
+// Up to its neighbours, which are evenly apart in frequency: beyond them lie other peaks.
+std::pair<double, double> Shortlist::periods_about(const Function& wave) const {
+  constexpr double least = 0.85, most = 1.18;
+  const double part = wave.constant / longest_of(wave.kernel);
+  return {wave.constant * std::max(least, 1.0 / (1.0 + part)),
+          wave.constant * (part < 1.0 ? std::min(most, 1.0 / (1.0 - part)) : most)};
+}
+
 Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) const {
   const Function& function = dictionary_.functions[static_cast<std::size_t>(ranked.function)];
   std::string pattern = dictionary_.pattern(function);
@@ -102,26 +166,20 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
   c.gain = ranked.gain;
   if (function.partner >= 0) {
     const Function& partner = dictionary_.functions[static_cast<std::size_t>(function.partner)];
-    const auto waves = [&](double period) {
-      Eigen::MatrixXd X(sums_.piece_dt.size(), 2);
-      int column = 0;
-      for (const Function* f : {&function, &partner}) {
-        const auto expression = laws::Expression::parse(dictionary_.pattern(*f));
-        X.col(column++) = sums_.means(expression->evaluate(sums_.channels, std::vector<double>{period}));
-      }
-      return X;
-    };
-    const double period = highest_between(function.constant * 0.85, function.constant * 1.18, 12,
-                                          [&](double p) { return model.gain(ranked.axis, waves(p)); });
-    const Eigen::MatrixXd X = waves(period);
+    const std::string cosine = dictionary_.pattern(partner);
+    const auto [shortest, longest] = periods_about(function);
+    const double period = highest_between(shortest, longest, 12,
+                                          [&](double p) { return model.gain(ranked.axis, waves(pattern, cosine, p)); });
+    const Eigen::MatrixXd X = waves(pattern, cosine, period);
     const auto [G, b] = model.project(ranked.axis, X);
     const Eigen::VectorXd size = G.ldlt().solve(b);
     c.gain = std::max(c.gain, model.gain(ranked.axis, X));
     c.cost += cost_of_phase(c.gain);
-    pattern.replace(pattern.find(wave), std::string(wave).size(), wave_with_phase);
+    const WaveForm& form = form_of(function.kernel);
+    pattern.replace(pattern.find(form.bare), form.bare.size(), form.with_phase);
     c.term.expression = *laws::Expression::parse(pattern);
     c.term.constants = {period, std::atan2(size(1), size(0))};
-    limit(c.term, Kernel::wave);
+    limit(c.term, function.kernel);
     return c;
   }
   c.term.expression = *laws::Expression::parse(pattern);
@@ -157,7 +215,7 @@ std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most
       key += std::to_string(function.constant);
     }
     std::vector<double>& others = taken[{ranked.axis, key}];
-    const bool wave_apart = function.kernel == Kernel::wave && others.size() < most_waves &&
+    const bool wave_apart = is_wave(function.kernel) && others.size() < most_waves &&
                             std::all_of(others.begin(), others.end(), [&](double other) {
                               return std::max(other / function.constant, function.constant / other) > another_period;
                             });
@@ -210,8 +268,13 @@ std::vector<Constant> Shortlist::constants(const LawTerm& term) const {
   if (term.constants.empty()) {
     return all;
   }
-  if (text.find(wave_with_phase) != std::string::npos) {
-    return {{"period", "h", term.constants[0], 0.0}, {"phase", "rad", term.constants[1], 0.0}};
+  for (const WaveForm& form : {over_time, over_turns}) {
+    if (text.find(form.with_phase) != std::string::npos) {
+      return {{"period", std::string(form.unit), term.constants[0], 0.0}, {"phase", "rad", term.constants[1], 0.0}};
+    }
+  }
+  if (text.find("1+?") != std::string::npos && text.find("/?") == std::string::npos) {
+    return {{"offset", "1", term.constants[0], 0.0}};
   }
   for (std::size_t k = 0; k < term.constants.size(); ++k) {
     const bool seconds = text.find("since/?") != std::string::npos || text.find("rest/?") != std::string::npos;

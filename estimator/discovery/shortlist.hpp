@@ -4,6 +4,7 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/discovery/law_fit.hpp"
@@ -38,6 +39,9 @@ class Shortlist {
   // The best `most` laws over the pieces given what the model has chosen, each expression once, constants of greatest
   // gain; best first.
   std::vector<Candidate> best(const PieceModel& model, std::size_t most) const;
+  // A wave with other periods up to one of resolution away, amplitude and phase of greatest gain at each: where little of it is seen, several
+  // fit alike, far beyond the sigma of a linearised fit. Of another law none.
+  std::vector<Candidate> values_of_wave(const PieceModel& model, const Candidate& own) const;
   // Columns of a term over the pieces: itself and its derivatives by its constants.
   void add_columns(const PieceModel& model, const LawTerm& term, std::vector<Eigen::VectorXd>& columns) const;
   // Names, units and values of a term's constants, by where they stand in its expression.
@@ -45,6 +49,10 @@ class Shortlist {
 
  private:
   Candidate candidate(const PieceModel& model, const Ranked& ranked) const;
+  double longest_of(Kernel kernel) const;
+  // Means over the pieces of a wave's sine and cosine of this period; `sine` is the text with the bare sine.
+  Eigen::MatrixXd waves(const std::string& sine, const std::string& cosine, double period) const;
+  std::pair<double, double> periods_about(const Function& wave) const;
   void limit(LawTerm& term, Kernel kernel) const;  // to twice the range in which its kernel is looked for
   double gain_of(const PieceModel& model, const LawTerm& term) const;
 

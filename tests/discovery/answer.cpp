@@ -43,6 +43,8 @@ ordered_json to_json(const discovery::Discovery& d) {
     j["described"].push_back({{"axis", law.term.axis},
                               {"expression", law.expression},
                               {"gain", law.gain},
+                              {"unsure", law.unsure},
+                              {"carries_over", law.carries_over},
                               {"departure_log_p", law.departure_log_p}});
   }
   for (const discovery::DiscoveredLaw& law : d.laws) {

@@ -101,9 +101,15 @@ std::string described_text(const Discovery& found) {
   if (found.described.empty()) {
     return {};
   }
+  const bool unsure = found.described.front().unsure;
   std::string text =
-      "  no equation of its own, for the axis does more than these forms hold; a description of\n"
-      "  this recording, not to be used on another:\n";
+      unsure
+          ? fmt::format(
+                "  no equation holds on another plan more probably than not ({:.2f} the best of {}); a description of\n"
+                "  this recording, not to be used on another:\n",
+                found.described.front().carries_over, found.described.front().ambiguous.size())
+          : "  no equation of its own, for the axis does more than these forms hold; a description of\n"
+            "  this recording, not to be used on another:\n";
   for (const DiscoveredLaw& law : found.described) {
     text += fmt::format("    {:<8} ({}) * {}, {:.0f} % of the misfit\n", name_of_axis(law.term.axis),
                         with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,
@@ -231,10 +237,24 @@ std::string effects_text(const discovery::JointFit& joint) {
   return text.empty() ? text : "named effects, fitted together with the laws and the 24 of each recording\n" + text;
 }
 
+namespace {
+
+std::string next_text(const std::optional<discovery::NextExperiment>& next) {
+  if (!next) {
+    return {};
+  }
+  return fmt::format(
+      "  next experiment: {:.0f} min, {} positions: its rival {} would be {:.1f} sigma away ({:.1f} now)\n",
+      next->schedule.duration_s() / 60.0, next->schedule.positions.size(), next->closest, next->separation,
+      next->separation_now);
+}
+
+}  // namespace
+
 std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
   if (found.laws.empty() && found.processes.empty()) {
     return fmt::format("discovery: no equation among {} explains what remains\n", found.functions_tried) +
-           described_text(found) + left_text(found);
+           described_text(found) + left_text(found) + next_text(next);
   }
   std::string text =
       fmt::format("discovery: found among {} equations; each predicts the dwells and rotations left out of its fit\n",
@@ -247,14 +267,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
     text += fmt::format("  {}: a random process, {}: {}{}\n", name_of_axis(p.axis), discovery::name_of(p.kind),
                         with_sigma(p.size, p.sigma, unit_of_axis(p.axis)), walk ? "/sqrt(h)" : " (1 sigma)");
   }
-  text += described_text(found) + left_text(found);
-  if (next) {
-    text += fmt::format(
-        "  next experiment: {:.0f} min, {} positions: its rival {} would be {:.1f} sigma away ({:.1f} now)\n",
-        next->schedule.duration_s() / 60.0, next->schedule.positions.size(), next->closest, next->separation,
-        next->separation_now);
-  }
-  return text;
+  return text + described_text(found) + left_text(found) + next_text(next);
 }
 
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {

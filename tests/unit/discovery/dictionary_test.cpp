@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 #include <set>
+#include <string>
 
 namespace selfcal::discovery {
 namespace {
@@ -85,6 +88,73 @@ TEST(Dictionary, OfWavesThatOnePlanCannotTellApartTheLongerOneIsMoreProbable) {
   ASSERT_TRUE(slow != nullptr && fast != nullptr);
   // Equal probability on a logarithmic scale: the density on the scale of frequency goes with the period.
   EXPECT_NEAR(fast->cost - slow->cost, std::log(slow->constant / fast->constant), 1e-9);
+}
+
+PieceSums twenty_dwells() {
+  PieceSums sums = everything_varies();
+  for (Eigen::Index k = 0; k < sums.channels.rows(); ++k) {
+    sums.channels(k, static_cast<Eigen::Index>(laws::Variable::n)) = static_cast<double>(k / 20);
+  }
+  return sums;
+}
+
+// sin(a*n) and sin((2*pi - a)*n) are one function of a whole number but for their sign: no period is less than two turns.
+TEST(Dictionary, WavesOverTheCountOfTurnsAreHalfAPeriodApartAndNoneTwice) {
+  laws::VariableSet all;
+  all.set();
+  const Dictionary dictionary = make_dictionary(twenty_dwells(), all);
+  std::set<double> periods;
+  for (const Function& f : dictionary.functions) {
+    if (f.kernel == Kernel::turn_wave && !f.second && dictionary.pattern(f) == "sin(2*pi*n/?)*wx") {
+      EXPECT_GE(f.partner, 0);
+      periods.insert(f.constant);
+    }
+  }
+  ASSERT_EQ(periods.size(), 19U);  // of 20 dwells: 40 turns over 1, 2, ..., 19
+  EXPECT_DOUBLE_EQ(*periods.rbegin(), 40.0);
+  EXPECT_DOUBLE_EQ(*periods.begin(), 40.0 / 19.0);
+}
+
+// The search goes from 0.35 to 2.9 times each of its values, and a gravity of 1.004 g is as much as the Earth has.
+TEST(Dictionary, NoQuotientHasAPole) {
+  laws::VariableSet all;
+  all.set();
+  const Dictionary dictionary = make_dictionary(everything_varies(), all);
+  laws::Channels most = laws::Channels::Zero(3, static_cast<Eigen::Index>(laws::variable_count));
+  for (const laws::Variable v : {laws::Variable::fx, laws::Variable::fy, laws::Variable::fz}) {
+    most.col(static_cast<Eigen::Index>(v)) << -1.004, 0.0, 1.004;
+  }
+  for (const laws::Variable v : {laws::Variable::outer, laws::Variable::inner}) {
+    most.col(static_cast<Eigen::Index>(v)) << -1.5707963, 3.1415927, 1.5707963;
+  }
+  std::set<std::string> seen;
+  for (const Factor& f : dictionary.factors) {
+    if (f.kernel == Kernel::quotient) {
+      seen.insert(f.text);
+      for (const double factor : {0.35, 1.0, 2.9}) {
+        const Eigen::ArrayXd values =
+            laws::Expression::parse(f.text)->evaluate(most, std::vector<double>{factor * f.constant});
+        EXPECT_TRUE((values > 0.0).all() && (values < 40.0).all()) << f.text << " " << factor * f.constant;
+      }
+    }
+  }
+  EXPECT_EQ(seen.size(), 14U);
+}
+
+// A wave over the time of the same period, in dwells, is ten times as probable and more: equal dwells do not tell them apart.
+TEST(Dictionary, QuotientsAndWavesOverTurnsStandAloneAndTimesAQuantity) {
+  laws::VariableSet all;
+  all.set();
+  const Dictionary dictionary = make_dictionary(twenty_dwells(), all);
+  std::map<std::string, double> least;
+  for (const Function& f : dictionary.functions) {
+    const auto [at, first] = least.emplace(dictionary.pattern(f), f.cost);
+    at->second = std::min(at->second, f.cost);
+  }
+  for (const char* text : {"1/(1+?+fy)*so", "1/(1+?-cos(inner))", "sin(2*pi*n/?)", "sin(2*pi*n/?)*fz"}) {
+    EXPECT_TRUE(least.contains(text)) << text;
+  }
+  EXPECT_GT(least["sin(2*pi*n/?)"] - least["sin(2*pi*t/?)"], std::log(10.0));
 }
 
 }  // namespace

@@ -39,8 +39,25 @@ TEST(KnownForm, TwoOfOneAxisAreToldWhereAlikeInSizeAndLikelyElsewhere) {
   EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 800.0), law(3, 700.0)}), Counts(0, 3));
 }
 
-TEST(KnownForm, OneLawThatIsUnsureElsewhereIsTold) {
-  EXPECT_EQ(told_and_described({law(3, 900.0, 0.33)}), Counts(1, 0));
+TEST(KnownForm, AWeakLawThatIsUnsureElsewhereIsTold) {
+  EXPECT_EQ(told_and_described({law(3, 100.0, 0.33)}), Counts(1, 0));
+}
+
+TEST(KnownForm, AStrongLawAloneThatMoreProbablyFailsElsewhereIsDescribedAsUnsure) {
+  const TellingLaws t = tell_laws({law(3, 900.0, 0.49)}, {}, departure_rate);
+  ASSERT_EQ(t.described.size(), 1U);
+  EXPECT_TRUE(t.described.front().unsure);
+  EXPECT_EQ(told_and_described({law(3, 900.0, 0.51)}), Counts(1, 0));
+  EXPECT_EQ(told_and_described({law(3, 900.0, 0.33), law(0, 800.0)}), Counts(2, 0));
+}
+
+// What departs is none of its class, and no experiment is to part that.
+TEST(KnownForm, WhatDepartsIsNotUnsure) {
+  DiscoveredLaw departs = law(4, 900.0, 0.33);
+  departs.departure_log_p = -20.0;
+  const TellingLaws t = tell_laws({departs}, {}, departure_rate);
+  ASSERT_EQ(t.described.size(), 1U);
+  EXPECT_FALSE(t.described.front().unsure);
 }
 
 TEST(KnownForm, WhatDepartsTakesItsWholeAxisAlong) {
