@@ -154,7 +154,7 @@ void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<P
     d.gyro_held_out_rms[axis] = poses.size() > 1 ? std::sqrt(square / n) * n / (n - 1.0) : 0.0;
   }
   if (!poses.empty()) {
-    d.supports.push_back("rest in " + counted(d.poses, "stand") + ": bias and noise of the gyros");
+    d.supports.push_back("rest in " + counted(d.poses, "stop") + ": bias and noise of the gyros");
   }
   add_read_outs(input, d);
   d.invisible.emplace_back("accelerometers: the log holds none");
