@@ -83,6 +83,9 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
       }
     }
   }
+  for (double& probability : result.probability) {
+    probability = std::min(1.0, probability);  // the weights add up to one but for their rounding
+  }
   return result;
 }
 
