@@ -79,7 +79,7 @@ CommandRun configure(Options& options) {
                "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw; or a recording (.h5)",
                Needed::yes);
   options.choice("--only", arguments->only, {"gyros", "accelerometers"},
-                 "the CSV holds one triad: time in s, then its x y z");
+                 "gyros or accelerometers: the CSV holds these alone, time in s and then x y z");
   options.whole("--angle-column", arguments->angle_column, known_columns,
                 "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
