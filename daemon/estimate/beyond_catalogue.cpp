@@ -87,6 +87,9 @@ ordered_json law_json(const DiscoveredLaw& law) {
   if (!law.effect.empty()) {
     document["effect"] = law.effect;
   }
+  if (law.unsure) {
+    document["unsure"] = true;
+  }
   if (law.carries_over > 0.0) {  // else its class was not looked at
     document["stability"] = law.stability;
     document["carries_over"] = law.carries_over;

@@ -114,6 +114,7 @@ std::string described_text(const Discovery& found) {
     text += fmt::format("    {:<8} ({}) * {}, {:.0f} % of the misfit\n", name_of_axis(law.term.axis),
                         with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,
                         100.0 * law.share);
+    text += law.unsure ? class_text(law) : std::string();
   }
   return text;
 }

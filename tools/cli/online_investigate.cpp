@@ -55,9 +55,20 @@ struct Analysis {
 
   const ordered_json& result() const { return document.at("result"); }
   bool acceptable() const { return result().at("acceptable").get<bool>(); }
-  const ordered_json& laws() const {
+  const ordered_json& laws() const { return laws_in("discovered"); }
+  // Only described, for none of their class holds elsewhere more probably than not: a rotation may show which.
+  ordered_json unsure() const {
+    ordered_json all = ordered_json::array();
+    for (const ordered_json& law : laws_in("described")) {
+      if (law.value("unsure", false)) {
+        all.push_back(law);
+      }
+    }
+    return all;
+  }
+  const ordered_json& laws_in(const char* key) const {
     static const ordered_json none = ordered_json::array();
-    const auto found = result().at("diagnosis").find("discovered");
+    const auto found = result().at("diagnosis").find(key);
     return found == result().at("diagnosis").end() ? none : *found;
   }
   // Equations that explain as well as those that are told.
@@ -250,6 +261,14 @@ class Investigation {
         say(fmt::format("   no rotation parts that from {}{}; another attitude of the base would\n", words.front(),
                         words.size() > 1 ? fmt::format(" and {} more", words.size() - 1) : std::string()));
       }
+    }
+    const ordered_json unsure = a.unsure();
+    for (const ordered_json& law : unsure) {
+      say(fmt::format("   {} may follow {}, which fails on another plan more probably than not; {}\n",
+                      law.at("axis").get<std::string>(), law.at("expression").get<std::string>(), rivals_text(law)));
+    }
+    if (!unsure.empty()) {
+      step["unsure"] = unsure;
     }
     if (a.next && !(a.acceptable() && a.settled())) {
       const ordered_json& next = a.result().at("next_experiment");

@@ -200,16 +200,19 @@ function showDiagnosisTables(d) {
   if (found) {
     const symbols = lawSymbols(listOf(d.discovered).map((l) => textOf(l.expression)));
     add('Found beyond the catalogue', discoveredTable(listOf(d.discovered), listOf(d.processes), 'discovered'), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''),
-        ...classTables(listOf(d.discovered)), nextExperiment(d));
+        ...classTables(listOf(d.discovered)), nextExperiment(listOf(d.discovered)));
   }
   if (correctedByLaws(d)) {
     add('What the omission did to the 24', element('p', {class: 'note', id: 'corrections'}, correctionWords(listOf(d.parameters))));
   }
   const described = listOf(d.described);
   if (described.length > 0) {
-    add('Only described', element('p', {class: 'note'}, 'Only several equations together make up what this axis does: its form is '
-        + 'none of them. They describe this recording and are not to be used on another.'),
-    discoveredTable(described, [], 'described'));
+    const unsure = described.map(objectOf).filter((law) => law.unsure);
+    add('Only described', element('p', {class: 'note'}, unsure.length > 0
+        ? 'Several equations explain what this axis does, and none of them holds on another plan more probably than not. The best one describes this recording and is '
+          + 'not to be used on another.'
+        : 'Only several equations together make up what this axis does: its form is none of them. They describe this recording and are not to be used on another.'),
+    discoveredTable(described, [], 'described'), ...classTables(unsure), ...(unsure.length > 0 ? [nextExperiment(unsure)] : []));
   }
   if (d.unexplained && !explained(d)) {
     add('What to do', adviceForUnexplained(d.adequacy));

@@ -93,6 +93,11 @@ function showStep(steps, k) {
     const texts = [...laws, ...before].flatMap(classOf).map((m) => textOf(m.expression));
     section.append(element('p', {class: 'note symbols'}, lawSymbols(texts) + '.'));
   }
+  const unsure = listOf(step.unsure).map(objectOf);
+  if (unsure.length > 0) {
+    section.append(element('p', {}, `None of the equations of ${unsure.map((law) => textOf(law.axis)).join(', ')} holds on another plan more probably than not: they are not told.`),
+                   ...classTables(unsure));
+  }
   if (step.next_experiment) {
     addExperiment(section, step, k + 1);
   }

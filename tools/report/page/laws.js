@@ -60,8 +60,8 @@ function classTables(laws) {
 }
 
 // How the equations that are left open can be told apart; nothing where none is.
-function nextExperiment(d) {
-  const open = listOf(d.discovered).some((law) => listOf(law.class).length > 1);
+function nextExperiment(laws) {
+  const open = laws.map(objectOf).some((law) => listOf(law.class).length > 1);
   return element('p', {class: 'note', id: 'next-experiment'}, ...(open ? ['They differ on a rotation designed for it: ',
     element('code', {}, 'selfcal diagnose RECORDING --next-experiment next.toml'), ' writes it, ', element('code', {}, 'selfcal investigate RUN'), ' makes it.'] : []));
 }
