@@ -258,8 +258,10 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
 // Equations are written with the 24 beside them; where several explain the recording as well, a next rotation parts them.
 Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (!explains(beyond)) {
+    const bool unsure = beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure;
     return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
-            unexplained_cause(d, beyond), command("diagnose", subject, "--split-schedule next.toml")};
+            unexplained_cause(d, beyond),
+            command("diagnose", subject, unsure ? "--next-experiment next.toml" : "--split-schedule next.toml")};
   }
   const bool ambiguous = std::any_of(beyond->laws.begin(), beyond->laws.end(),
                                      [](const discovery::DiscoveredLaw& law) { return law.ambiguous.size() > 1; });
