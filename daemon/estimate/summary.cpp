@@ -136,7 +136,7 @@ std::string named_cause(const Diagnosis& d) {
 }
 
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
-  if (explains(beyond)) {
+  if (beyond != nullptr && explains(beyond)) {
     return discovered_figures(*beyond) + ".";
   }
   std::string text;
@@ -257,7 +257,7 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
 
 // Equations are written with the 24 beside them; where several explain the recording as well, a next rotation parts them.
 Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
-  if (!explains(beyond)) {
+  if (beyond == nullptr || !explains(beyond)) {
     const bool unsure = beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure;
     return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
             unexplained_cause(d, beyond),

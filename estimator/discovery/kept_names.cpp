@@ -15,6 +15,7 @@ constexpr double most_beside = 0.02;  // of the laws' square, that the effects c
 
 std::vector<EffectTerm> terms_of(const std::vector<diagnosis::ModelEffect>& model) {
   std::vector<EffectTerm> terms;
+  terms.reserve(model.size());
   for (const diagnosis::ModelEffect& effect : model) {
     terms.push_back({effect.effect, effect.constant, effect.size, !std::isnan(effect.constant)});
   }
