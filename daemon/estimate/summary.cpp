@@ -135,6 +135,12 @@ std::string named_cause(const Diagnosis& d) {
   return text + ".";
 }
 
+// An equation that is only described, for none of its class holds elsewhere more probably than not; null: there is none.
+const discovery::DiscoveredLaw* unsure_law(const discovery::Discovery* beyond) {
+  const bool any = beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure;
+  return any ? &beyond->described.front() : nullptr;
+}
+
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
   if (beyond != nullptr && explains(beyond)) {
     return discovered_figures(*beyond) + ".";
@@ -159,10 +165,9 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
   }
-  if (beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure) {
-    const discovery::DiscoveredLaw& law = beyond->described.front();
+  if (const discovery::DiscoveredLaw* law = unsure_law(beyond)) {
     text += fmt::format("; {} follows one of {} equations, none of which holds elsewhere more probably than not",
-                        name_of_axis(law.term.axis), std::max<std::size_t>(2, law.ambiguous.size()));
+                        name_of_axis(law->term.axis), std::max<std::size_t>(2, law->ambiguous.size()));
   } else if (beyond != nullptr && !beyond->described.empty()) {
     text += fmt::format("; {} follows no equation that was tried, only a sum of several",
                         name_of_axis(beyond->described.front().term.axis));
@@ -258,10 +263,10 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
 // Equations are written with the 24 beside them; where several explain the recording as well, a next rotation parts them.
 Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (beyond == nullptr || !explains(beyond)) {
-    const bool unsure = beyond != nullptr && !beyond->described.empty() && beyond->described.front().unsure;
     return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
             unexplained_cause(d, beyond),
-            command("diagnose", subject, unsure ? "--next-experiment next.toml" : "--split-schedule next.toml")};
+            command("diagnose", subject,
+                    unsure_law(beyond) != nullptr ? "--next-experiment next.toml" : "--split-schedule next.toml")};
   }
   const bool ambiguous = std::any_of(beyond->laws.begin(), beyond->laws.end(),
                                      [](const discovery::DiscoveredLaw& law) { return law.ambiguous.size() > 1; });

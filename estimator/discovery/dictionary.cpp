@@ -104,7 +104,6 @@ class Builder {
     add_grid(decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
     add_grid(decays_, "exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
     waves();
-    turn_waves();
     quotients();
     for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {
       const Piece& piece = sums_.pieces[k];
@@ -117,42 +116,30 @@ class Builder {
     }
   }
 
-  // Half a period of frequency resolution apart; the shortest wave is twice the longest piece. A period is as probable as
-  // any other on a logarithmic scale: of two that one plan cannot tell apart the longer one wins.
+  // The shortest wave over the time is twice the longest piece. Over the count of turns it is whatever lies between the turns, so that
+  // dwells of other lengths tell it from one over the time; what takes less than two turns is another wave at the turns.
   void waves() {
-    constexpr double shortest_h = 120.0 / seconds_per_hour;
-    double sum = 0.0;
-    for (int k = 1; 2.0 * duration_h_ / k > shortest_h; ++k) {
-      const double period = 2.0 * duration_h_ / k;
-      const int sine = add("sin(2*pi*t/?)", Kernel::wave, period);
-      const int cosine = add("cos(2*pi*t/?)", Kernel::wave, period);
-      if (sine >= 0 && cosine >= 0) {
-        waves_.push_back({sine, 1.0 / k});
-        cosine_[sine] = cosine;
-        sum += 1.0 / k;
-      }
-    }
-    for (Choice& wave : waves_) {
-      wave.belief /= sum;
-    }
+    constexpr double shortest_h = 120.0 / seconds_per_hour, shortest_turns = 2.0;
+    const double turns = sums_.channels.col(static_cast<Eigen::Index>(laws::Variable::n)).maxCoeff() + 1.0;
+    add_waves(waves_, "(2*pi*t/?)", Kernel::wave, duration_h_, shortest_h);
+    add_waves(turn_waves_, "(2*pi*n/?)", Kernel::turn_wave, turns, shortest_turns);
   }
 
-  // Once around in so many turns: whatever lies between the turns, so that dwells of other lengths tell it from a wave over the
-  // time. Half a period of resolution apart; what takes less than two turns is another wave at the turns.
-  void turn_waves() {
-    const double turns = sums_.channels.col(static_cast<Eigen::Index>(laws::Variable::n)).maxCoeff() + 1.0;
+  // Half a period of resolution apart over the `whole`. A period is as probable as any other on a logarithmic scale: of two that one plan
+  // cannot tell apart the longer one wins.
+  void add_waves(std::vector<Choice>& choices, const std::string& phase, Kernel kernel, double whole, double shortest) {
     double sum = 0.0;
-    for (int k = 1; 2.0 * turns / k > 2.0; ++k) {
-      const double period = 2.0 * turns / k;
-      const int sine = add("sin(2*pi*n/?)", Kernel::turn_wave, period);
-      const int cosine = add("cos(2*pi*n/?)", Kernel::turn_wave, period);
+    for (int k = 1; 2.0 * whole / k > shortest; ++k) {
+      const double period = 2.0 * whole / k;
+      const int sine = add("sin" + phase, kernel, period);
+      const int cosine = add("cos" + phase, kernel, period);
       if (sine >= 0 && cosine >= 0) {
-        turn_waves_.push_back({sine, 1.0 / k});
+        choices.push_back({sine, 1.0 / k});
         cosine_[sine] = cosine;
         sum += 1.0 / k;
       }
     }
-    for (Choice& wave : turn_waves_) {
+    for (Choice& wave : choices) {
       wave.belief /= sum;
     }
   }
