@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "protocol/import/array_source.hpp"
+#include "protocol/import/bag.hpp"
 #include "protocol/import/text_source.hpp"
 #include "protocol/recording/atomic_file.hpp"
 
@@ -43,35 +44,69 @@ Expected<std::unique_ptr<ColumnSource>> open_arrays(const std::filesystem::path&
   return array_source(std::move(*arrays), file.string());
 }
 
+Expected<std::unique_ptr<ColumnSource>> open_bag(const std::filesystem::path& file,
+                                                 Expected<Bag> (*read)(const std::filesystem::path&),
+                                                 const std::optional<std::string>& topic) {
+  Expected<Bag> bag = read(file);
+  if (!bag) {
+    return tl::unexpected(bag.error());
+  }
+  return bag_source(std::move(*bag), file.string(), topic);
+}
+
+// What this program does not read, and what helps.
+struct Stranger {
+  std::string_view magic, words;
+};
+constexpr std::array<Stranger, 4> strangers{
+    {{"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
+     {"#ROSRECORD", "a ROS bag of version 1, which this program does not read; version 2.0 is read"},
+     {"\x28\xB5\x2F\xFD", "compressed with zstd; `zstd -d` unpacks it"},
+     {"\x89HDF",
+      "an HDF5 file; a recording needs no import, and of others the arrays are wanted as .npz, .mat or CSV"}}};
+
+Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& file,
+                                                 const std::optional<TextDialect>& dialect,
+                                                 const std::optional<std::string>& topic) {
+  std::error_code none;
+  if (std::filesystem::is_directory(file, none)) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: a folder; of a ROS 2 bag its .db3 file is wanted", file.string()));
+  }
+  const std::string head = first_bytes(file);
+  if (head.starts_with("SQLite format 3")) {
+    return open_bag(file, read_sqlite_bag, topic);
+  }
+  if (head.starts_with("#ROSBAG")) {
+    return open_bag(file, read_ros1_bag, topic);
+  }
+  if (topic && !topic->empty()) {
+    return fail(ErrorKind::usage, fmt::format("{}: no ROS bag: it has no --topic", file.string()));
+  }
+  if (head.starts_with("\x93NUMPY")) {
+    return open_npy(file);
+  }
+  if (head.starts_with("PK\x03\x04")) {
+    return open_arrays(file, read_npz);
+  }
+  if (head.starts_with("MATLAB ") || (file.extension() == ".mat" && head.find('\0') != std::string::npos)) {
+    return open_arrays(file, read_mat);
+  }
+  for (const Stranger& stranger : strangers) {
+    if (head.starts_with(stranger.magic)) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: {}", file.string(), stranger.words));
+    }
+  }
+  return open_text(file, dialect);
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<ColumnSource>> open_columns(const std::filesystem::path& file,
-                                                     const std::optional<TextDialect>& dialect) {
+                                                     const std::optional<TextDialect>& dialect,
+                                                     const std::optional<std::string>& topic) {
   try {
-    const std::string head = first_bytes(file);
-    if (head.starts_with("\x93NUMPY")) {
-      return open_npy(file);
-    }
-    if (head.starts_with("PK\x03\x04")) {
-      return open_arrays(file, read_npz);
-    }
-    if (head.starts_with("MATLAB ") || (file.extension() == ".mat" && head.find('\0') != std::string::npos)) {
-      return open_arrays(file, read_mat);
-    }
-    for (const auto& [magic, kind] : {std::pair{"\x89MCAP", "an MCAP file"}, std::pair{"#ROSBAG", "a ROS bag"}}) {
-      if (head.starts_with(magic)) {
-        return fail(
-            ErrorKind::bad_input,
-            fmt::format("{}: {}, which this program does not read; write the topic as CSV", file.string(), kind));
-      }
-    }
-    if (head.starts_with("\x89HDF")) {
-      return fail(ErrorKind::bad_input,
-                  fmt::format("{}: an HDF5 file; a recording needs no import, and of others the arrays are wanted as "
-                              ".npz, .mat or CSV",
-                              file.string()));
-    }
-    return open_text(file, dialect);
+    return open_any(file, dialect, topic);
   } catch (const std::bad_alloc&) {
     return fail(ErrorKind::bad_input, fmt::format("{}: does not fit into memory", file.string()));
   }

@@ -1,4 +1,4 @@
-// The columns of a file that somebody else wrote, whatever its form: text, NumPy, MATLAB.
+// The columns of a file that somebody else wrote, whatever its form: text, NumPy, MATLAB, ROS.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +43,7 @@ class ColumnSource {
 
   // One per column; empty text where the file gives none.
   virtual const std::vector<std::string>& names() const = 0;
-  // Of a text whose second header line holds units, one per column; else empty.
+  // One per column, of a text whose second header line holds units and of a bag; else empty.
   virtual const std::vector<std::string>& units() const = 0;
   // "text, commas between the fields, names in line 1"
   virtual std::string form() const = 0;
@@ -58,8 +58,10 @@ class ColumnSource {
   std::string title(std::size_t column) const;
 };
 
-// Opens FILE by what it holds. A dialect that is given replaces the one that the text shows.
+// Opens FILE by what it holds. A dialect that is given replaces the one that the text shows. A topic is that of the Imu whose
+// columns are wanted of a ROS bag: empty for the only one, an error (usage) where there are several; none for all.
 Expected<std::unique_ptr<ColumnSource>> open_columns(const std::filesystem::path& file,
-                                                     const std::optional<TextDialect>& dialect = std::nullopt);
+                                                     const std::optional<TextDialect>& dialect = std::nullopt,
+                                                     const std::optional<std::string>& topic = std::nullopt);
 
 }  // namespace selfcal::import

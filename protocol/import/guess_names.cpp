@@ -281,9 +281,7 @@ Role single_role(const Words& w) {
   return Role::unknown;
 }
 
-}  // namespace
-
-NamedColumn read_name(std::string_view name, std::string_view unit) {
+NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   NamedColumn column;
   if (trimmed(name).empty()) {
     column.unit = known_unit(unit);
@@ -325,6 +323,18 @@ NamedColumn read_name(std::string_view name, std::string_view unit) {
                                      {"sow", "s"}});
   }
   return column;
+}
+
+}  // namespace
+
+NamedColumn read_name(std::string_view name, std::string_view unit) {
+  // "/robot/imu.angular_velocity.x": the field of a ROS message; the topic is somebody's choice, and is asked last.
+  const std::size_t field = name.starts_with('/') ? name.find('.') : std::string_view::npos;
+  if (field == std::string_view::npos) {
+    return read_plain_name(name, unit);
+  }
+  const NamedColumn column = read_plain_name(name.substr(field + 1), unit);
+  return column.role == Role::unknown ? read_plain_name(name, unit) : column;
 }
 
 std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units) {

@@ -25,6 +25,7 @@ struct ImportArguments {
   std::string to;
   std::string map;
   bool guess = false;
+  std::string topic;
   import::GuessKnowledge known;
   bool as_run = false;
   AsRun run;
@@ -124,7 +125,7 @@ Expected<int> guess_and_import(const ImportArguments& arguments) {
   if (const auto folder = check_folder(map_file); !folder) {
     return tl::unexpected(folder.error());
   }
-  const auto source = import::open_columns(arguments.from);
+  const auto source = import::open_columns(arguments.from, std::nullopt, arguments.topic);
   if (!source) {
     return tl::unexpected(source.error());
   }
@@ -162,6 +163,9 @@ Expected<int> convert_to_recording(const ImportArguments& arguments) {
   if (arguments.to.empty() && !arguments.guess) {
     return fail(ErrorKind::usage, "--output is required, or --guess");
   }
+  if (!arguments.topic.empty() && !arguments.guess) {
+    return fail(ErrorKind::usage, "--topic belongs to --guess; a map names its columns with their topics");
+  }
   if (!arguments.to.empty() && (arguments.guess || !arguments.map.empty())) {
     if (const auto known = check_output(arguments.to, {".h5", ".hdf5"}); !known) {
       return tl::unexpected(known.error());
@@ -198,15 +202,17 @@ Expected<int> run_import(const ImportArguments& arguments) {
 
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<ImportArguments>();
-  options.text("FILE", arguments->from,
-               "with --map or --guess: text with any delimiter, plain or gzip, .npy, .npz, .mat; else CSV with its "
-               "attributes in a TOML file of the same stem; with --as-run also a recording (.h5)",
-               Needed::yes);
+  options.text(
+      "FILE", arguments->from,
+      "with --map or --guess: text with any delimiter, plain or gzip, .npy, .npz, .mat, a ROS bag (.db3, .bag); "
+      "else CSV with its attributes in a TOML file of the same stem; with --as-run also a recording (.h5)",
+      Needed::yes);
   options.text("-o,--output", arguments->to, "HDF5 file to write: .h5 or .hdf5");
   options.text("--map", arguments->map,
                "TOML file that says which column is what, in which unit; with --guess: where to write it");
   options.flag("--guess", arguments->guess,
                "guess the map from names and numbers, say what is assumed and what is doubted");
+  options.text("--topic", arguments->topic, "for --guess: the topic of a ROS bag that has several of sensor_msgs/Imu");
   options.number("--latitude", arguments->known.latitude_deg, range::latitude,
                  "for --guess: latitude of the site, deg");
   options.number("--longitude", arguments->known.longitude_deg, range::angle,

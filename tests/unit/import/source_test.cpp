@@ -104,7 +104,7 @@ TEST_F(Source, WhatIsNoTextSaysWhatItIs) {
               HasSubstr("UTF-16"));
   EXPECT_THAT(fault(std::string("1,2\0,3\n", 7)), HasSubstr("holds a byte 0"));
   EXPECT_THAT(fault("\x89MCAP0\r\n"), HasSubstr("MCAP"));
-  EXPECT_THAT(fault("#ROSBAG V2.0\n"), HasSubstr("ROS bag"));
+  EXPECT_THAT(fault("#ROSBAG V2.0\n"), HasSubstr("ROS 1 bag"));
   EXPECT_THAT(fault("\x89HDF\r\n\x1A\n"), HasSubstr("HDF5"));
   EXPECT_THAT(fault("hello\nworld\n"), HasSubstr("no lines of numbers"));
   EXPECT_THAT(fault(""), HasSubstr("no lines of numbers"));
