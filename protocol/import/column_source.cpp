@@ -58,8 +58,12 @@ Expected<std::unique_ptr<ColumnSource>> open_bag(const std::filesystem::path& fi
 struct Stranger {
   std::string_view magic, words;
 };
-constexpr std::array<Stranger, 4> strangers{
-    {{"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
+constexpr std::string_view novatel =
+    "a NovAtel log; `sed -n '/^[%#]RAWIMU/{s/^[^;]*;//;s/[*].*//;p}'` makes columns of its lines";
+constexpr std::array<Stranger, 6> strangers{
+    {{"%RAWIMU", novatel},
+     {"#RAWIMU", novatel},
+     {"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
      {"#ROSRECORD", "a ROS bag of version 1, which this program does not read; version 2.0 is read"},
      {"\x28\xB5\x2F\xFD", "compressed with zstd; `zstd -d` unpacks it"},
      {"\x89HDF",

@@ -59,6 +59,12 @@ class Guesser {
   void say(const char* key, std::string text) { guess_.remarks.push_back({key, std::move(text), false}); }
   void doubt(const char* key, std::string text) { guess_.remarks.push_back({key, std::move(text), true}); }
 
+  // Whether a key of TABLE is doubted.
+  bool is_doubted(std::string_view table) const {
+    return std::any_of(guess_.remarks.begin(), guess_.remarks.end(),
+                       [table](const Remark& remark) { return remark.doubt && remark.key.starts_with(table); });
+  }
+
   ColumnRef reference(std::size_t column) const {
     const std::vector<std::string>& names = source_.names();
     const std::string& name = names[column];
@@ -98,7 +104,8 @@ class Guesser {
     const std::size_t column = *roles_.time;
     map.time.column = reference(column);
     const double interval = static_cast<double>(1.0L / static_cast<long double>(rate_of(roles_.stamps, 1.0L).rate_hz));
-    const std::vector<std::string> units = time_units(interval);
+    const bool xsens = source_.names()[column].find("SampleTimeFine") != std::string::npos;
+    const std::vector<std::string> units = xsens ? xsens_time_units(interval) : time_units(interval);
     const std::string& claimed = named_[column].unit;
     if (roles_.time_is_date) {
       map.time.unit = "date";
@@ -150,13 +157,25 @@ class Guesser {
     say("time.leave_out_incomplete", lines + ": they are left out, as samples that were lost");
   }
 
+  // ln: a scale error of an instrument in a unit that no name says. Whole numbers are likely to be counts: 1024 of MMA8451's
+  // are 1 g, 16.4 of MPU-6050's 1 deg/s.
+  double nearness(const std::array<std::size_t, 3>& columns) const {
+    constexpr double of_counts = 0.01, of_numbers = 0.03;
+    const bool whole = std::all_of(columns.begin(), columns.end(), [this](std::size_t column) {
+      return std::all_of(values_[column].begin(), values_[column].end(), [](double v) { return v == std::floor(v); });
+    });
+    return whole ? of_counts : of_numbers;
+  }
+
   UnitClaim claim(const std::array<std::size_t, 3>& columns, const char* key) {
-    UnitClaim said{named_[columns[0]].unit, named_[columns[0]].increment};
+    UnitClaim said{{}, named_[columns[0]].increment};
     for (const std::size_t column : columns) {
-      if (named_[column].unit != said.unit) {
+      const std::string& unit = named_[column].unit;  // some say it once: "gx (dps), gy, gz"
+      if (!unit.empty() && !said.unit.empty() && unit != said.unit) {
         doubt(key, "the names of the three columns say different units");
-        said.unit.clear();
+        return {{}, said.increments};
       }
+      said.unit = unit.empty() ? said.unit : unit;
     }
     return said;
   }
@@ -327,13 +346,23 @@ class Guesser {
                                     : doubt("gyro.unit", fmt::format("{}{}: {}", gyro.unit,
                                                                      claimed ? " by its name" : " or any other", why));
     }
-    if (const auto fit = gyro_unit(*orientation.rad_per_sample, *interval_s_, said)) {
+    auto fit = gyro_unit(*orientation.rad_per_sample, *interval_s_, said);
+    // "gyro_rad" of PX4 is a rate.
+    if (!fit && !said.increments && claimed && claimed->quantity == Quantity::angle) {
+      fit = gyro_unit(*orientation.rad_per_sample, *interval_s_, {said.unit + "/s", false});
+    }
+    if (fit) {
       gyro.unit = fit->unit;
       gyro.increments = fit->increments;
       say("gyro.unit", fmt::format("{} ({}): the turns show it within {:.1f} %", fit->unit,
                                    fit->increments ? "increments" : "rates", 100.0 * std::expm1(fit->off)));
       if (!fit->rivals.empty()) {
         doubt("gyro.unit", fmt::format("{} or {}: both fit the turns", fit->unit, fmt::join(fit->rivals, ", ")));
+      } else if (said.unit.empty() && fit->off > nearness(*roles_.gyro)) {
+        doubt("gyro.unit", fmt::format("{} within {:.1f} %; what a count of an instrument means may be as near",
+                                       fit->unit, 100.0 * std::expm1(fit->off)));
+      } else if (said.unit.empty() && is_doubted("time")) {
+        doubt("gyro.unit", fmt::format("{} follows from the time, which is doubted", fit->unit));
       }
       return;
     }
@@ -383,6 +412,12 @@ class Guesser {
       if (!fit->rivals.empty() || (!interval_s_ && fit->increments)) {
         doubt("accelerometer.unit",
               fmt::format("{} or {}: gravity fits both", fit->unit, fmt::join(fit->rivals, ", ")));
+      } else if (said.unit.empty() && fit->off > nearness(*roles_.accelerometer)) {
+        doubt("accelerometer.unit",
+              fmt::format("{} within {:.1f} %; what a count of an instrument means may be as near", fit->unit,
+                          100.0 * std::expm1(fit->off)));
+      } else if (said.unit.empty() && is_doubted("time")) {
+        doubt("accelerometer.unit", fmt::format("{} was found with the time, which is doubted", fit->unit));
       }
       return;
     }
@@ -407,23 +442,9 @@ class Guesser {
     }
     const std::vector<double>& values = values_[roles_.temperature.front()];
     const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-    const std::string& claimed = named_[roles_.temperature.front()].unit;
-    if (claimed == "C" || claimed == "K" || claimed == "F") {
-      map.temperature_unit = claimed;
-      const double celsius_of = celsius(mean, claimed);
-      return celsius_of > -60.0 && celsius_of < 130.0
-                 ? say("temperature.unit", fmt::format("{}, by its name", claimed))
-                 : doubt("temperature.unit",
-                         fmt::format("{} by its name: {:.4g} would be {:.4g} C", claimed, mean, celsius_of));
-    }
-    map.temperature_unit.assign(1, mean > 200.0 ? 'K' : 'C');
-    if (mean > 200.0 && mean < 400.0) {
-      return say("temperature.unit", fmt::format("K: {:.4g}", mean));
-    }
-    if (mean > -40.0 && mean < 45.0) {
-      return say("temperature.unit", fmt::format("C: {:.4g}", mean));
-    }
-    doubt("temperature.unit", fmt::format("{:.4g}: C, F or counts", mean));
+    const TemperatureFit fit = temperature_unit(mean, named_[roles_.temperature.front()].unit);
+    map.temperature_unit = fit.unit;
+    guess_.remarks.push_back({"temperature.unit", fit.words, fit.doubt});
   }
 
   const ColumnSource& source_;

@@ -36,7 +36,9 @@ Words words_of(std::string_view name) {
   return words;
 }
 
-// As people write units, to as we do. Blanks, points and carets are taken out first.
+}  // namespace
+
+// Blanks, points, carets and parentheses are taken out first.
 std::string known_unit(std::string_view written) {
   std::string text;
   constexpr std::string_view degree_sign = "\xC2\xB0";
@@ -53,14 +55,14 @@ std::string known_unit(std::string_view written) {
     } else if (rest.starts_with(square)) {
       text += '2';
       ++k;
-    } else if (written[k] != ' ' && written[k] != '^' && written[k] != '*' && written[k] != '.') {
+    } else if (std::string_view(" ^*.()").find(written[k]) == std::string_view::npos) {
       text += lower(written[k]);
     }
   }
   struct Known {
     std::string_view written, unit;
   };
-  static constexpr std::array<Known, 66> known{{
+  static constexpr std::array<Known, 68> known{{
       {"rad/s", "rad/s"},
       {"rads", "rad/s"},
       {"rads-1", "rad/s"},
@@ -70,6 +72,8 @@ std::string known_unit(std::string_view written) {
       {"degs", "deg/s"},
       {"dps", "deg/s"},
       {"deg/sec", "deg/s"},
+      {"degs-1", "deg/s"},
+      {"deg/s-1", "deg/s"},
       {"degps", "deg/s"},
       {"deg/h", "deg/h"},
       {"degh", "deg/h"},
@@ -131,6 +135,8 @@ std::string known_unit(std::string_view written) {
   const auto* const found = std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.written == text; });
   return found == known.end() ? std::string() : std::string(found->unit);
 }
+
+namespace {
 
 // Takes a unit off the end of the words: acc x m s2.
 std::string unit_at_end(Words& words) {
@@ -236,7 +242,7 @@ int take_axis(Words& words) {
 }
 
 Role triad_role(const Words& w) {
-  if (holds(w, {"mag", "field"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
+  if (holds(w, {"mag"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
     return Role::other;
   }
   const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});
@@ -250,7 +256,8 @@ Role triad_role(const Words& w) {
       (inc && (holds(w, {"vel"}) || is_one_of(w, {"v"})))) {
     return Role::accelerometer;
   }
-  return Role::unknown;
+  // "field.angular_velocity.x" is what ROS calls a field.
+  return holds(w, {"field"}) ? Role::other : Role::unknown;
 }
 
 Role single_role(const Words& w) {
@@ -262,6 +269,10 @@ Role single_role(const Words& w) {
   }
   if (holds(w, {"inner"})) {
     return Role::inner;
+  }
+  // Betaflight's controllers: axisP[0].
+  if (is_one_of(w, {"axis"}) && is_one_of(w, {"p", "i", "d", "f"})) {
+    return Role::other;
   }
   if (holds(w, {"gimbal", "turntable", "encoder", "resolver", "cmd", "axis"})) {
     return Role::gimbal;
@@ -281,6 +292,21 @@ Role single_role(const Words& w) {
   return Role::unknown;
 }
 
+// Takes "[0]", "[1]" or "[2]" off the end: one of three.
+int take_index(std::string_view& name) {
+  constexpr std::size_t length = 3;
+  const std::string_view text = trimmed(name);
+  if (text.size() <= length || text.back() != ']' || text[text.size() - length] != '[') {
+    return -1;
+  }
+  const int index = text[text.size() - 2] - '0';
+  if (index < 0 || index > 2) {
+    return -1;
+  }
+  name = text.substr(0, text.size() - length);
+  return index;
+}
+
 NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   NamedColumn column;
   if (trimmed(name).empty()) {
@@ -288,6 +314,7 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     return column;
   }
   std::string_view bare = name;
+  const int index = take_index(bare);
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}, std::pair{'{', '}'}}) {
     const std::size_t begin = bare.find(open);
     const std::size_t end = begin == std::string_view::npos ? begin : bare.find(close, begin);
@@ -306,9 +333,14 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   const bool delta =
       holds(words, {"delta", "incr", "dtheta", "dvel", "dang"}) || is_one_of(words, {"inc", "d", "dv", "dth", "da"});
   Words stems = words;
-  column.axis = take_axis(stems);
+  column.axis = index >= 0 ? index : take_axis(stems);
   column.increment = delta || (column.axis >= 0 && is_one_of(stems, {"dv", "dth", "da", "dtheta", "dvel", "dang"}));
   column.role = column.axis >= 0 ? triad_role(stems) : single_role(words);
+  // "Gyro X temp", "axisP[0]"
+  if (column.axis >= 0 && (holds(words, {"temp"}) || (index >= 0 && column.role == Role::unknown))) {
+    column.axis = -1;
+    column.role = single_role(words);
+  }
   if (column.role == Role::temperature && column.unit.empty()) {
     column.unit = unit_among(words, {{"c", "C"}, {"k", "K"}, {"f", "F"}});
   }

@@ -20,6 +20,9 @@ struct NamedColumn {
 // NAME without or with a unit ("gx [deg/s]", "acc_x_m_s2"); UNIT from a line of units, may be empty.
 NamedColumn read_name(std::string_view name, std::string_view unit);
 
+// As people write units, to as units.hpp does ("m.s^-2", "dps"); empty: none that is known.
+std::string known_unit(std::string_view written);
+
 std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units);
 
 }  // namespace selfcal::import

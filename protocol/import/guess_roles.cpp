@@ -134,30 +134,55 @@ class Assigner {
     }
   }
 
-  std::optional<std::array<std::size_t, 3>> triad_by_name(Role role, const char* key) {
-    std::array<std::optional<std::size_t>, 3> found;
-    bool several = false;
+  using Triad = std::array<std::size_t, 3>;
+
+  // The first x, y and z that are named so, the second ones, and so on. `several`: there are more of some than of all.
+  std::vector<Triad> triads_by_name(Role role, bool& several) const {
+    std::array<std::vector<std::size_t>, 3> found;
     for (std::size_t k = 0; k < named_.size(); ++k) {
       if (named_[k].role == role && named_[k].axis >= 0 && !used_[k]) {
-        auto& place = found.at(static_cast<std::size_t>(named_[k].axis));
-        several = several || place.has_value();
-        place = place ? place : k;
+        found.at(static_cast<std::size_t>(named_[k].axis)).push_back(k);
       }
     }
-    if (!found[0] || !found[1] || !found[2]) {
+    const std::size_t most = std::max({found[0].size(), found[1].size(), found[2].size()});
+    std::vector<Triad> triads(std::min({found[0].size(), found[1].size(), found[2].size()}));
+    for (std::size_t k = 0; k < triads.size(); ++k) {
+      triads[k] = {found[0][k], found[1][k], found[2][k]};
+    }
+    several = most > 1;
+    return triads;
+  }
+
+  std::optional<Triad> triad_by_name(Role role, const char* key) {
+    bool several = false;
+    std::vector<Triad> triads = triads_by_name(role, several);
+    if (triads.empty()) {
       return std::nullopt;
     }
-    const std::array<std::size_t, 3> triad{*found[0], *found[1], *found[2]};
+    // A phone's "linear acceleration" is without gravity.
+    const std::size_t named_so = triads.size();
+    if (role == Role::accelerometer && named_so > 1) {
+      std::vector<Triad> heavy = triads;
+      std::erase_if(heavy, [this](const Triad& triad) {
+        const auto size = size_of(triad);
+        return !size || size->scatter > most_scatter;
+      });
+      if (heavy.size() == 1) {
+        triads = heavy;
+        several = false;
+      }
+    }
+    const Triad& triad = triads.front();
     for (const std::size_t k : triad) {
       take(k);
     }
     const std::string which =
         fmt::format("{}, {}, {}", source_.title(triad[0]), source_.title(triad[1]), source_.title(triad[2]));
-    const std::string path = fmt::format("{}.columns", key);
-    remarks_.push_back({path,
-                        several ? fmt::format("{}: the first of several that are named so", which)
-                                : fmt::format("{}, by their names", which),
-                        several});
+    const char* words = several ? ": the first of several that are named so"
+                        : named_so > 1
+                            ? ": of several that are named so the only ones whose size is gravity's throughout"
+                            : ", by their names";
+    remarks_.push_back({fmt::format("{}.columns", key), which + words, several});
     return triad;
   }
 
@@ -201,6 +226,7 @@ class Assigner {
   // Samples of a block: a turn takes some seconds, and a recording a thousand of them.
   std::size_t block() const { return std::clamp<std::size_t>(values_.front().size() / 2000, 2, 25); }
 
+  static constexpr double most_scatter = 0.05;  // of gravity's size
   struct SizeOfTriad {
     double scatter = 0.0;  // of the size of a block's mean, in parts of it
     bool turns = false;    // the direction changes
@@ -235,7 +261,6 @@ class Assigner {
     if (roles_.accelerometer) {
       return;
     }
-    constexpr double most_scatter = 0.05;
     SizeOfTriad best;
     std::size_t alike = 0;
     for (const auto& triad : free_triads()) {
@@ -394,7 +419,19 @@ class Assigner {
   }
   bool is_angle(std::size_t column) const {
     const std::string& unit = named_[column].unit;
+    if (named_[column].role == Role::other) {
+      return false;
+    }
     return unit == "deg" || unit == "rad" || is_read_out(column) || says(column, {"azimuth", "pitch", "yaw", "roll"});
+  }
+
+  // Roll, pitch and yaw, all three: nobody calls the axes of a gimbal so, of which there are two.
+  bool is_attitude(const std::vector<std::size_t>& angles) const {
+    const auto told = [&](std::initializer_list<std::string_view> words) {
+      return std::any_of(angles.begin(), angles.end(), [&](std::size_t k) { return says(k, words); });
+    };
+    return told({"roll"}) && told({"pitch"}) && told({"yaw", "azimuth", "heading"}) &&
+           std::none_of(angles.begin(), angles.end(), [this](std::size_t k) { return is_read_out(k); });
   }
 
   void tell_unused() {
@@ -410,6 +447,9 @@ class Assigner {
       roles_.angle = angles.front();
       roles_.angle_of_a_table = is_read_out(angles.front());
       take(angles.front());
+    } else if (is_attitude(angles)) {
+      say("gimbal", fmt::format("{} and those beside it: an attitude that was computed, no read-outs",
+                                source_.title(angles.front())));
     } else if (!angles.empty()) {
       doubt("gimbal", fmt::format("{}: angles by the name, but no two columns side by side fit gravity and the turns",
                                   source_.title(angles.front())));

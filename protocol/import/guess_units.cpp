@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 
 namespace selfcal::import {
 namespace {
@@ -60,27 +61,16 @@ std::optional<UnitFit> best_unit(double seen, double interval_s, const UnitClaim
   return best;
 }
 
-}  // namespace
-
-std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const UnitClaim& claim) {
-  return best_unit(rad_per_sample, interval_s, claim, Quantity::angular_rate, Quantity::angle, {0.25, 0.06});
-}
-
-std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim) {
-  return best_unit(gravity * interval_s / size, interval_s, claim, Quantity::acceleration, Quantity::velocity,
-                   {0.08, 0.03});
-}
-
-std::vector<std::string> time_units(double interval) {
+// Those of NAMES that make a rate from LOWEST to HIGHEST, the most usual one first.
+std::vector<std::string> units_by_rate(double interval, std::initializer_list<const char*> names, double lowest,
+                                       double highest) {
   struct Way {
     std::string unit;
     double strangeness;
   };
   std::vector<Way> ways;
-  for (const char* name : {"s", "ms", "us", "ns"}) {
+  for (const char* name : names) {
     const double rate = 1.0 / (interval * find_unit(name).value_or(Unit{{}, Quantity::time, 1.0}).si);
-    constexpr double lowest = 1.0;
-    constexpr double highest = 20000.0;
     constexpr double usual = 150.0;
     if (rate > lowest * (1.0 - 1e-3) && rate < highest) {
       ways.push_back({name, std::abs(std::log(rate / usual))});
@@ -92,6 +82,44 @@ std::vector<std::string> time_units(double interval) {
     units.push_back(std::move(way.unit));
   }
   return units;
+}
+
+}  // namespace
+
+std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const UnitClaim& claim) {
+  return best_unit(rad_per_sample, interval_s, claim, Quantity::angular_rate, Quantity::angle, {0.25, 0.06});
+}
+
+std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim) {
+  return best_unit(gravity * interval_s / size, interval_s, claim, Quantity::acceleration, Quantity::velocity,
+                   {0.08, 0.03});
+}
+
+TemperatureFit temperature_unit(double mean, const std::string& claimed) {
+  if (claimed == "C" || claimed == "K" || claimed == "F") {
+    const double celsius_of = celsius(mean, claimed);
+    const bool fits = celsius_of > -60.0 && celsius_of < 130.0;
+    return {claimed,
+            fits ? fmt::format("{}, by its name", claimed)
+                 : fmt::format("{} by its name: {:.4g} would be {:.4g} C", claimed, mean, celsius_of),
+            !fits};
+  }
+  if (mean > 200.0) {
+    const bool fits = mean < 400.0;
+    return {"K", fmt::format("{}: {:.4g}", fits ? "K" : "K, or counts", mean), !fits};
+  }
+  if (mean > -40.0 && mean < 45.0) {
+    return {"C", fmt::format("C: {:.4g}", mean), false};
+  }
+  return {"C", fmt::format("{:.4g}: C, F or counts", mean), true};
+}
+
+std::vector<std::string> time_units(double interval) {
+  return units_by_rate(interval, {"s", "ms", "us", "ns"}, 1.0, 20000.0);
+}
+
+std::vector<std::string> xsens_time_units(double interval) {
+  return units_by_rate(interval, {"100us", "us"}, 2.0, 5000.0);
 }
 
 }  // namespace selfcal::import

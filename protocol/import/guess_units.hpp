@@ -28,7 +28,18 @@ std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const
 // Accelerometers: SIZE is the size of gravity in counts. nullopt: no unit within 8 %.
 std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim);
 
+struct TemperatureFit {
+  std::string unit;  // "C", "K", "F"
+  std::string words;
+  bool doubt = false;
+};
+// Of a column with this mean; CLAIMED may be empty.
+TemperatureFit temperature_unit(double mean, const std::string& claimed);
+
 // Units (s, ms, us, ns) in which times with this interval make 1 Hz to 20 kHz, the likeliest first.
 std::vector<std::string> time_units(double interval);
+
+// The same of Xsens' SampleTimeFine, which counts 100us in some instruments and us in others, at 2 Hz to 5 kHz.
+std::vector<std::string> xsens_time_units(double interval);
 
 }  // namespace selfcal::import

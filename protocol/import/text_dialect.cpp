@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "protocol/import/guess_names.hpp"
+
 namespace selfcal::import {
 namespace {
 
@@ -167,14 +169,15 @@ Run longest_run(const std::vector<std::string_view>& lines, char separator, char
 }
 
 bool is_unit(std::string_view field) {
-  constexpr std::array<std::string_view, 34> known{
-      "s",      "ms",     "us",   "ns",     "sec",   "rad",   "deg",    "rad/s", "deg/s", "deg/h",   "dps", "m/s^2",
-      "m/s2",   "m/s",    "g",    "mg",     "ug",    "c",     "degc",   "k",     "f",     "degf",    "hz",  "-",
-      "counts", "arcsec", "mrad", "mrad/s", "rad/h", "ft/s2", "ft/s^2", "m/s/s", "ug*s",  "arcsec/s"};
+  constexpr std::array<std::string_view, 35> known{
+      "na",    "s",      "ms",     "us",   "ns",     "sec",   "rad",   "deg",    "rad/s", "deg/s", "deg/h",   "dps",
+      "m/s^2", "m/s2",   "m/s",    "g",    "mg",     "ug",    "c",     "degc",   "k",     "f",     "degf",    "hz",
+      "-",     "counts", "arcsec", "mrad", "mrad/s", "rad/h", "ft/s2", "ft/s^2", "m/s/s", "ug*s",  "arcsec/s"};
   std::string lower(field);
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return std::find(known.begin(), known.end(), lower) != known.end() || lower.find("\xC2\xB0") != std::string::npos;
+  return std::find(known.begin(), known.end(), lower) != known.end() || lower.find("\xC2\xB0") != std::string::npos ||
+         !known_unit(field).empty();
 }
 
 // Index of the line of names above the numbers, and of the units between them.

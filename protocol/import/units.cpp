@@ -14,7 +14,7 @@ using units::hour;
 constexpr double g = units::standard_gravity;
 constexpr double foot = 0.3048;  // m, international
 
-constexpr std::array<Unit, 33> table{{
+constexpr std::array<Unit, 34> table{{
     {"rad/s", Quantity::angular_rate, 1.0},
     {"deg/s", Quantity::angular_rate, degree},
     {"deg/h", Quantity::angular_rate, degree / hour},
@@ -44,6 +44,7 @@ constexpr std::array<Unit, 33> table{{
     {"ft/s", Quantity::velocity, foot},
     {"s", Quantity::time, 1.0},
     {"ms", Quantity::time, 1e-3},
+    {"100us", Quantity::time, 1e-4},
     {"us", Quantity::time, 1e-6},
     {"ns", Quantity::time, 1e-9},
     {"min", Quantity::time, 60.0},
