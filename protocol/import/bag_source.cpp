@@ -227,14 +227,14 @@ Expected<std::unique_ptr<ColumnSource>> bag_source(Bag bag, const std::string& f
     }
   }
   if (imus.empty()) {
-    return fail(
-        ErrorKind::bad_input,
-        fmt::format("{}: {}: no message of type sensor_msgs/Imu{}{}", file, bag.form,
-                    bag.not_read.empty() ? "" : "; topics: ",
-                    fmt::join(std::vector<std::string>(bag.not_read.begin(),
-                                                       bag.not_read.begin() + static_cast<std::ptrdiff_t>(std::min(
-                                                                                  bag.not_read.size(), most_named))),
-                              ", ")));
+    std::set<std::string> topics(bag.not_read.begin(), bag.not_read.end());
+    for (const Series& series : bag.series) {
+      topics.insert(fmt::format("{} ({})", series.topic, series.type));
+    }
+    std::vector<std::string> first(topics.begin(), topics.end());
+    first.resize(std::min(first.size(), most_named));
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: no message of type sensor_msgs/Imu{}{}", file, bag.form,
+                                                  first.empty() ? "" : "; topics: ", fmt::join(first, ", ")));
   }
   if (topic) {
     if (topic->empty() && imus.size() > 1) {

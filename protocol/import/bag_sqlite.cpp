@@ -129,7 +129,7 @@ class Reader {
   // A view or a virtual table has no root page: it is a program.
   Expected<void> check_tables() {
     int tables = 0;
-    const auto counted =
+    Expected<void> counted =
         each("SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name IN ('topics', 'messages') AND rootpage > 0",
              [&tables](sqlite3_stmt*) {
                ++tables;

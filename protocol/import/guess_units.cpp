@@ -69,6 +69,7 @@ std::vector<std::string> units_by_rate(double interval, std::initializer_list<co
     double strangeness;
   };
   std::vector<Way> ways;
+  ways.reserve(names.size());
   for (const char* name : names) {
     const double rate = 1.0 / (interval * find_unit(name).value_or(Unit{{}, Quantity::time, 1.0}).si);
     constexpr double usual = 150.0;
@@ -78,6 +79,7 @@ std::vector<std::string> units_by_rate(double interval, std::initializer_list<co
   }
   std::sort(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.strangeness < b.strangeness; });
   std::vector<std::string> units;
+  units.reserve(ways.size());
   for (Way& way : ways) {
     units.push_back(std::move(way.unit));
   }

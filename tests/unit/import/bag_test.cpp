@@ -11,6 +11,7 @@
 #include <random>
 
 #include "protocol/import/bag.hpp"
+#include "protocol/import/build_recording.hpp"
 #include "protocol/import/guess.hpp"
 #include "tests/unit/recording/sample_recording.hpp"
 
@@ -332,9 +333,43 @@ TEST_F(SqliteBag, OtherTopicsArePutBetweenTheirStamps) {
   EXPECT_THAT(data->values[0], ElementsAre(nan, 20, 22, 24, 23.5, 23, nan, nan, nan, nan, nan, nan, 30));
 }
 
+// The header's stamp is the time, whatever the order of reception: as of any file, one that does not increase is told.
+TEST_F(SqliteBag, StampsThatRepeatAreTold) {
+  write({imu_topic}, {{1, 1, imu(1, 0, 1.0)}, {1, 2, imu(3, 0, 2.0)}, {1, 3, imu(2, 0, 3.0)}, {1, 4, imu(4, 0, 3.0)}});
+  const auto map = parse_import_map(R"(map = 1
+[site]
+latitude_deg = 48
+longitude_deg = 11
+height_m = 500
+[time]
+column = "/imu/data.header.stamp"
+unit = "ns"
+[gyro]
+columns = ["/imu/data.angular_velocity.x", "/imu/data.angular_velocity.y", "/imu/data.angular_velocity.z"]
+kind = "rates"
+unit = "rad/s"
+[accelerometer]
+columns = ["/imu/data.linear_acceleration.x", "/imu/data.linear_acceleration.y", "/imu/data.linear_acceleration.z"]
+kind = "rates"
+unit = "m/s^2"
+[gimbal]
+absent = true
+)",
+                                    "bag.toml");
+  ASSERT_TRUE(map) << map.error().message;
+  const auto source = open_columns(file_);
+  ASSERT_TRUE(source) << source.error().message;
+  const auto built = build_recording(**source, *map, "bag_0.db3");
+  ASSERT_FALSE(built);
+  EXPECT_THAT(built.error().message,
+              HasSubstr("bag_0.db3: row 2: time 2000000000 is not after 3000000000 in the one before"));
+}
+
 TEST_F(SqliteBag, WhatIsNoBagSaysSo) {
   write({imu_topic}, {});
   EXPECT_THAT(fault(), HasSubstr("no message of type sensor_msgs/Imu"));
+  write({{"/temp", "sensor_msgs/msg/Temperature", "cdr"}}, {{1, 1, temperature(1, 20.0)}});
+  EXPECT_THAT(fault(), HasSubstr("no message of type sensor_msgs/Imu; topics: /temp (sensor_msgs/Temperature)"));
   write({{"/imu", "sensor_msgs/msg/Imu", "json"}}, {{1, 1, "{}"}});
   EXPECT_THAT(fault(), HasSubstr("/imu: serialised as 'json'; cdr is expected"));
   write({imu_topic}, {{1, 1, "short"}});
