@@ -20,6 +20,13 @@ struct Finalize {
 };
 using Statement = std::unique_ptr<sqlite3_stmt, Finalize>;
 
+// 0 where there is none.
+std::uintmax_t size_of_file(const std::filesystem::path& file) {
+  std::error_code fault;
+  const std::uintmax_t size = std::filesystem::file_size(file, fault);
+  return fault ? 0 : size;
+}
+
 std::string uri_of(const std::filesystem::path& file) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(file).string()) {
@@ -28,11 +35,8 @@ std::string uri_of(const std::filesystem::path& file) {
     uri += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
   // Nothing is written beside the file, unless a recorder that was killed left the rest of its messages there.
-  for (const char* ending : {"-wal", "-journal"}) {
-    std::error_code none;
-    if (std::filesystem::file_size(file.string() + ending, none) > 0 && !none) {
-      return uri + "?mode=ro";
-    }
+  if (size_of_file(file.string() + "-wal") > 0 || size_of_file(file.string() + "-journal") > 0) {
+    return uri + "?mode=ro";
   }
   return uri + "?mode=ro&immutable=1";
 }
@@ -82,8 +86,7 @@ class Reader {
     // A file is no program: no views, triggers or functions of its own; no value longer than the file.
     sqlite3_db_config(opened, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(opened, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-    std::error_code none;
-    size_ = std::filesystem::file_size(file_, none);
+    size_ = size_of_file(file_) + size_of_file(file_.string() + "-wal");
     constexpr std::uintmax_t least = 100000;  // of SQLite's own
     constexpr std::uintmax_t most = 1000000000;
     sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, static_cast<int>(std::clamp(size_, least, most)));

@@ -217,7 +217,8 @@ class SqliteBag : public ::testing::Test {
     sqlite3* database = nullptr;
     ASSERT_EQ(sqlite3_open(file_.c_str(), &database), SQLITE_OK);
     ASSERT_EQ(sqlite3_exec(database,
-                           "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
+                           "PRAGMA synchronous = OFF; CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, "
+                           "type TEXT NOT NULL,"
                            " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
                            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL,"
                            " timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
@@ -386,6 +387,27 @@ TEST_F(SqliteBag, WhatIsNoBagSaysSo) {
   std::filesystem::resize_file(file_, 40960);
   EXPECT_THAT(fault(), HasSubstr("SQLite cannot read it"));
   EXPECT_THAT(open_columns(folder_.path()).error().message, HasSubstr("a folder"));
+}
+
+// What a recorder that was killed left in its write-ahead log is read with the rest.
+TEST_F(SqliteBag, MessagesInTheLogBesideItAreRead) {
+  write({imu_topic}, {{1, 1, imu(1, 0, 1.0)}});
+  sqlite3* recorder = nullptr;
+  ASSERT_EQ(sqlite3_open(file_.c_str(), &recorder), SQLITE_OK);
+  ASSERT_EQ(
+      sqlite3_exec(
+          recorder,
+          "PRAGMA journal_mode = WAL; WITH RECURSIVE n(k) AS (SELECT 2 UNION ALL SELECT k + 1 FROM n WHERE k < 500) "
+          "INSERT INTO messages SELECT k, 1, k, data FROM n JOIN messages WHERE id = 1",
+          nullptr, nullptr, nullptr),
+      SQLITE_OK);
+  const std::filesystem::path killed = folder_ / "killed.db3";
+  std::filesystem::copy(file_, killed);
+  std::filesystem::copy(file_.string() + "-wal", killed.string() + "-wal");
+  sqlite3_close(recorder);
+  const auto source = open_columns(killed);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_THAT((*source)->form(), HasSubstr("/imu/data, 500 messages"));
 }
 
 TEST_F(SqliteBag, PartsAndCompressedFilesAreRefused) {
