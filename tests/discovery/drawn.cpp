@@ -158,6 +158,36 @@ Expected<Case> draw_effect_case(const Recipe& recipe, int number, std::uint64_t 
   return c;
 }
 
+// Draws laws of the kind, each as strong as the case says, until there are so many.
+Expected<void> add_laws(Case& c, std::size_t count, const blind::Filtered& filtered, Random& random) {
+  for (int tries = 0; c.physics.laws.size() < count; ++tries) {
+    constexpr int most_tries = 200;
+    if (tries == most_tries) {
+      return fail(ErrorKind::internal, fmt::format("case {}: no law of {} sigma was drawn", c.number, c.strength));
+    }
+    sim::Law law = draw_law(c.kind, random);
+    const auto response = filtered.response({{}, {law}});
+    // What takes more than these to reach its strength is nothing that a sensor does.
+    const double largest = law.axis < 3 ? 5.0 * units::degree_per_hour : 3000.0 * units::micro_g;
+    if (!response || !(response->sigmas > 0.0)) {
+      continue;
+    }
+    law.coefficient *= c.strength / response->sigmas;
+    const double in_time = law.process == sim::LawProcess::random_walk ? std::sqrt(units::hour) : 1.0;
+    if (law.coefficient * in_time < largest) {
+      c.physics.laws.push_back(law);
+    }
+  }
+  return {};
+}
+
+// The strength of a law is that on a base which stands still.
+Expected<blind::Filtered> still_filter(const Case& c) {
+  sim::SimConfig still = c.config;
+  still.base_motion = {};
+  return blind::Filtered::make(still, c.schedule, c.seed);
+}
+
 Expected<ParameterVector> bound_of(const blind::Filtered& filtered, const std::vector<sim::Law>& laws) {
   std::vector<blind::Column> columns;
   for (const sim::Law& law : laws) {
@@ -196,15 +226,24 @@ std::vector<Recipe> recipes(const Counts& counts) {
     const auto n = static_cast<std::size_t>(k);
     all.push_back({"effect", strengths[n / catalogue.size() % strengths.size()], catalogue[n % catalogue.size()]});
   }
+  for (int k = 0; k < counts.beside; ++k) {
+    all.push_back({"beside", 30.0, catalogue[static_cast<std::size_t>(k) % catalogue.size()]});
+  }
   return all;
 }
 
 Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
-  if (!recipe.effect.empty()) {
-    return draw_effect_case(recipe, number, seed);
-  }
   constexpr std::uint64_t streams_per_seed = 100000;
   Random random(seed, streams_per_seed + static_cast<std::uint64_t>(number));
+  if (!recipe.effect.empty()) {
+    auto c = draw_effect_case(recipe, number, seed);
+    if (!c || c->kind != "beside") {
+      return c;
+    }
+    const auto filtered = still_filter(*c);
+    const auto added = filtered ? add_laws(*c, 1, *filtered, random) : tl::unexpected(filtered.error());
+    return added ? c : tl::unexpected(added.error());
+  }
   Case c;
   c.number = number;
   c.kind = recipe.kind;
@@ -212,30 +251,13 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
   c.seed = seed * streams_per_seed + static_cast<std::uint64_t>(number);
   c.config = draw_installation(random);
   c.schedule = *named_schedule("horizontal");
-  sim::SimConfig still = c.config;  // what the strength is that of
-  still.base_motion = {};
-  const auto filtered = blind::Filtered::make(still, c.schedule, c.seed);
+  const auto filtered = still_filter(c);
   if (!filtered) {
     return tl::unexpected(filtered.error());
   }
-  const int count = c.kind == "clean" ? 0 : (c.kind == "pair" ? 2 : 1);
-  for (int tries = 0; static_cast<int>(c.physics.laws.size()) < count; ++tries) {
-    constexpr int most_tries = 200;
-    if (tries == most_tries) {
-      return fail(ErrorKind::internal, fmt::format("case {}: no law of {} sigma was drawn", number, c.strength));
-    }
-    sim::Law law = draw_law(c.kind, random);
-    const auto response = filtered->response({{}, {law}});
-    // What takes more than these to reach its strength is nothing that a sensor does.
-    const double largest = law.axis < 3 ? 5.0 * units::degree_per_hour : 3000.0 * units::micro_g;
-    if (!response || !(response->sigmas > 0.0)) {
-      continue;
-    }
-    law.coefficient *= c.strength / response->sigmas;
-    const double in_time = law.process == sim::LawProcess::random_walk ? std::sqrt(units::hour) : 1.0;
-    if (law.coefficient * in_time < largest) {
-      c.physics.laws.push_back(law);
-    }
+  const std::size_t count = c.kind == "clean" ? 0 : (c.kind == "pair" ? 2 : 1);
+  if (const auto added = add_laws(c, count, *filtered, random); !added) {
+    return tl::unexpected(added.error());
   }
   if (c.kind == "law" || c.kind == "pair") {
     const auto bound = bound_of(*filtered, c.physics.laws);

@@ -18,7 +18,8 @@ namespace selfcal::discovery_trial {
 
 struct Case {
   int number = 0;
-  // clean, law, pair, process, foreign (a law of forms that the search has not), effect (of the catalogue)
+  // clean, law, pair, process, foreign (a law of forms that the search has not), effect (of the catalogue), beside (a law
+  // within the search's forms beside an effect of the catalogue, both of the same strength)
   std::string kind;
   double strength = 0.0;  // sigma, of each law
   std::uint64_t seed = 0;
@@ -31,7 +32,7 @@ struct Case {
 
 struct Counts {
   int laws = 40;  // of each strength
-  int pairs = 40, processes = 40, clean = 400, foreign = 40, effects = 120;
+  int pairs = 40, processes = 40, clean = 400, foreign = 40, effects = 120, beside = 40;
 };
 
 // Kinds in the order of the trial, with strength; `repeats` of each.

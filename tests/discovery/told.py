@@ -19,7 +19,7 @@ def left_elsewhere(programs, key, number, laws, folder):
 
 def answer_of(programs, way, case, recording, folder):
     """The answer to a case's recording, with what its laws leave elsewhere. Of a case the answering program knows nothing."""
-    words = [] if case["kind"] == "effect" and way == "discover" else [f"--{way}"]
+    words = [] if case["kind"] in ("effect", "beside") and way == "discover" else [f"--{way}"]
     out = subprocess.run([f"{programs}/selfcal_discovery_answer", str(recording), *words], check=True, capture_output=True, text=True).stdout
     answer = json.loads(out)
     if case["laws"] and not any(law["process"] for law in case["laws"]) and "discovery" in answer:
