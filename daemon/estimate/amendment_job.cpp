@@ -14,8 +14,8 @@
 #include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/result_json.hpp"
+#include "daemon/estimate/search_beyond.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
-#include "estimator/discovery/kept_names.hpp"
 #include "estimator/passes/consistency.hpp"
 
 namespace selfcal {
@@ -138,6 +138,7 @@ discovery::NextExperiment second_look(const Schedule& done) {
 // Nothing where there is one recording and the catalogue explains it. A walk or an instability that equations explain is no name.
 Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& request,
                                                   const std::vector<std::unique_ptr<Taken>>& taken,
+                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                   const std::function<void()>& progress, const std::stop_token& stop) {
   if (!taken.front()->diagnosis.faults.empty() ||
       (taken.size() == 1 && !taken.front()->diagnosis.unexplained && !may_be_a_law(taken.front()->diagnosis))) {
@@ -148,35 +149,33 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   for (const auto& t : taken) {
     files.push_back({t->file, t->data, t->diagnosis});
   }
-  const auto rest = discovery::UnexplainedRest::of(recordings_of(files), stop);
-  if (!rest) {
-    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, rest.error()));
-  }
-  discovery::DiscoveryOptions options;
-  options.stop = stop;
-  options.coloured = taken.front()->diagnosis.before.coloured;
-  BeyondAnswer answer;
-  answer.found = discovery::discover(rest->recordings(), options, [&](const std::string&) { progress(); });
+  discovery::DiscoveryOptions of_laws;
+  of_laws.stop = stop;
+  of_laws.coloured = taken.front()->diagnosis.before.coloured;
+  const discovery::Progress step = [&](const std::string&) { progress(); };
   diagnosis::Diagnosis& first = taken.front()->diagnosis;
-  replace_process(first, answer.found);
-  if (taken.size() == 1 && discovery::say_what_was_rejected(rest->recordings().front(), first, answer.found, stop)) {
-    discovery::keep_rejected_names(first, answer.found);
+  auto search = search_beyond(recordings_of(files), of_catalogue, of_laws, first, step);
+  if (!search) {
+    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, search.error()));
   }
   if (taken.size() == 1 && !first.unexplained) {
     return std::nullopt;
   }
-  const auto joint = fit_together(*rest, answer.found, stop);
+  const auto joint = fit_together(search->rest, search->found, stop);
   if (!joint) {
     return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, joint.error()));
   }
+  BeyondAnswer answer;
+  answer.found = std::move(search->found);
+  const discovery::UnexplainedRest& rest = search->rest;
   if (files.size() > 1) {
-    answer.together = put_together(files, *rest, **joint);
+    answer.together = put_together(files, rest, **joint);
     answer.joint = *joint;
   }
   progress();
   discovery::ExperimentLimits limits;
   limits.rotation_s = request.config.rotation_s;
-  answer.next = plan_next(rest->recordings(), answer.found, limits, stop);
+  answer.next = plan_next(rest.recordings(), answer.found, limits, stop);
   if (!answer.next && taken.size() == 1) {
     answer.next = second_look(schedule_of(taken.front()->loaded.recording, taken.front()->data));
   }
@@ -214,7 +213,7 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
     return tl::unexpected(kept.error());
   }
   diagnosis::Diagnosis& diagnosis = taken.front()->diagnosis;
-  auto beyond = look_beyond(request, taken, report, stop);
+  auto beyond = look_beyond(request, taken, options, report, stop);
   if (!beyond) {
     return tl::unexpected(beyond.error());
   }

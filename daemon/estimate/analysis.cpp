@@ -1,8 +1,9 @@
 #include "daemon/estimate/analysis.hpp"
 
+#include "daemon/estimate/beyond_catalogue.hpp"
+#include "daemon/estimate/search_beyond.hpp"
+#include "daemon/estimate/unit_answer.hpp"
 #include "estimator/diagnosis/effects/catalogue.hpp"
-#include "estimator/discovery/kept_names.hpp"
-#include "estimator/discovery/named_effects.hpp"
 
 namespace selfcal {
 
@@ -10,19 +11,17 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
                const std::function<void(const std::string& step)>& step) {
   diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, options, step);
   Cause cause{std::move(outcome.diagnosis), std::move(outcome.failure), std::nullopt};
-  if (!cause.diagnosis || !cause.diagnosis->unexplained) {
+  if (!cause.diagnosis || !(cause.diagnosis->unexplained || may_be_a_law(*cause.diagnosis))) {
     return cause;
   }
-  const discovery::DiagnosedRecording recording{data, *cause.diagnosis};
-  if (const auto rest = discovery::UnexplainedRest::of({&recording, 1}, options.stop)) {
-    discovery::DiscoveryOptions of_laws;
-    of_laws.stop = options.stop;
-    of_laws.coloured = cause.diagnosis->before.coloured;
-    cause.beyond = discovery::discover(rest->recordings(), of_laws, step);
-    if (discovery::say_what_was_rejected(rest->recordings().front(), *cause.diagnosis, *cause.beyond, options.stop)) {
-      discovery::keep_rejected_names(*cause.diagnosis, *cause.beyond);
-      cause.beyond.reset();
-    }
+  diagnosis::Diagnosis& diagnosis = *cause.diagnosis;
+  const discovery::DiagnosedRecording recording{data, diagnosis};
+  discovery::DiscoveryOptions of_laws;
+  of_laws.stop = options.stop;
+  of_laws.coloured = diagnosis.before.coloured;
+  auto search = search_beyond({&recording, 1}, options, of_laws, diagnosis, step);
+  if (search && diagnosis.unexplained && fit_together(search->rest, search->found, options.stop)) {
+    cause.beyond = std::move(search->found);
   }
   return cause;
 }

@@ -126,10 +126,7 @@ bool confirmed(const Discovery* found) {
 }
 
 bool may_be_a_law(const diagnosis::Diagnosis& d) {
-  const auto process = [](const diagnosis::Finding& f) { return f.process; };
-  const auto equation = [](const diagnosis::Finding& f) { return f.source != nullptr; };
-  return std::any_of(d.findings.begin(), d.findings.end(), process) &&
-         std::none_of(d.findings.begin(), d.findings.end(), equation);
+  return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
 }
 
 bool replaces_process(const Discovery& found, const diagnosis::Diagnosis& d) {
@@ -145,7 +142,9 @@ void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {
   d.rejected.insert(d.rejected.end(), kept, d.findings.end());
   d.findings.erase(kept, d.findings.end());
   d.unexplained = d.mismatch = true;
-  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
+  const bool equations = std::any_of(d.findings.begin(), d.findings.end(),
+                                     [](const diagnosis::Finding& f) { return f.source != nullptr; });
+  d.verdict = equations ? diagnosis::DiagnosisVerdict::named : diagnosis::DiagnosisVerdict::none_of_the_above;
 }
 
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
@@ -189,7 +188,7 @@ const char* beyond_what(const Discovery& found) {
   return known ? "what the catalogue alone does not explain" : "what no catalogue holds";
 }
 
-std::string discovered_figures(const Discovery& found) {
+std::string law_figures(const Discovery& found) {
   std::vector<std::string> all;
   for (const DiscoveredLaw& law : found.laws) {
     all.push_back(fmt::format("{}: ({}) * {}", name_of_axis(law.term.axis),
@@ -201,8 +200,12 @@ std::string discovered_figures(const Discovery& found) {
                               with_sigma(p.size, p.sigma, process_unit(p))));
   }
   all.resize(std::min(all.size(), most_told));
+  return fmt::format("{}", fmt::join(all, "; "));
+}
+
+std::string discovered_figures(const Discovery& found) {
   const auto nis = [&](double misfit) { return 1.0 + misfit / std::max(1.0, found.rows); };
-  return fmt::format("{}; NIS {:.3g} becomes {:.3g}", fmt::join(all, "; "), nis(found.misfit_before),
+  return fmt::format("{}; NIS {:.3g} becomes {:.3g}", law_figures(found), nis(found.misfit_before),
                      nis(found.misfit_after));
 }
 

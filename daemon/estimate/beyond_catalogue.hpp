@@ -19,8 +19,7 @@ bool explains(const discovery::Discovery* found);
 // stand behind a set that is written.
 bool confirmed(const discovery::Discovery* found);
 
-// A random walk or an instability follows any slow curve: where the catalogue names no equation beside one, what it names may be
-// a law that no catalogue holds.
+// A random walk or an instability follows any slow curve: what the catalogue names by one may be a law that no catalogue holds.
 bool may_be_a_law(const diagnosis::Diagnosis& diagnosis);
 // Whether equations alone were found that explain what such a walk or instability had been named for.
 bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagnosis& diagnosis);
@@ -37,6 +36,8 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::
 std::string discovered_words(const discovery::Discovery& found);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
 std::string discovered_figures(const discovery::Discovery& found);
+// The same without what they make of NIS.
+std::string law_figures(const discovery::Discovery& found);
 
 // "what no catalogue holds"; "what the catalogue alone does not explain" where an effect of it makes some of the laws.
 const char* beyond_what(const discovery::Discovery& found);

@@ -108,7 +108,8 @@ std::vector<std::string> kinds_of(const Diagnosis& d) {
   return words;
 }
 
-std::string named(const Diagnosis& d) {
+// With the equations that the names leave, or with the word that they leave something.
+std::string named(const Diagnosis& d, const discovery::Discovery* beyond) {
   constexpr std::size_t most = 2;
   const std::vector<std::string> kinds = kinds_of(d);
   const auto told = std::span(kinds).first(std::min(most, kinds.size()));
@@ -116,20 +117,25 @@ std::string named(const Diagnosis& d) {
   if (kinds.size() > most) {
     text += fmt::format("; and {} more", kinds.size() - most);
   }
+  if (d.unexplained && explains(beyond)) {
+    return text + "; and that " + discovered_words(*beyond);
+  }
   return text + (d.unexplained ? "; and what none of these explains" : "");
 }
 
 // What shows it: the strongest coefficient, what the fit makes of the misfit, and what it does to the 24.
-std::string named_cause(const Diagnosis& d) {
+std::string named_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
+  const bool with_laws = d.unexplained && explains(beyond);
   std::string text;
   if (!d.findings.empty()) {
     const Finding& first = d.findings.front();
-    text = fmt::format("{}: {}; NIS {:.3g} becomes {:.3g}", first.effect, figures_with_significance(first),
-                       d.before.nis, d.after.nis);
+    text =
+        fmt::format("{}: {};{} NIS {:.3g} becomes {:.3g}", first.effect, figures_with_significance(first),
+                    with_laws ? fmt::format(" {};", law_figures(*beyond)) : std::string(), d.before.nis, d.after.nis);
   }
   const std::string moved = largest_correction(d);
   text += moved.empty() ? std::string() : fmt::format("; {}", moved);
-  if (d.unexplained && !d.remaining.empty()) {
+  if (d.unexplained && !with_laws && !d.remaining.empty()) {
     text += fmt::format("; {:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
   }
   return text + ".";
@@ -242,8 +248,8 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
     s.cause = fault_cause(*d);
     s.next = "Mend the fault and record again.";
   } else if (d != nullptr && d->verdict == DiagnosisVerdict::named) {
-    s.verdict = fmt::format("These 24 values are biased by what the model leaves out: {}.", named(*d));
-    s.cause = named_cause(*d);
+    s.verdict = fmt::format("These 24 values are biased by what the model leaves out: {}.", named(*d, beyond));
+    s.cause = named_cause(*d, beyond);
     s.next = subject.run > 0 ? fmt::format("selfcal amend {}", subject.run) : command("diagnose", subject);
   } else if (d != nullptr && d->unexplained) {
     s.verdict =
@@ -313,8 +319,8 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
   }
   if (gate.acceptable()) {
     return {SummaryStanding::good,
-            fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d)),
-            named_cause(d), command("report", subject, "-o report.html")};
+            fmt::format("All 24 parameters are determined to tolerance once this is fitted too: {}.", named(d, beyond)),
+            named_cause(d, beyond), command("report", subject, "-o report.html")};
   }
   switch (gate.objections.front().kind) {
     case ObjectionKind::nothing_to_amend:
@@ -350,7 +356,7 @@ Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::
                           d.before.largest_sigma, innovations_text(d.before)),
               {}};
     case DiagnosisVerdict::named:
-      return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d)), named_cause(d),
+      return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d, beyond)), named_cause(d, beyond),
               subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
                               : command("diagnose", subject, "--amended amended")};
     case DiagnosisVerdict::none_of_the_above: return summary_beyond(d, subject, beyond);

@@ -111,9 +111,10 @@ struct Diagnosis {
   NoiseCheck noise;
   CalibrationResult calibration;   // of the 24 alone
   std::vector<ModelEffect> model;  // equations among the findings
-  // Equations among what is rejected, where nothing but what they leave speaks against them; empty where something else does: a walk
-  // beside them, or that they are nearly one.
+  // Equations among what is rejected, and whether nothing but what they leave speaks against them: no walk beside them, and not
+  // that they are nearly one.
   std::vector<ModelEffect> rejected_model;
+  bool rejected_by_remains_alone = false;
   double log_p_limit = 0.0;  // natural logarithm of p, not corrected, below which one test of an effect is a name
   double mean_temperature_c = 0.0;  // of the recording; 0 without a channel
   // Of the 24, SI: mean and sigma over all explanations that the recording leaves open; and with `model` as it is.

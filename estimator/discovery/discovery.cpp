@@ -45,7 +45,9 @@ FittedRecording without_any_law(const CalibrationResult& calibration) {
           Eigen::MatrixXd::Zero(sensor_parameter_count, 0)};
 }
 
-class Search {
+}  // namespace
+
+class LawSearch::Search {
  public:
   Search(std::span<const UnitRecording> recordings, const DiscoveryOptions& options, const Progress& progress)
       : recordings_(recordings),
@@ -69,7 +71,7 @@ class Search {
 
   // Laws first, and beside them what a random process takes up; then processes first. The way of the greater posterior
   // probability is reported: a process can stand for any law, and laws added up can stand for a process.
-  Discovery run() {
+  void fit() {
     const bool process_alone = significant(best_process());
     take_laws();
     settle();
@@ -77,9 +79,55 @@ class Search {
     if (process_alone || significant(best_process())) {
       processes_too();
     }
-    tell();
-    return std::move(result_);
+    if (state_.processes.empty()) {
+      drop_weak();
+    }
+    write_down();
   }
+
+  // Classes, stability and what else is told of the laws as fitted.
+  void tell() {
+    std::vector<DiscoveredLaw> laws(state_.terms.size());
+    for (std::size_t k = 0; k < laws.size(); ++k) {
+      settle_class(k, laws[k]);  // which may put another equation in the place of one
+    }
+    write_down();
+    auto at = static_cast<Eigen::Index>(state_.terms.size());
+    for (std::size_t k = 0; k < state_.terms.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      DiscoveredLaw& law = laws[k];
+      law.term = state_.terms[k];
+      law.expression = state_.terms[k].expression.text(state_.terms[k].constants);
+      law.coefficient = state_.fit.coefficient(row);
+      law.sigma = std::sqrt(state_.fit.covariance(row, row));
+      law.gain = state_.fit.gain[k];
+      law.held_out_gain = state_.fit.held_out_gain[k];
+      law.share = std::min(1.0, law.gain / std::max(1.0, result_.misfit_before));
+      law.constants = shortlist_.constants(state_.terms[k]);
+      for (Constant& constant : law.constants) {
+        constant.sigma = std::sqrt(std::max(0.0, state_.fit.covariance(at, at)));
+        ++at;
+      }
+      if (const auto spread = spread_over_constant(laws_on_, state_.fit, k, options_.stop)) {
+        // Where the range of the search cuts off probable values, the spread is too small.
+        law.sigma = std::max(law.sigma, spread->coefficient);
+        law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
+      }
+      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
+      const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
+      law.significance =
+          sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
+    }
+    std::stable_sort(laws.begin(), laws.end(),
+                     [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
+    TellingLaws telling = tell_laws(std::move(laws), state_.processes, options_.departure_rate);
+    result_.laws = std::move(telling.told);
+    result_.described = std::move(telling.described);
+  }
+
+  Discovery& result() { return result_; }
+  std::span<const UnitRecording> recordings() const { return recordings_; }
+  const DiscoveryOptions& options() const { return options_; }
 
  private:
   // All that the search has decided.
@@ -380,55 +428,17 @@ class Search {
     law.stability = stability(laws_on_, all_but(k), tried, members, options_.stop);
   }
 
-  void tell() {
-    if (state_.processes.empty()) {
-      drop_weak();
-    }
-    std::vector<DiscoveredLaw> laws(state_.terms.size());
-    for (std::size_t k = 0; k < laws.size(); ++k) {
-      settle_class(k, laws[k]);
-    }
+  void write_down() {
     result_.processes = state_.processes;
     result_.log_p_remaining = state_.log_p_remaining;
     result_.refused = state_.refused;
     result_.fit = state_.fit;
     result_.misfit_after = (state_.processes.empty() ? state_.fit.square_after : model_->square()) - result_.rows;
-    auto at = static_cast<Eigen::Index>(state_.terms.size());
-    for (std::size_t k = 0; k < state_.terms.size(); ++k) {
-      const auto row = static_cast<Eigen::Index>(k);
-      DiscoveredLaw& law = laws[k];
-      law.term = state_.terms[k];
-      law.expression = state_.terms[k].expression.text(state_.terms[k].constants);
-      law.coefficient = state_.fit.coefficient(row);
-      law.sigma = std::sqrt(state_.fit.covariance(row, row));
-      law.gain = state_.fit.gain[k];
-      law.held_out_gain = state_.fit.held_out_gain[k];
-      law.share = std::min(1.0, law.gain / std::max(1.0, result_.misfit_before));
-      law.constants = shortlist_.constants(state_.terms[k]);
-      for (Constant& constant : law.constants) {
-        constant.sigma = std::sqrt(std::max(0.0, state_.fit.covariance(at, at)));
-        ++at;
-      }
-      if (const auto spread = spread_over_constant(laws_on_, state_.fit, k, options_.stop)) {
-        // Where the range of the search cuts off probable values, the spread is too small.
-        law.sigma = std::max(law.sigma, spread->coefficient);
-        law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
-      }
-      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
-      const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
-      law.significance =
-          sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
-    }
-    std::stable_sort(laws.begin(), laws.end(),
-                     [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
-    TellingLaws telling = tell_laws(std::move(laws), state_.processes, options_.departure_rate);
-    result_.laws = std::move(telling.told);
-    result_.described = std::move(telling.described);
   }
 
   std::span<const UnitRecording> recordings_;
-  const DiscoveryOptions& options_;
-  const Progress& progress_;
+  DiscoveryOptions options_;
+  Progress progress_;
   std::vector<std::unique_ptr<Scene>> scenes_;
   std::vector<LawRecording> laws_on_;  // the same, for fits
   PieceSums sums_;                     // of all of them
@@ -442,11 +452,22 @@ class Search {
   double raw_square_ = 0.0;
 };
 
-}  // namespace
+LawSearch::LawSearch(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
+                     const Progress& progress)
+    : search_(std::make_unique<Search>(recordings, options, progress)) {
+  search_->fit();
+}
+LawSearch::LawSearch(LawSearch&&) noexcept = default;
+LawSearch::~LawSearch() = default;
 
-Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
-                   const Progress& progress) {
-  Discovery found = Search(recordings, options, progress).run();
+const Discovery& LawSearch::fitted() const { return search_->result(); }
+
+Discovery LawSearch::told() {
+  search_->tell();
+  Discovery found = std::move(search_->result());
+  const std::span<const UnitRecording> recordings = search_->recordings();
+  const DiscoveryOptions options = search_->options();
+  search_.reset();  // what follows has passes and memory of its own
   if (!found.laws.empty() && found.processes.empty()) {
     found.average = average_over_classes(recordings, found, members_averaged, options.stop);
     if (found.described.empty()) {
@@ -454,6 +475,11 @@ Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOpt
     }
   }
   return found;
+}
+
+Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
+                   const Progress& progress) {
+  return LawSearch(recordings, options, progress).told();
 }
 
 }  // namespace selfcal::discovery

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -116,5 +117,22 @@ using Progress = std::function<void(const std::string&)>;
 // have are looked at.
 Discovery discover(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
                    const Progress& progress = {});
+
+// The same in two steps, for who may have no use for the second one, which takes most of the time.
+class LawSearch {
+ public:
+  // Laws and processes as fitted: `fit`, `processes`, misfits. `laws` and `described` are empty. `recordings` must outlive this.
+  LawSearch(std::span<const UnitRecording> recordings, const DiscoveryOptions& options, const Progress& progress = {});
+  LawSearch(LawSearch&&) noexcept;
+  ~LawSearch();
+  const Discovery& fitted() const;
+
+  // What is told of them: classes, stability, the 24 over the classes. Once.
+  Discovery told();
+
+ private:
+  class Search;
+  std::unique_ptr<Search> search_;
+};
 
 }  // namespace selfcal::discovery

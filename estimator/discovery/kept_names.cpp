@@ -43,47 +43,86 @@ double share_beside(const ColumnSums& sums, const Eigen::VectorXd& signature, co
   return 1.0 - gain_of(as_data, columns) / square;
 }
 
+// What laws make of the innovations of a recording, and what effects can.
+class Made {
+ public:
+  Made(const UnitRecording& recording, const std::vector<diagnosis::ModelEffect>& model,
+       const std::vector<LawTerm>& laws, const std::stop_token& stop)
+      : laws_(laws.size()) {
+    Scene scene(recording);
+    scene.table = collect_nodes(scene.motion, scene.input);
+    const std::vector<EffectTerm> terms = terms_of(model);
+    LawColumns of_laws(scene.motion, scene.table, laws, false);
+    EffectColumns of_effects(scene.context, terms);
+    TwoSources source(of_laws, of_effects);
+    sums_ = run_columns(scene.input, scene.trace, source, stop);
+    std::iota(laws_.begin(), laws_.end(), 0);
+    for (const EffectTerm& term : terms) {
+      own_.emplace_back(static_cast<std::size_t>(term.count()));
+      std::iota(own_.back().begin(), own_.back().end(), of_laws.count() + static_cast<int>(effects_.size()));
+      effects_.insert(effects_.end(), own_.back().begin(), own_.back().end());
+    }
+  }
+
+  // All but two per cent of law k.
+  bool by(std::size_t effect, std::size_t k) const {
+    const auto n = static_cast<Eigen::Index>(laws_.size());
+    return share_beside(sums_, Eigen::VectorXd::Unit(n, static_cast<Eigen::Index>(k)), own_[effect]) < most_beside;
+  }
+  bool by_all(const Eigen::VectorXd& coefficient) const {
+    return share_beside(sums_, coefficient, effects_) < most_beside;
+  }
+  double more_by_laws() const { return gain_of(sums_, laws_) - gain_of(sums_, effects_); }
+
+ private:
+  ColumnSums sums_;
+  std::vector<int> laws_, effects_;
+  std::vector<std::vector<int>> own_;  // columns of each effect
+};
+
 }  // namespace
+
+std::vector<bool> made_by_effects(const UnitRecording& recording, const std::vector<diagnosis::ModelEffect>& model,
+                                  const std::vector<LawTerm>& laws, const std::stop_token& stop) {
+  std::vector<bool> made(laws.size(), false);
+  if (laws.empty() || model.empty()) {
+    return made;
+  }
+  const Made columns(recording, model, laws, stop);
+  for (std::size_t k = 0; k < laws.size() && !stop.stop_requested(); ++k) {
+    for (std::size_t effect = 0; effect < model.size(); ++effect) {
+      made[k] = made[k] || columns.by(effect, k);
+    }
+  }
+  return made;
+}
 
 bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diagnosis& d, Discovery& found,
                            const std::stop_token& stop) {
   const auto of_a_sensor = [](const diagnosis::ModelEffect& e) { return e.effect->sensor != nullptr; };
-  if (!d.unexplained || d.rejected_model.empty() || found.laws.empty() ||
+  if (!d.unexplained || !d.rejected_by_remains_alone || d.rejected_model.empty() || found.laws.empty() ||
       !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
     return false;
   }
-  Scene scene(recording);
-  scene.table = collect_nodes(scene.motion, scene.input);
-  const std::vector<EffectTerm> terms = terms_of(d.rejected_model);
   std::vector<LawTerm> told;
   Eigen::VectorXd coefficient(static_cast<Eigen::Index>(found.laws.size()));
   for (const DiscoveredLaw& law : found.laws) {
     coefficient(static_cast<Eigen::Index>(told.size())) = law.coefficient;
     told.push_back(law.term);
   }
-  LawColumns of_laws(scene.motion, scene.table, told, false);
-  EffectColumns of_effects(scene.context, terms);
-  TwoSources source(of_laws, of_effects);
-  const ColumnSums sums = run_columns(scene.input, scene.trace, source, stop);
+  const Made columns(recording, d.rejected_model, told, stop);
   if (stop.stop_requested()) {
     return false;
   }
-  std::vector<int> laws(told.size()), effects;
-  std::iota(laws.begin(), laws.end(), 0);
-  for (const EffectTerm& term : terms) {
-    std::vector<int> own(static_cast<std::size_t>(term.count()));
-    std::iota(own.begin(), own.end(), of_laws.count() + static_cast<int>(effects.size()));
-    effects.insert(effects.end(), own.begin(), own.end());
+  for (std::size_t effect = 0; effect < d.rejected_model.size(); ++effect) {
     for (std::size_t k = 0; k < told.size(); ++k) {
-      const Eigen::VectorXd alone = Eigen::VectorXd::Unit(coefficient.size(), static_cast<Eigen::Index>(k));
-      if (share_beside(sums, alone, own) < most_beside) {
-        found.laws[k].effect = term.effect->id;
+      if (columns.by(effect, k)) {
+        found.laws[k].effect = d.rejected_model[effect].effect->id;
       }
     }
   }
   const double chance = 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, found.functions_tried)));
-  return found.left && share_beside(sums, coefficient, effects) < most_beside &&
-         gain_of(sums, laws) - gain_of(sums, effects) < chance;
+  return found.left && columns.by_all(coefficient) && columns.more_by_laws() < chance;
 }
 
 void keep_rejected_names(diagnosis::Diagnosis& d, const Discovery& found) {

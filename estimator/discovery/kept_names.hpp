@@ -9,6 +9,10 @@
 
 namespace selfcal::discovery {
 
+// Of each law whether one of the effects, fitted anew, makes all but two per cent of it. `model`: effects of sensors.
+std::vector<bool> made_by_effects(const UnitRecording& recording, const std::vector<diagnosis::ModelEffect>& model,
+                                  const std::vector<LawTerm>& laws, const std::stop_token& stop = {});
+
 // Looks for laws that are what a rejected effect of the catalogue makes, fitted anew, and says so in them (`effect`). True where the laws
 // alone explain the recording and the rejected effects make all of them, as well but for less than a search among so many functions
 // gains by chance. `recording`: the one that `found` is of.

@@ -9,7 +9,6 @@
 #include "daemon/estimate/showing_schedule.hpp"
 #include "estimator/diagnosis/poses/poses.hpp"
 #include "estimator/diagnosis/poses/references.hpp"
-#include "estimator/discovery/kept_names.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/recording_file.hpp"
@@ -340,16 +339,9 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   for (std::size_t k = 0; k < others->size(); ++k) {
     unit.push_back({(*others)[k]->file, (*others)[k]->data, (*of_others)[k]});
   }
-  Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit);
+  Expected<BeyondCatalogue> beyond = look_beyond(arguments.discovery, unit, options, diagnosis);
   if (!beyond) {
     return tl::unexpected(beyond.error());
-  }
-  if (beyond->said_by_catalogue) {
-    discovery::keep_rejected_names(diagnosis, *beyond->found);
-    beyond->found.reset();
-  }
-  if (beyond->found) {
-    replace_process(diagnosis, *beyond->found);
   }
   const Expected<std::optional<diagnosis::Holdout>> holdout = held_out(arguments, diagnosis, options);
   if (!holdout) {

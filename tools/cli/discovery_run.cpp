@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
-#include "estimator/discovery/kept_names.hpp"
+#include "daemon/estimate/search_beyond.hpp"
 #include "estimator/discovery/named_effects.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -123,53 +123,50 @@ void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {
   }
 }
 
-Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings) {
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings,
+                                      const diagnosis::DiagnosisOptions& of_catalogue, diagnosis::Diagnosis& first) {
   BeyondCatalogue result;
   const bool unexplained =
       std::any_of(recordings.begin(), recordings.end(), [](const DiagnosedFile& r) { return r.diagnosis.unexplained; });
   const bool asked = arguments.discover || unexplained || recordings.size() > 1 || !arguments.next_experiment.empty();
-  const bool discover = asked || may_be_a_law(recordings.front().diagnosis);
-  if (!discover && arguments.laws.empty()) {
-    return result;
-  }
-  const auto rest = discovery::UnexplainedRest::of(recordings_of(recordings));
-  if (!rest) {
-    return fail(ErrorKind::bad_input, rest.error());
-  }
+  const std::vector<discovery::DiagnosedRecording> unit = recordings_of(recordings);
   if (!arguments.laws.empty()) {
+    const auto rest = discovery::UnexplainedRest::of(unit);
+    if (!rest) {
+      return fail(ErrorKind::bad_input, rest.error());
+    }
     if (const auto tried = try_them(arguments.laws, *rest, result); !tried) {
       return tl::unexpected(tried.error());
     }
   }
-  if (discover) {
-    ProgressLine line;
-    discovery::DiscoveryOptions options;
-    options.coloured = recordings.front().diagnosis.before.coloured;
-    result.found =
-        discovery::discover(rest->recordings(), options, [&line](const std::string& words) { line.show(words); });
-    if (!asked && !replaces_process(*result.found, recordings.front().diagnosis)) {
-      result.found.reset();
-      return result;
-    }
-    const bool alone = recordings.size() == 1;
-    if (alone &&
-        discovery::say_what_was_rejected(rest->recordings().front(), recordings.front().diagnosis, *result.found)) {
-      result.said_by_catalogue = true;
-      if (arguments.next_experiment.empty()) {
-        return result;
-      }
-    }
-    auto joint = fit_together(*rest, *result.found);
-    if (!joint) {
-      return fail(ErrorKind::bad_input, joint.error());
-    }
-    result.joint = std::move(*joint);
-    if (recordings.size() > 1) {
-      result.together = put_together(recordings, *rest, *result.joint);
-    }
-    if (const auto planned = plan_and_write(arguments.next_experiment, rest->recordings(), result); !planned) {
-      return tl::unexpected(planned.error());
-    }
+  if (!asked && !may_be_a_law(first)) {
+    return result;
+  }
+  ProgressLine line;
+  const discovery::Progress progress = [&line](const std::string& words) { line.show(words); };
+  discovery::DiscoveryOptions options;
+  options.coloured = first.before.coloured;
+  auto search = search_beyond(unit, of_catalogue, options, first, progress);
+  if (!search) {
+    return fail(ErrorKind::bad_input, search.error());
+  }
+  if ((!asked && !first.unexplained) || (search->said_by_catalogue && arguments.next_experiment.empty())) {
+    return result;
+  }
+  result.found = std::move(search->found);
+  auto joint = fit_together(search->rest, *result.found);
+  if (!joint) {
+    return fail(ErrorKind::bad_input, joint.error());
+  }
+  result.joint = std::move(*joint);
+  if (recordings.size() > 1) {
+    result.together = put_together(recordings, search->rest, *result.joint);
+  }
+  if (const auto planned = plan_and_write(arguments.next_experiment, search->rest.recordings(), result); !planned) {
+    return tl::unexpected(planned.error());
+  }
+  if (search->said_by_catalogue) {
+    result.found.reset();
   }
   return result;
 }

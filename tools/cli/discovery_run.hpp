@@ -27,7 +27,6 @@ void add_discovery_options(Options& options, DiscoveryArguments& arguments);
 
 struct BeyondCatalogue {
   std::optional<discovery::Discovery> found;
-  bool said_by_catalogue = false;            // by names that it rejected: nothing else was made of `found`
   std::optional<discovery::JointFit> joint;  // of several recordings, or of effects and laws
   std::optional<Together> together;
   std::optional<discovery::NextExperiment> next;
@@ -46,6 +45,8 @@ struct BeyondCatalogue {
 
 // Looks where the diagnosis of a recording left something unexplained, where it named nothing but a walk or an instability of a bias (and
 // then keeps only what replaces that), where there are several, or where asked to; in all of them together. Errors: a file of laws that is wrong (file, law, column), a schedule that cannot be written.
-Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings);
+// `first`: the diagnosis of the first recording, to which `recordings` refers; what is found may change it (search_beyond.hpp).
+Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::span<const DiagnosedFile> recordings,
+                                      const diagnosis::DiagnosisOptions& of_catalogue, diagnosis::Diagnosis& first);
 
 }  // namespace selfcal::cli

@@ -167,13 +167,11 @@ void write_down(const SearchResult& found, const Judgement& j, Diagnosis& d) {
   // carried over or taken out.
   std::vector<Finding>& destination = j.names_stand ? d.findings : d.rejected;
   destination.insert(destination.end(), j.named.begin(), j.named.end());
-  const bool by_what_they_leave = j.jumps.empty() && found.processes.empty() && !found.collinear;
-  if (j.names_stand || by_what_they_leave) {
-    std::vector<ModelEffect>& model = j.names_stand ? d.model : d.rejected_model;
-    for (const NamedTerm& term : found.named) {
-      model.push_back({term.effect, term.constant, term.amplitude, term.covariance});
-    }
+  std::vector<ModelEffect>& model = j.names_stand ? d.model : d.rejected_model;
+  for (const NamedTerm& term : found.named) {
+    model.push_back({term.effect, term.constant, term.amplitude, term.covariance});
   }
+  d.rejected_by_remains_alone = !j.names_stand && j.jumps.empty() && found.processes.empty() && !found.collinear;
   d.value = found.value;
   d.value_as_named = found.value_as_named;
   d.covariance = found.covariance;

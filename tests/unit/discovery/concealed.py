@@ -25,6 +25,10 @@ def law(**keys):
     return "[[law]]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in keys.items())
 
 
+def effect(name, **keys):
+    return f'[[effect]]\nid = "{name}"\n' + "".join(f"{k} = {json.dumps(v)}\n" for k, v in keys.items())
+
+
 def answer(name, text, *arguments):
     """The document of a diagnosis of a recording in which the law is concealed."""
     (folder / f"{name}.toml").write_text(text)

@@ -54,6 +54,7 @@ class KeptNames : public testing::Test {
     finding.effect = id;
     finding.source = &effect_of(id);
     diagnosis_.rejected = {finding};
+    diagnosis_.rejected_by_remains_alone = true;
     diagnosis_.rejected_model = {{&effect_of(id), constant, size, Eigen::MatrixXd::Identity(size.size(), size.size())}};
     diagnosis_.unexplained = diagnosis_.mismatch = true;
     diagnosis_.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
@@ -116,7 +117,7 @@ TEST_F(KeptNames, OneOfTwoLawsIsMarked) {
 
 TEST_F(KeptNames, NothingIsSaidWhereThereIsNoName) {
   const Discovery found = told("exp(-since/?)", size_ug, {tau_s});
-  diagnosis_.rejected_model.clear();
+  diagnosis_.rejected_by_remains_alone = false;
   EXPECT_FALSE(says(found));
   rejected("accel_relaxation", tau_s, Eigen::Vector3d(0.0, 0.0, 1.5));
   Discovery described = found;

@@ -1,0 +1,223 @@
+#include "estimator/discovery/names_beside_laws.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <utility>
+
+#include "estimator/discovery/kept_names.hpp"
+#include "estimator/discovery/scene.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+using diagnosis::Diagnosis;
+using diagnosis::ModelEffect;
+
+// Twice the logarithm of the choices that one law is, a function and an axis out of half a million with their prior probabilities, and of its
+// coefficient (BIC); and of a name out of the catalogue. What an explanation costs beside the square that it leaves.
+// The logarithm of the odds that it is known physics that stands beside unknown one lowers a name's.
+constexpr double of_a_law = 24.0, of_a_name = 2.0;
+
+struct Laws {
+  std::vector<LawTerm> terms;
+  Eigen::VectorXd coefficient;  // in unit_of(axis)
+
+  // Without numbers: laws that differ by their constants alone are the same guess.
+  std::string forms() const {
+    std::string all;
+    for (const LawTerm& term : terms) {
+      std::string text = term.expression.text(term.constants) + ';';
+      std::erase_if(text, [](char c) { return c == '.' || c == 'e' || (c >= '0' && c <= '9'); });
+      all += static_cast<char>('a' + term.axis) + text;
+    }
+    return all;
+  }
+  static Laws fitted(const LawFit& fit) { return {fit.terms, fit.coefficient}; }
+  // Those for which `kept` says so.
+  template <typename Kept>
+  Laws where(Kept kept) const {
+    Laws some;
+    some.coefficient.resize(coefficient.size());
+    for (std::size_t k = 0; k < terms.size(); ++k) {
+      if (kept(k)) {
+        some.coefficient(static_cast<Eigen::Index>(some.terms.size())) = coefficient(static_cast<Eigen::Index>(k));
+        some.terms.push_back(terms[k]);
+      }
+    }
+    some.coefficient.conservativeResize(static_cast<Eigen::Index>(some.terms.size()));
+    return some;
+  }
+};
+
+double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
+  constexpr double counts = 3.0;
+  const double of_a_coefficient = std::log(std::max(2.0, found.rows));
+  // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
+  double cost = std::max(0.0, found.misfit_after);
+  cost += (of_a_law + of_a_coefficient) * static_cast<double>(found.fit.terms.size());
+  cost += of_a_law * static_cast<double>(found.processes.size());
+  for (const ModelEffect& name : names) {
+    const Eigen::ArrayXd z = name.size.array().abs() / name.covariance.diagonal().array().sqrt();
+    cost += of_a_name + of_a_coefficient * static_cast<double>(std::max<Eigen::Index>(1, (z > counts).count()));
+  }
+  return cost;
+}
+
+class Together {
+ public:
+  Together(const ImuData& data, const Diagnosis& diagnosis, const diagnosis::DiagnosisOptions& of_catalogue,
+           const DiscoveryOptions& of_laws, const Progress& progress)
+      : data_(data), diagnosis_(diagnosis), of_catalogue_(of_catalogue), of_laws_(of_laws), progress_(progress) {}
+
+  // What the search finds beside this name, fitted together with it. The name's size is that of a recording in which the law is: what
+  // corrects it is no law.
+  std::optional<Laws> laws_beside(const ModelEffect& name) const {
+    Diagnosis as_named = diagnosis_;
+    as_named.model = {name};
+    as_named.findings.assign(1, {});
+    as_named.findings.front().source = name.effect;
+    const DiagnosedRecording recording{data_, as_named};
+    const auto rest = UnexplainedRest::of({&recording, 1}, of_laws_.stop);
+    if (!rest) {
+      return std::nullopt;
+    }
+    const LawSearch search(rest->recordings(), of_laws_, progress_);
+    if (!search.fitted().processes.empty()) {
+      return std::nullopt;
+    }
+    const Laws all = Laws::fitted(search.fitted().fit);
+    const std::vector<bool> made = made_by_effects(rest->recordings().front(), {name}, all.terms, of_laws_.stop);
+    Laws laws = all.where([&](std::size_t k) { return !made[k]; });
+    if (laws.terms.empty()) {
+      return std::nullopt;
+    }
+    const auto joint = rest->beside(laws.terms, laws.coefficient, of_laws_.stop);
+    if (!joint) {
+      return std::nullopt;
+    }
+    laws.coefficient = joint->shared.coefficient.head(laws.coefficient.size());
+    return laws;
+  }
+
+  // What the catalogue says of the recording less these laws.
+  std::optional<Diagnosis> without(const Laws& laws) const {
+    Scene scene({data_, diagnosis_.calibration});
+    scene.table = collect_nodes(scene.motion, scene.input);
+    const diagnosis::CorrectedRecording rest =
+        without_laws(scene.motion, scene.table, scene.input, laws.terms, laws.coefficient);
+    diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(rest.data(), of_catalogue_, progress_);
+    if (!outcome.diagnosis || outcome.diagnosis->unexplained || outcome.diagnosis->model.empty()) {
+      return std::nullopt;
+    }
+    return std::move(outcome.diagnosis);
+  }
+
+  // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them.
+  std::optional<NamesBesideLaws> answer(const Diagnosis& of_rest) const {
+    Diagnosis named = diagnosis_;
+    named.findings = of_rest.findings;
+    named.model = of_rest.model;
+    named.remainder = of_rest.remainder;
+    named.value = of_rest.value;
+    named.sigma = of_rest.sigma;
+    named.covariance = of_rest.covariance;
+    named.value_as_named = of_rest.value_as_named;
+    named.rejected.clear();
+    named.rejected_model.clear();
+    named.rejected_by_remains_alone = false;
+    named.verdict = diagnosis::DiagnosisVerdict::named;
+    const DiagnosedRecording recording{data_, named};
+    auto rest = UnexplainedRest::of({&recording, 1}, of_laws_.stop);
+    if (!rest) {
+      return std::nullopt;
+    }
+    Discovery laws = discover(rest->recordings(), of_laws_, progress_);
+    if (laws.laws.empty() && laws.described.empty()) {
+      return std::nullopt;
+    }
+    return NamesBesideLaws{std::move(named), std::move(*rest), std::move(laws)};
+  }
+
+ private:
+  const ImuData& data_;
+  const Diagnosis& diagnosis_;
+  const diagnosis::DiagnosisOptions& of_catalogue_;
+  const DiscoveryOptions& of_laws_;
+  const Progress& progress_;
+};
+
+// The strongest of the equations that were rejected.
+const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
+  const auto square = [](const ModelEffect& m) { return m.size.dot(m.covariance.ldlt().solve(m.size)); };
+  const auto found = std::max_element(
+      names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) { return square(a) < square(b); });
+  return found == names.end() ? nullptr : &*found;
+}
+
+// What to take out so that a name may stand: a first guess of which laws are none of the catalogue's. Cheapest first; empty ones are
+// passed over.
+std::vector<std::function<std::optional<Laws>()>> guesses(const Together& together, const UnitRecording& recording,
+                                                          const std::vector<ModelEffect>& rejected, const Laws& alone,
+                                                          const std::stop_token& stop) {
+  std::vector<std::function<std::optional<Laws>()>> all;
+  all.emplace_back([&rejected, &alone, &recording, stop]() -> std::optional<Laws> {
+    const std::vector<bool> made = made_by_effects(recording, rejected, alone.terms, stop);
+    const bool any = std::find(made.begin(), made.end(), true) != made.end();
+    return any ? std::optional(alone.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
+  });
+  if (const ModelEffect* name = strongest(rejected)) {
+    all.emplace_back([&together, name] { return together.laws_beside(*name); });
+  }
+  // An effect of one triad may have been written as several laws of it.
+  const auto of_gyros = [&](std::size_t k) { return alone.terms[k].axis < 3; };
+  const Laws gyros = alone.where(of_gyros), accelerometers = alone.where([&](std::size_t k) { return !of_gyros(k); });
+  if (!gyros.terms.empty() && !accelerometers.terms.empty()) {
+    all.emplace_back([gyros] { return gyros; });
+    all.emplace_back([accelerometers] { return accelerometers; });
+  } else if (alone.terms.size() == 2) {
+    all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 0; }); });
+    all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 1; }); });
+  }
+  return all;
+}
+
+}  // namespace
+
+std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diagnosis& d, const UnitRecording& searched,
+                                                 const Discovery& alone,
+                                                 const diagnosis::DiagnosisOptions& of_catalogue,
+                                                 const DiscoveryOptions& of_laws, const Progress& progress) {
+  if (!d.unexplained || !d.model.empty() || alone.fit.terms.size() + alone.processes.size() < 2) {
+    return std::nullopt;
+  }
+  const Together together(data, d, of_catalogue, of_laws, progress);
+  std::vector<ModelEffect> rejected;
+  std::copy_if(d.rejected_model.begin(), d.rejected_model.end(), std::back_inserter(rejected),
+               [](const ModelEffect& m) { return m.effect->sensor != nullptr; });
+  const double least = cost_of(alone, {});
+  const Laws laws_alone = Laws::fitted(alone.fit);
+  std::vector<std::string> tried;
+  for (const auto& guess : guesses(together, searched, rejected, laws_alone, of_laws.stop)) {
+    const std::optional<Laws> laws = guess();
+    if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
+      continue;
+    }
+    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end()) {
+      continue;
+    }
+    tried.push_back(laws->forms());
+    const std::optional<Diagnosis> of_rest = together.without(*laws);
+    auto both = of_rest ? together.answer(*of_rest) : std::nullopt;
+    // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
+    if (both && both->laws.fit.terms.size() <= laws->terms.size() &&
+        cost_of(both->laws, both->diagnosis.model) < least) {
+      return both;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace selfcal::discovery
