@@ -1,4 +1,4 @@
-// selfcal poses: diagnosis of sensors turned by hand or by a table between static poses: no Earth rate. What `diagnose` says
+// selfcal poses: diagnosis of sensors that stand, or are turned by hand or by a table between static poses: no Earth rate. What `diagnose` says
 // of a recording that supports no more, and of raw counts.
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ struct PosesArguments {
   double false_alarm_rate = 0.01;
   bool json = false;
   std::string only;
-  std::optional<std::uint64_t> angle_column;
+  std::optional<std::uint64_t> angle_column, temperature_column;
 };
 
 RawColumns raw_columns(const PosesArguments& arguments) {
@@ -32,14 +32,16 @@ RawColumns raw_columns(const PosesArguments& arguments) {
                     : arguments.only == "accelerometers" ? diagnosis::Sensors::accelerometers
                                                          : diagnosis::Sensors::both;
   columns.angle = static_cast<std::size_t>(arguments.angle_column.value_or(0));
+  columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
 }
 
 // What says how a CSV's columns stand says nothing of a recording, whose datasets have names.
 Expected<void> check_columns(const PosesArguments& arguments, bool is_recording) {
-  if (is_recording && (!arguments.only.empty() || arguments.angle_column)) {
-    return fail(ErrorKind::usage,
-                fmt::format("{}: --only and --angle-column are of CSV of raw values", arguments.file));
+  if (is_recording && (!arguments.only.empty() || arguments.angle_column || arguments.temperature_column)) {
+    return fail(
+        ErrorKind::usage,
+        fmt::format("{}: --only, --angle-column and --temperature-column are of CSV of raw values", arguments.file));
   }
   return {};
 }
@@ -82,6 +84,8 @@ CommandRun configure(Options& options) {
                  "gyros or accelerometers: the CSV holds these alone, time in s and then x y z");
   options.whole("--angle-column", arguments->angle_column, known_columns,
                 "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
+  options.whole("--temperature-column", arguments->temperature_column, known_columns,
+                "the CSV's column, from 1, that holds a temperature, degC");
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
   options.flag("--json", arguments->json, "one JSON document on standard output");
@@ -89,7 +93,7 @@ CommandRun configure(Options& options) {
 }
 
 const CommandRegistration registration{
-    {"poses", "which physics a hand-turned sensor shows in static poses", configure}};
+    {"poses", "which physics a sensor shows that stands, or is turned by hand", configure}};
 
 }  // namespace
 }  // namespace selfcal::cli

@@ -28,6 +28,9 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
   input.gyro = rates(recording.delta_theta_rad);
   input.accel = rates(recording.delta_v_mps);
   input.accel_unit = 1.0;
+  for (std::size_t i = 0; i < recording.temperature_c.size(); i += recording.temperature_channels) {
+    input.temperature_c.push_back(recording.temperature_c[i]);
+  }
   const auto zero = [](const std::vector<double>& angles) {
     return std::all_of(angles.begin(), angles.end(), [](double angle) { return angle == 0.0; });
   };
@@ -48,7 +51,7 @@ Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path, const Raw
   std::string_view rest = *text;
   std::size_t line_number = 0;
   const bool both = columns.sensors == diagnosis::Sensors::both;
-  std::vector<double> row(std::max<std::size_t>(both ? 7 : 4, columns.angle));
+  std::vector<double> row(std::max({std::size_t{both ? 7U : 4U}, columns.angle, columns.temperature}));
   input.sensors = columns.sensors;
   while (!rest.empty()) {
     const std::size_t end = rest.find('\n');
@@ -77,6 +80,9 @@ Expected<diagnosis::PoseInput> read_raw_poses(const std::string& path, const Raw
     input.accel.push_back(both                                                    ? std::array{row[4], row[5], row[6]}
                           : columns.sensors == diagnosis::Sensors::accelerometers ? first
                                                                                   : none);
+    if (columns.temperature > 0) {
+      input.temperature_c.push_back(row[columns.temperature - 1]);
+    }
     if (columns.angle > 0) {
       input.outer.push_back(row[columns.angle - 1] * units::degree);
       input.inner.push_back(0.0);

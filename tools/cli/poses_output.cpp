@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/rest_output.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -383,6 +384,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"supports", d.supports},
           {"not_by_position", d.not_by_position},
           {"read_outs", d.read_outs ? read_outs_json(*d.read_outs) : Json()},
+          {"rest", d.rest ? rest_json(*d.rest) : Json()},
           {"clipped", to_json(d.clipped)},
           {"left_out", to_json(d.left_out)},
           {"accelerometers",
@@ -421,7 +423,8 @@ bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
   const bool nonlinear =
       d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
                                  [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
-  return !d.accel_adequate || !d.gyro_named.empty() || d.settling.has_value() || nonlinear;
+  return !d.accel_adequate || !d.gyro_named.empty() || d.settling.has_value() || nonlinear ||
+         (d.rest && drifts(*d.rest));
 }
 
 std::string poses_text(const diagnosis::PoseDiagnosis& d, bool si) {
@@ -429,13 +432,18 @@ std::string poses_text(const diagnosis::PoseDiagnosis& d, bool si) {
   if (si) {
     shown = {units::degree, 9.80665e-3, "deg/s", "mg"};
   }
-  std::string text = fmt::format("{} static poses, {:.0f} s in all\n", d.poses, d.static_seconds);
+  std::string text =
+      fmt::format("{} static pose{}, {:.0f} s in all\n", d.poses, d.poses == 1 ? "" : "s", d.static_seconds);
   for (const std::string& words : d.supports) {
     text += fmt::format("reference: {}\n", words);
   }
   text += clipping_text(d, shown);
   if (d.read_outs) {
     text += read_outs_text(*d.read_outs, shown);
+  }
+  if (d.rest) {
+    text += d.force_at_rest_g > 0.0 ? fmt::format("|f| {:.5f} g; ", d.force_at_rest_g) : std::string();
+    text += rest_text(*d.rest);
   }
   if (d.sensors != diagnosis::Sensors::both) {
     text += one_triad_text(d, shown);

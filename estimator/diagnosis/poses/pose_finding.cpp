@@ -242,8 +242,8 @@ Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
 
 std::vector<Pose> find_poses(const PoseInput& input) {
   const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
-  const auto window = static_cast<std::size_t>(std::lround(rate));  // 1 s
-  if (window < 4 || input.time_s.size() < 20 * window) {
+  const auto window = std::max<std::size_t>(4, static_cast<std::size_t>(std::lround(rate)));  // 1 s, or four samples
+  if (input.time_s.size() < 20 * window) {
     return {};
   }
   std::vector<Pose> poses = put_together(input, quiet_stretches(input, window));
@@ -302,12 +302,17 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
     const double range = (*high)[axis] - (*low)[axis];
     Clipping c{k < 3, k % 3, 0.0, 0, 0.0, 0.0};
     for (const double end : {(*low)[axis], (*high)[axis]}) {
+      double step = range;  // to the value next to the end: of coarse readings more than a hundredth of the range
+      for (const auto& row : series) {
+        const double off = std::abs(row[axis] - end);
+        step = off > 0.0 ? std::min(step, off) : step;
+      }
       std::size_t there = 0, before = 0, first = 0, last = 0;
       for (std::size_t i = 0; i < series.size(); ++i) {
         if (series[i][axis] == end) {
           first = there++ == 0 ? i : first;
           last = i;
-        } else if (std::abs(series[i][axis] - end) < near * range) {
+        } else if (std::abs(series[i][axis] - end) <= std::max(near * range, step)) {
           ++before;
         }
       }

@@ -15,7 +15,7 @@ std::vector<RestNoise> noise_at_rest(const PoseInput& input, const std::vector<s
     }
   }
   std::vector<RestNoise> all;
-  for (double tau_s = 1.0;; tau_s *= 2.0) {
+  for (double tau_s = std::max(1.0, 1.0 / rate_hz);; tau_s *= 2.0) {
     const auto m = static_cast<std::size_t>(std::lround(tau_s * rate_hz));
     if (m == 0 || 3 * m > longest) {
       return all;

@@ -44,6 +44,7 @@ void add_noise(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagn
 }
 
 constexpr double narrow_deg = 20.0;
+constexpr std::size_t least_poses = 6;  // biases and scale factors
 
 void add_untested(PoseDiagnosis& d) {
   if (!d.accel_tested) {
@@ -131,6 +132,17 @@ std::string counted(int count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
+void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
+  d.rest = judge_rest(input, poses, alpha, d);
+  if (!d.rest) {
+    return;
+  }
+  d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise, means, and what changes while nothing turns");
+  for (const std::string& words : undetermined_at_rest(*d.rest, d)) {
+    d.invisible.push_back(words);
+  }
+}
+
 // Gyros alone: nothing says where down is, so that only rest and a table's angles are left to hold them against.
 void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
   d.read_outs = judge_read_outs(input, poses, alpha);
@@ -153,7 +165,10 @@ void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<P
     d.gyro_bias_sigma[axis] = poses.size() > 1 ? std::sqrt(square / (n - 1.0) / n) : d.gyro_white_rms[axis];
     d.gyro_held_out_rms[axis] = poses.size() > 1 ? std::sqrt(square / n) * n / (n - 1.0) : 0.0;
   }
-  if (!poses.empty()) {
+  if (poses.size() < least_poses) {
+    add_rest(input, alpha, poses, d);
+  }
+  if (!poses.empty() && !d.rest) {
     d.supports.push_back("rest in " + counted(d.poses, "stop") + ": bias and noise of the gyros");
   }
   add_read_outs(input, d);
@@ -179,7 +194,10 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
     d.supports.push_back("gravity in " + std::to_string(d.poses) + " poses: accelerometers");
     add_invisible_of_accelerometers(d);
   } else {
-    d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise of the accelerometers");
+    add_rest(input, alpha, poses, d);
+    if (!d.rest) {
+      d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise of the accelerometers");
+    }
     d.invisible.push_back("bias, scale and misalignment of the accelerometers: fewer than 6 static poses: " +
                           std::to_string(d.poses));
   }
@@ -208,8 +226,7 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   if (!poses.empty()) {
     add_noise(input, poses, d);
   }
-  constexpr std::size_t least = 6;  // biases and scale factors
-  d.by_poses = poses.size() >= least && input.sensors != Sensors::gyros;
+  d.by_poses = poses.size() >= least_poses && input.sensors != Sensors::gyros;
   if (input.sensors == Sensors::gyros) {
     judge_gyros_alone(input, alpha, poses, d);
     return d;
@@ -220,16 +237,22 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   }
   constexpr double of_read_outs = 0.2;
   d.read_outs = judge_read_outs(input, poses, of_read_outs * alpha);
-  if (!d.by_poses && !d.read_outs) {
-    d.failure = "fewer than 6 static poses: " + std::to_string(poses.size());
+  const double left = (d.read_outs ? 1.0 - of_read_outs : 1.0) * alpha;
+  if (!d.by_poses) {
+    add_rest(input, left, poses, d);
+  }
+  if (!d.by_poses && !d.read_outs && !d.rest) {
+    d.failure = "fewer than 6 static poses: " + std::to_string(poses.size()) + ", and too little rest in them";
     return d;
   }
   if (d.by_poses) {
-    judge_poses(input, (d.read_outs ? 1.0 - of_read_outs : 1.0) * alpha, poses, d);
+    judge_poses(input, left, poses, d);
   } else {
     d.accel_adequate = true;
-    d.invisible.push_back("accelerometers, and gyros at rest: fewer than 6 static poses: " +
-                          std::to_string(poses.size()));
+    if (!d.rest) {
+      d.invisible.push_back("accelerometers, and gyros at rest: fewer than 6 static poses: " +
+                            std::to_string(poses.size()));
+    }
   }
   add_supports(input, d);
   return d;

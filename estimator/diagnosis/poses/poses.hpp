@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/poses/rest.hpp"
 #include "estimator/geometry/rotation.hpp"
 
 namespace selfcal::diagnosis {
@@ -24,9 +25,10 @@ struct PoseInput {
   std::vector<std::array<double, 3>> gyro,
       accel;  // raw, any unit; zero throughout of a triad that the log does not hold
   Sensors sensors = Sensors::both;
-  double gyro_unit = 1.0;            // nominal rad/s per raw unit
-  double accel_unit = 0.0;           // nominal m/s^2 per raw unit; 0: not known
-  std::vector<double> outer, inner;  // angle read-outs, rad; empty: none
+  double gyro_unit = 1.0;             // nominal rad/s per raw unit
+  double accel_unit = 0.0;            // nominal m/s^2 per raw unit; 0: not known
+  std::vector<double> outer, inner;   // angle read-outs, rad; empty: none
+  std::vector<double> temperature_c;  // empty: no channel
 };
 
 struct PoseEffect {
@@ -152,6 +154,7 @@ struct PoseDiagnosis {
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
   std::optional<ReadOuts> read_outs;
+  std::optional<Rest> rest;                        // of fewer poses than calibrate
   std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first
   std::string not_by_position;                     // why position at rest is no reference, if somebody asked
   std::vector<std::string> supports;               // what the recording is a reference for, in words

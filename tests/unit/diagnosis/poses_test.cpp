@@ -65,11 +65,24 @@ TEST(Poses, NamesNothingWhereNothingIs) {
   EXPECT_TRUE(d.gyro_named.empty());
 }
 
-TEST(Poses, RefusesARecordingWithoutPoses) {
+TEST(Poses, AnswersFivePosesByRest) {
   PoseInput input = hand_turned(Matrix3::Zero(), 3);
   input.time_s.resize(3000);
   input.gyro.resize(3000);
   input.accel.resize(3000);
+  const PoseDiagnosis d = diagnose_poses(input, 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  EXPECT_EQ(d.poses, 5);
+  EXPECT_FALSE(d.by_poses);
+  ASSERT_TRUE(d.rest);
+  EXPECT_FALSE(d.rest->drift_tested);
+}
+
+TEST(Poses, RefusesARecordingWithoutPoses) {
+  PoseInput input = hand_turned(Matrix3::Zero(), 3);
+  input.time_s.resize(900);  // 4 s, 2 s of a turn, 3 s: five blocks, and two constants
+  input.gyro.resize(900);
+  input.accel.resize(900);
   EXPECT_FALSE(diagnose_poses(input, 0.01).failure.empty());
 }
 

@@ -1,0 +1,164 @@
+#include "estimator/diagnosis/poses/rest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/diagnosis/poses/rest_drift.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+// Quantum of an axis: the smallest step of what steps at all. Noise that it hides leaves the mean off by
+// q / pi exp(-2 pi^2 (sigma/q)^2) at most (Widrow and Kollar 2008, the first term), any part of which is as likely as another.
+void add_quantum(const PoseInput& input, const std::vector<Pose>& poses, RestAxis& a) {
+  const auto& series = a.gyro ? input.gyro : input.accel;
+  const auto axis = static_cast<std::size_t>(a.axis);
+  std::vector<double> steps;
+  for (const Pose& p : poses) {
+    for (const auto& [first, last] : p.quiet) {
+      for (std::size_t i = first + 1; i < last; ++i) {
+        steps.push_back(std::abs(series[i][axis] - series[i - 1][axis]));
+      }
+    }
+  }
+  const double most = steps.empty() ? 0.0 : *std::max_element(steps.begin(), steps.end());
+  constexpr double rounding = 1e-6;
+  double least = HUGE_VAL, square = 0.0;
+  for (const double step : steps) {
+    square += 0.5 * step * step / static_cast<double>(steps.size());
+    least = step > rounding * most ? std::min(least, step) : least;
+  }
+  if (most <= 0.0) {
+    return;
+  }
+  constexpr double of_rounding = 1.0 / 12.0, visible = 0.01;
+  const double noise = std::max(0.0, square / (least * least) - of_rounding);  // variance, quanta
+  const double off = std::min(std::sqrt(of_rounding), std::exp(-2.0 * M_PI * M_PI * noise) / M_PI / M_SQRT2);
+  a.mean_sigma = std::hypot(a.mean_sigma, off * least);
+  a.quantum = off > visible ? least : 0.0;
+}
+
+// White noise shows where sigma sqrt(tau) is least: quanta and vibration lie above it at short times, slow noise at long ones.
+void add_allan(const std::vector<RestNoise>& noise, RestAxis& a) {
+  const auto axis = static_cast<std::size_t>(a.axis);
+  constexpr double enough = 8.0, many = 200.0;  // means that do not overlap: 25 % and 5 % of the deviation
+  double white = HUGE_VAL, least = HUGE_VAL;
+  double longest = 0.0;
+  for (const RestNoise& n : noise) {
+    if (n.freedom < enough && longest > 0.0) {
+      break;
+    }
+    if (n.freedom >= many || !std::isfinite(white)) {
+      white = std::min(white, n.deviation[axis] * std::sqrt(n.tau_s));
+    }
+    if (n.deviation[axis] < least) {
+      least = n.deviation[axis];
+      a.instability_tau_s = n.tau_s;
+    }
+  }
+  a.white_asd = std::isfinite(white) ? white : 0.0;
+  a.instability = std::isfinite(least) ? least : 0.0;
+  a.instability_is_bound = a.instability_tau_s == longest;
+}
+
+std::string with_number(const char* format, double value) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+bool names(const Rest& rest, bool gyro, bool of_temperature) {
+  return std::any_of(rest.axes.begin(), rest.axes.end(), [&](const RestAxis& a) {
+    return a.gyro == gyro && std::any_of(a.terms.begin(), a.terms.end(), [&](const RestTerm& t) {
+             return t.found.equation.of_temperature == of_temperature;
+           });
+  });
+}
+
+// The Earth turns by 15.04 deg/h, which the gyros' mean holds.
+std::string of_gyros(const Rest& rest) {
+  double square = 0.0, most_sigma = 0.0;
+  for (const RestAxis& a : rest.axes) {
+    if (a.gyro) {
+      square += a.mean * a.mean;
+      most_sigma = std::max(most_sigma, a.mean_sigma);
+    }
+  }
+  const double sigma = most_sigma / units::degree_per_hour;
+  constexpr double visible = 3.0;  // deg/h: a fifth of the Earth's rate
+  if (!rest.si) {
+    return "bias of the gyros apart from the Earth's rate: no unit and no north";
+  }
+  if (sigma > visible) {
+    return with_number("the Earth's 15.04 deg/h apart from a bias of the gyros known to %.2g", sigma);
+  }
+  return with_number("bias of the gyros apart from the Earth's rate (%.2f deg/h in all)",
+                     std::sqrt(square) / units::degree_per_hour);
+}
+
+}  // namespace
+
+std::optional<Rest> judge_rest(const PoseInput& input, const std::vector<Pose>& poses, double alpha,
+                               const PoseDiagnosis& d) {
+  if (poses.empty()) {
+    return std::nullopt;
+  }
+  const RestBlocks blocks = rest_blocks(input, poses);
+  constexpr Eigen::Index least = 5;
+  if (blocks.rows() < least + static_cast<Eigen::Index>(poses.size())) {
+    return std::nullopt;
+  }
+  Rest rest;
+  rest.si = input.accel_unit > 0.0;
+  rest.blocks = static_cast<int>(blocks.rows());
+  rest.block_s = blocks.times.block_s;
+  rest.has_channel = !input.temperature_c.empty();
+  rest.drift_tested = drift_is_asked(blocks);
+  if (blocks.temperature.size() > 0) {
+    rest.coldest = blocks.temperature.minCoeff();
+    rest.warmest = blocks.temperature.maxCoeff();
+  }
+  for (const bool gyro : {true, false}) {
+    for (int axis = 0; axis < 3 && input.sensors != (gyro ? Sensors::accelerometers : Sensors::gyros); ++axis) {
+      RestAxis a;
+      a.gyro = gyro;
+      a.axis = axis;
+      add_allan(gyro ? d.gyro_noise : d.accel_noise, a);
+      rest.axes.push_back(a);
+    }
+  }
+  judge_drift(blocks, alpha, rest.axes);
+  for (RestAxis& a : rest.axes) {
+    add_quantum(input, poses, a);
+    if (a.gyro || std::abs(a.mean) < 0.1 * blocks.accel.row(0).norm()) {  // a scale factor shows where gravity acts
+      for (RestTerm& t : a.terms) {
+        t.twins.clear();
+      }
+    }
+  }
+  return rest;
+}
+
+std::vector<std::string> undetermined_at_rest(const Rest& rest, const PoseDiagnosis& d) {
+  std::vector<std::string> all;
+  if (d.sensors == Sensors::both) {
+    all.emplace_back("scale factors, misalignment: six poses and turns between them");
+    all.emplace_back("bias of the accelerometers: where gravity points in them is not known");
+    all.push_back(of_gyros(rest));
+  }
+  if (names(rest, false, true) || names(rest, false, false)) {
+    all.emplace_back("drift of accelerometers or tilt of the base: 1 mg is 0.057 deg");
+  }
+  if (!rest.has_channel) {
+    all.emplace_back("the temperature's part: the log has no such channel");
+  } else if (!rest.coldest) {
+    all.emplace_back("the temperature's part: its channel moves by no more than its noise");
+  } else if (!rest.drift_tested) {
+    all.emplace_back("drift: too short a rest");
+  }
+  return all;
+}
+
+}  // namespace selfcal::diagnosis
