@@ -123,6 +123,13 @@ struct Diagnosis {
   ParameterMatrix covariance;  // of value
 };
 
+// Nothing turned, and the position departs by more than noise of the model does: what changes is asked of the log as one that
+// stands (poses/rest.hpp).
+inline bool wanders_at_rest(const Diagnosis& d) {
+  constexpr double least = 0.5, most = 2.0;  // NIS
+  return d.nothing_turned && (d.before.nis < least || d.before.nis > most);
+}
+
 struct DiagnosisOutcome {
   std::optional<Diagnosis> diagnosis;
   std::string failure;

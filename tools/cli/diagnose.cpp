@@ -331,6 +331,9 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
   if (!diagnosis.faults.empty()) {
     return tell_faults(arguments, diagnosis, (*opened)->file);
   }
+  if (wanders_at_rest(diagnosis)) {
+    return diagnose_by_poses(arguments, **opened, "nothing turned, and its readings change by more than white noise");
+  }
   const Expected<std::vector<diagnosis::Diagnosis>> of_others = diagnose_each(*others, options, arguments.strict);
   if (!of_others) {
     return tl::unexpected(of_others.error());
