@@ -129,7 +129,9 @@ std::optional<Rest> judge_rest(const PoseInput& input, const std::vector<Pose>& 
       rest.axes.push_back(a);
     }
   }
-  judge_drift(blocks, alpha, rest.axes);
+  constexpr double of_promised =
+      0.5;  // the noise is of no grid: half of what is promised, as in the diagnosis elsewhere
+  judge_drift(blocks, of_promised * alpha, rest.axes);
   for (RestAxis& a : rest.axes) {
     add_quantum(input, poses, a);
     if (a.gyro || std::abs(a.mean) < 0.1 * blocks.accel.row(0).norm()) {  // a scale factor shows where gravity acts

@@ -13,9 +13,11 @@ namespace {
 constexpr std::array flicker_variances = {0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0};
 constexpr std::array walk_variances = {0.0, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 10.0, 100.0};  // in a block
 
-// A density of zero is as likely beforehand as all others together: many sensors show white noise only.
+// A density of zero is half as likely beforehand as all others together: few sensors show white noise only. With as likely a zero,
+// tests/rest finds false alarms in 15 of 1000 logs; with one that is no likelier than another point, means in 98 % of their intervals.
 double log_prior(double variance, std::size_t points) {
-  return variance > 0.0 ? -std::log(static_cast<double>(points - 1)) : 0.0;
+  constexpr double of_zero = 0.5;
+  return variance > 0.0 ? -std::log(static_cast<double>(points - 1)) : std::log(of_zero);
 }
 
 // (N2)
@@ -139,7 +141,8 @@ SlowNoise::Answer SlowNoise::ask(const std::vector<Eigen::Index>& known, Eigen::
   a.log_p = std::min(0.0, log_of_sum(tails));
   a.walk = walks / with;
   a.walk_sigma = std::sqrt(std::max(0.0, walk_square / with - a.walk * a.walk));
-  a.walk_odds = std::log(with) - std::log(std::max(1.0 - with, 1e-300));
+  constexpr double prior_odds = 2.0;  // log_prior
+  a.walk_odds = std::log(with / prior_odds) - std::log(std::max(1.0 - with, 1e-300));
   return a;
 }
 
