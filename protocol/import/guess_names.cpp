@@ -341,6 +341,12 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     column.axis = -1;
     column.role = single_role(words);
   }
+  // "T_C", "T [K]": a t with a unit of temperature is no time.
+  const bool thermal = column.unit.empty() ? words.size() == 2 && is_one_of(words, {"c", "k", "f"})
+                                           : column.unit == "C" || column.unit == "K" || column.unit == "F";
+  if (column.role == Role::time && thermal && is_one_of(words, {"t"})) {
+    column.role = Role::temperature;
+  }
   if (column.role == Role::temperature && column.unit.empty()) {
     column.unit = unit_among(words, {{"c", "C"}, {"k", "K"}, {"f", "F"}});
   }

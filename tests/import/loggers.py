@@ -101,6 +101,7 @@ LOGGERS = [
     Logger("Shimmer Consensys", "\t", "Shimmer_8665_Timestamp_Unix_CAL\tShimmer_8665_Accel_LN_X_CAL\tShimmer_8665_Accel_LN_Y_CAL\tShimmer_8665_Accel_LN_Z_CAL\t"
            "Shimmer_8665_Gyro_X_CAL\tShimmer_8665_Gyro_Y_CAL\tShimmer_8665_Gyro_Z_CAL\nms\tm/(s^2)\tm/(s^2)\tm/(s^2)\tdeg/s\tdeg/s\tdeg/s",
            "t.ms.1709164800 a.m/s^2 g.deg/s"),
+    Logger("a chamber's own", ",", "t_s,T_C,wx_dps,wy_dps,wz_dps,ax_g,ay_g,az_g", "t.s T.C g.deg/s a.g"),
     Logger("MATLAB writetable", ",", "Time,Acc_1,Acc_2,Acc_3,Gyr_1,Gyr_2,Gyr_3", "t.s a.m/s^2 g.rad/s"),
     Logger("rostopic echo -p", ",", "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.orientation.x,field.orientation.y,field.orientation.z,"
            "field.orientation.w,field.orientation_covariance0,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,"
