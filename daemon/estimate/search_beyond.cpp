@@ -25,7 +25,8 @@ tl::expected<BeyondSearch, std::string> search_beyond(std::span<const discovery:
       return BeyondSearch{std::move(both->rest), std::move(both->laws)};
     }
   }
-  BeyondSearch answer{std::move(*rest), search.told()};
+  discovery::Discovery told = search.told();
+  BeyondSearch answer{std::move(*rest), std::move(told)};
   replace_process(first, answer.found);
   if (unit.size() == 1 &&
       discovery::say_what_was_rejected(answer.rest.recordings().front(), first, answer.found, of_laws.stop)) {
