@@ -175,8 +175,8 @@ std::vector<std::function<std::optional<Laws>()>> guesses(const Together& togeth
   const auto of_gyros = [&](std::size_t k) { return alone.terms[k].axis < 3; };
   const Laws gyros = alone.where(of_gyros), accelerometers = alone.where([&](std::size_t k) { return !of_gyros(k); });
   if (!gyros.terms.empty() && !accelerometers.terms.empty()) {
-    all.emplace_back([gyros] { return gyros; });
-    all.emplace_back([accelerometers] { return accelerometers; });
+    all.emplace_back([gyros] { return std::optional(gyros); });
+    all.emplace_back([accelerometers] { return std::optional(accelerometers); });
   } else if (alone.terms.size() == 2) {
     all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 0; }); });
     all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 1; }); });
