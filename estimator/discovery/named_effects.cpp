@@ -28,8 +28,6 @@ bool can_hold(const diagnosis::Effect& effect, const ImuData& data) {
          (!effect.needs_gimbal || has_angles);
 }
 
-double square_of(const diagnosis::ModelEffect& m) { return m.size.dot(m.covariance.ldlt().solve(m.size)); }
-
 // The effect where each recording that named it has it; where another can hold it, that of the recording that shows it best.
 UnitEffect on_unit(const diagnosis::Effect* effect, std::span<const DiagnosedRecording> unit) {
   const diagnosis::ModelEffect* best = nullptr;
@@ -67,6 +65,8 @@ std::vector<const diagnosis::Effect*> to_be_taken_out(std::span<const DiagnosedR
 }
 
 }  // namespace
+
+double square_of(const diagnosis::ModelEffect& m) { return m.size.dot(m.covariance.ldlt().solve(m.size)); }
 
 tl::expected<UnexplainedRest, std::string> UnexplainedRest::of(std::span<const DiagnosedRecording> unit,
                                                                const std::stop_token& stop) {

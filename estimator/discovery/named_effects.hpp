@@ -15,6 +15,9 @@
 
 namespace selfcal::discovery {
 
+// How much an effect is seen: its sizes' square in sigmas.
+double square_of(const diagnosis::ModelEffect& effect);
+
 // A recording and what the catalogue says of it. Both must outlive it.
 struct DiagnosedRecording {
   const ImuData& data;

@@ -1,6 +1,5 @@
 #include "estimator/discovery/names_beside_laws.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -151,9 +150,9 @@ class Together {
 
 // The strongest of the equations that were rejected.
 const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
-  const auto square = [](const ModelEffect& m) { return m.size.dot(m.covariance.ldlt().solve(m.size)); };
-  const auto found = std::max_element(
-      names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) { return square(a) < square(b); });
+  const auto found = std::max_element(names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) {
+    return square_of(a) < square_of(b);
+  });
   return found == names.end() ? nullptr : &*found;
 }
 
