@@ -56,7 +56,8 @@ class LawSearch::Search {
         scenes_(scenes_of(recordings)),
         sums_(said("pieces of the recording", [&] { return sum_scenes(); })),
         dictionary_(said("functions", [&] { return make_dictionary(sums_, available_in_all()); })),
-        model_(std::make_unique<PieceModel>(sums_, dictionary_)),
+        information_(std::make_shared<const PieceInformation>(sums_.sums.information, dictionary_)),
+        model_(model_of_sums()),
         shortlist_(sums_, dictionary_) {
     laws_on_ = laws_on(scenes_);
     result_.misfit_before = sums_.sums.square - sums_.sums.rows;
@@ -174,6 +175,11 @@ class LawSearch::Search {
     return join(std::move(all));
   }
 
+  // Of the residual that sums_ has now.
+  std::unique_ptr<PieceModel> model_of_sums() const {
+    return std::make_unique<PieceModel>(sums_, dictionary_, information_);
+  }
+
   laws::VariableSet available_in_all() const {
     laws::VariableSet available = scenes_.front()->motion.available();
     for (const auto& scene : scenes_) {
@@ -199,7 +205,7 @@ class LawSearch::Search {
     raw_model_ = std::move(model_);
     sums_.sums.score = settled.sums.score;
     sums_.sums.square = settled.sums.square;
-    model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+    model_ = model_of_sums();
     choose(state_.terms.size());
   }
 
@@ -213,14 +219,14 @@ class LawSearch::Search {
       sums_.sums.square = raw_square_;
       raw_model_.reset();
     }
-    model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+    model_ = model_of_sums();
     take_processes();
     take_laws();
     if (state_.processes.empty() || log_posterior() < laws_first_posterior) {
       state_ = laws_first;
       if (state_.processes.empty()) {
         // What may stand in a law's place is asked of the recording with no process in it.
-        model_ = std::make_unique<PieceModel>(sums_, dictionary_);
+        model_ = model_of_sums();
         choose(state_.terms.size());
       }
     }
@@ -443,6 +449,7 @@ class LawSearch::Search {
   std::vector<LawRecording> laws_on_;  // the same, for fits
   PieceSums sums_;                     // of all of them
   Dictionary dictionary_;
+  std::shared_ptr<const PieceInformation> information_;  // of sums_
   std::unique_ptr<PieceModel> model_;
   std::unique_ptr<PieceModel> raw_model_;  // of the recording with its laws, once settle() took them out
   Shortlist shortlist_;

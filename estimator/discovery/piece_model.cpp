@@ -1,9 +1,9 @@
 #include "estimator/discovery/piece_model.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace selfcal::discovery {
 namespace {
@@ -16,33 +16,72 @@ constexpr double least_left = 1e-4;
 
 double cost_of_phase(double gain) { return 0.5 * std::log(2.0 * std::numbers::pi * std::max(1.0, gain)); }
 
-PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
-    : sums_(sums),
-      dictionary_(dictionary),
-      information_(sums.sums.information),
-      score_(sums.sums.score),
-      square_(sums.sums.square),
-      raw_square_(sums.sums.square) {
+PieceInformation::PieceInformation(Eigen::MatrixXd information, const Dictionary& dictionary)
+    : all(std::move(information)) {
   for (int axis = 0; axis < axis_count; ++axis) {
-    prepare(axis);
+    of_axis(axis, dictionary);
   }
 }
 
-void PieceModel::prepare(int axis) {
-  const auto n = static_cast<Eigen::Index>(sums_.pieces.size());
-  const auto rows = Eigen::seqN(axis, n, axis_count);
-  const Eigen::MatrixXd& D = dictionary_.means;
+void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
+  const auto rows = Eigen::seqN(axis, all.rows() / axis_count, axis_count);
+  const Eigen::MatrixXd& D = dictionary.means;
   const auto f = static_cast<std::size_t>(axis);
-  own_information_[f] = information_(rows, rows);
-  const Eigen::MatrixXd image = own_information_[f] * D;
-  function_information_[f] = (D.array() * image.array()).colwise().sum().transpose();
-  function_score_[f] = D.transpose() * own_score(axis);
-  partner_information_[f] = Eigen::VectorXd::Zero(D.cols());
+  own[f] = all(rows, rows);
+  const Eigen::MatrixXd image = own[f] * D;
+  function[f] = (D.array() * image.array()).colwise().sum().transpose();
+  partner[f] = Eigen::VectorXd::Zero(D.cols());
   for (Eigen::Index k = 0; k < D.cols(); ++k) {
-    const int partner = dictionary_.functions[static_cast<std::size_t>(k)].partner;
-    if (partner >= 0) {
-      partner_information_[f](k) = D.col(k).dot(image.col(partner));
+    const int p = dictionary.functions[static_cast<std::size_t>(k)].partner;
+    if (p >= 0) {
+      partner[f](k) = D.col(k).dot(image.col(p));
     }
+  }
+}
+
+std::shared_ptr<const PieceInformation> PieceInformation::less(const Eigen::MatrixXd& W,
+                                                               const Dictionary& dictionary) const {
+  Eigen::MatrixXd rest = all;
+  rest.selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
+  rest.triangularView<Eigen::StrictlyUpper>() = rest.transpose();
+  const Eigen::Index pieces = all.rows() / axis_count;
+  if (W.cols() >= pieces / 2) {
+    return std::make_shared<const PieceInformation>(std::move(rest), dictionary);
+  }
+  auto lower = std::make_shared<PieceInformation>(*this);
+  lower->all = std::move(rest);
+  for (int axis = 0; axis < axis_count; ++axis) {
+    const auto rows = Eigen::seqN(axis, pieces, axis_count);
+    const auto f = static_cast<std::size_t>(axis);
+    lower->own[f] = lower->all(rows, rows);
+    const Eigen::MatrixXd of_own = W(rows, Eigen::all);
+    const Eigen::MatrixXd taken = of_own.transpose() * dictionary.means;
+    lower->function[f] -= taken.colwise().squaredNorm().transpose();
+    for (Eigen::Index k = 0; k < taken.cols(); ++k) {
+      const int p = dictionary.functions[static_cast<std::size_t>(k)].partner;
+      lower->partner[f](k) -= p >= 0 ? taken.col(k).dot(taken.col(p)) : 0.0;
+    }
+  }
+  return lower;
+}
+
+PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
+    : PieceModel(sums, dictionary, std::make_shared<const PieceInformation>(sums.sums.information, dictionary)) {}
+
+PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary,
+                       std::shared_ptr<const PieceInformation> information)
+    : sums_(sums),
+      dictionary_(dictionary),
+      information_(std::move(information)),
+      score_(sums.sums.score),
+      square_(sums.sums.square),
+      raw_square_(sums.sums.square) {
+  score_functions();
+}
+
+void PieceModel::score_functions() {
+  for (int axis = 0; axis < axis_count; ++axis) {
+    function_score_[static_cast<std::size_t>(axis)] = dictionary_.means.transpose() * own_score(axis);
   }
 }
 
@@ -57,7 +96,7 @@ void PieceModel::choose(const std::vector<Eigen::VectorXd>& columns) {
   for (std::size_t k = 0; k < columns.size(); ++k) {
     chosen_.col(static_cast<Eigen::Index>(k)) = columns[k];
   }
-  chosen_image_ = information_ * chosen_;
+  chosen_image_ = information_->all * chosen_;
   Eigen::MatrixXd A = chosen_.transpose() * chosen_image_;
   A.diagonal() *= 1.0 + 1e-9;
   chosen_solver_.compute(A);
@@ -69,17 +108,16 @@ void PieceModel::choose(const std::vector<Eigen::VectorXd>& columns) {
 }
 
 void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
-  const Eigen::MatrixXd image = information_ * X;
+  const Eigen::MatrixXd image = information_->all * X;
   Eigen::MatrixXd A = X.transpose() * image;
   A.diagonal().array() += 1.0 / q;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(A);
-  const Eigen::VectorXd b = X.transpose() * score_;
-  information_ -= image * solver.solve(image.transpose());
-  score_ -= image * solver.solve(b);
-  raw_square_ -= b.dot(solver.solve(b));
-  for (int axis = 0; axis < axis_count; ++axis) {
-    prepare(axis);
-  }
+  const Eigen::LLT<Eigen::MatrixXd> root(A);
+  const Eigen::MatrixXd W = root.matrixL().solve(image.transpose()).transpose();
+  const Eigen::VectorXd b = root.matrixL().solve(X.transpose() * score_);
+  information_ = information_->less(W, dictionary_);
+  score_ -= W * b;
+  raw_square_ -= b.squaredNorm();
+  score_functions();
   std::vector<Eigen::VectorXd> again;
   for (Eigen::Index k = 0; k < chosen_.cols(); ++k) {
     again.emplace_back(chosen_.col(k));
@@ -88,7 +126,7 @@ void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
 }
 
 std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const Eigen::MatrixXd& means) const {
-  Eigen::MatrixXd G = means.transpose() * (own_information_[static_cast<std::size_t>(axis)] * means);
+  Eigen::MatrixXd G = means.transpose() * (information_->own[static_cast<std::size_t>(axis)] * means);
   Eigen::VectorXd b = means.transpose() * own_score(axis);
   if (chosen_.cols() > 0) {
     const Eigen::MatrixXd cross = own_image(axis).transpose() * means;
@@ -102,7 +140,7 @@ double PieceModel::gain(int axis, const Eigen::MatrixXd& means) const {
   const auto [G, b] = project(axis, means);
   for (Eigen::Index k = 0; k < b.size(); ++k) {
     const auto column = means.col(k);
-    const double before = column.dot(own_information_[static_cast<std::size_t>(axis)] * column);
+    const double before = column.dot(information_->own[static_cast<std::size_t>(axis)] * column);
     if (G(k, k) < least_left * before || G(k, k) <= 0.0) {
       return 0.0;
     }
@@ -116,8 +154,8 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
   const Eigen::MatrixXd& D = dictionary_.means;
   for (int axis = 0; axis < axis_count; ++axis) {
     const auto f = static_cast<std::size_t>(axis);
-    Eigen::VectorXd information = function_information_[f], score = function_score_[f],
-                    partner = partner_information_[f];
+    Eigen::VectorXd information = information_->function[f], score = function_score_[f],
+                    partner = information_->partner[f];
     if (chosen_.cols() > 0) {
       const Eigen::MatrixXd cross = own_image(axis).transpose() * D;
       const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
@@ -128,7 +166,7 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
         partner(k) -= p >= 0 ? cross.col(k).dot(solved.col(p)) : 0.0;
       }
     }
-    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * function_information_[f](k); };
+    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * information_->function[f](k); };
     for (Eigen::Index k = 0; k < D.cols(); ++k) {
       const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
       if (function.second || !seen(k)) {

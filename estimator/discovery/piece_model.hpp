@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "estimator/discovery/dictionary.hpp"
@@ -21,11 +22,29 @@ struct Ranked {
 // What a phase that is fitted costs in the logarithm of the odds: all of 2 pi before the data, 1/sqrt(gain) rad after them.
 double cost_of_phase(double gain);
 
+// The information of the normal equations over the pieces and that of every function of the dictionary in them. It takes a product
+// of the size pieces^2 x functions, and belongs to all models of the recording whatever its residual is.
+struct PieceInformation {
+  PieceInformation(Eigen::MatrixXd information, const Dictionary& dictionary);
+  // Columns X become random: W = G X L'^-1, L L' = X'G X + I/q, is taken off (Woodbury).
+  std::shared_ptr<const PieceInformation> less(const Eigen::MatrixXd& W, const Dictionary& dictionary) const;
+
+  Eigen::MatrixXd all;
+  std::array<Eigen::MatrixXd, axis_count> own;  // [pieces x pieces] blocks of one axis
+  // Of every function on every axis before projection; of a wave with its partner.
+  std::array<Eigen::VectorXd, axis_count> function, partner;
+
+ private:
+  void of_axis(int axis, const Dictionary& dictionary);
+};
+
 // Normal equations over the pieces. Laws are vectors over pieces and axes; what was chosen is projected out, what is a
 // random process is integrated out.
 class PieceModel {
  public:
   PieceModel(const PieceSums& sums, const Dictionary& dictionary);
+  // `information`: of these sums.
+  PieceModel(const PieceSums& sums, const Dictionary& dictionary, std::shared_ptr<const PieceInformation> information);
 
   // The function on the axis as a vector over all columns of the sums.
   Eigen::VectorXd column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const;
@@ -44,7 +63,7 @@ class PieceModel {
   double square() const { return square_; }  // of the residuals, the chosen ones' gain taken off
 
  private:
-  void prepare(int axis);
+  void score_functions();
   Eigen::VectorXd own_score(int axis) const { return score_(Eigen::seqN(axis, sums_.piece_dt.size(), axis_count)); }
   // Rows of one axis of the chosen ones' image.
   Eigen::MatrixXd own_image(int axis) const {
@@ -53,15 +72,13 @@ class PieceModel {
 
   const PieceSums& sums_;
   const Dictionary& dictionary_;
-  Eigen::MatrixXd information_;
+  std::shared_ptr<const PieceInformation> information_;
   Eigen::VectorXd score_;
   double square_ = 0.0, raw_square_ = 0.0;
   Eigen::MatrixXd chosen_, chosen_image_;  // X, G X
   Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
   Eigen::VectorXd chosen_score_;
-  std::array<Eigen::MatrixXd, axis_count> own_information_;  // [pieces x pieces] blocks of one axis
-  // Of every function on every axis before projection; of a wave with its partner.
-  std::array<Eigen::VectorXd, axis_count> function_information_, partner_information_, function_score_;
+  std::array<Eigen::VectorXd, axis_count> function_score_;  // of every function on every axis before projection
 };
 
 }  // namespace selfcal::discovery

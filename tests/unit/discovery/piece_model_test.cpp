@@ -1,0 +1,103 @@
+// Gains over the pieces beside the covariance of the data written out, a random process in it.
+#include "estimator/discovery/piece_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <map>
+#include <utility>
+
+namespace selfcal::discovery {
+namespace {
+
+constexpr Eigen::Index pieces = 8, rows = 100, columns = pieces * axis_count;
+constexpr double q = 0.7;
+
+// Uniform numbers that are the same on every machine.
+Eigen::MatrixXd drawn(Eigen::Index m, Eigen::Index n, unsigned seed) {
+  Eigen::MatrixXd A(m, n);
+  for (double& x : A.reshaped()) {
+    seed = 1664525U * seed + 1013904223U;
+    x = static_cast<double>(seed >> 8U) / 16777216.0 - 0.5;
+  }
+  return A;
+}
+
+struct Drawn {
+  Eigen::MatrixXd Z = drawn(rows, columns, 1);
+  Eigen::VectorXd r = drawn(rows, 1, 2);
+  PieceSums sums;
+  Dictionary dictionary;
+
+  Drawn() {
+    sums.piece_dt = Eigen::VectorXd::Constant(pieces, 60.0);
+    sums.pieces.resize(static_cast<std::size_t>(pieces));
+    sums.sums.information = Z.transpose() * Z;
+    sums.sums.score = Z.transpose() * r;
+    sums.sums.square = r.squaredNorm();
+    dictionary.means = drawn(pieces, 4, 3);
+    dictionary.functions.resize(4);
+    dictionary.functions[1].partner = 2;  // a wave
+    dictionary.functions[2].second = true;
+  }
+  // Fall of the square of the data's residual, weighted by their covariance, by functions of one axis.
+  double gain(const Eigen::MatrixXd& covariance, int axis, const Eigen::MatrixXd& functions) const {
+    const Eigen::MatrixXd of_axis = Z(Eigen::all, Eigen::seqN(axis, pieces, axis_count));
+    const Eigen::MatrixXd signatures = of_axis * functions;
+    const Eigen::MatrixXd weighted = covariance.inverse() * signatures;
+    const Eigen::VectorXd b = weighted.transpose() * r;
+    return b.dot((signatures.transpose() * weighted).ldlt().solve(b));
+  }
+};
+
+void expect_gains(const Drawn& d, const PieceModel& model, const Eigen::MatrixXd& covariance) {
+  std::map<std::pair<int, int>, double> gains;
+  for (const Ranked& ranked : model.rank(100)) {
+    gains[{ranked.axis, ranked.function}] = ranked.gain;
+  }
+  ASSERT_EQ(gains.size(), 3U * axis_count);  // a wave's cosine is no function by itself
+  const Eigen::MatrixXd& D = d.dictionary.means;
+  for (int axis = 0; axis < axis_count; ++axis) {
+    EXPECT_NEAR((gains[{axis, 0}]), d.gain(covariance, axis, D.col(0)), 1e-9);
+    EXPECT_NEAR((gains[{axis, 1}]), d.gain(covariance, axis, D.middleCols(1, 2)), 1e-9);
+    EXPECT_NEAR((gains[{axis, 3}]), d.gain(covariance, axis, D.col(3)), 1e-9);
+  }
+  EXPECT_NEAR(model.square(), d.r.dot(covariance.inverse() * d.r), 1e-9);
+}
+
+TEST(PieceModel, RanksByTheFallOfTheSquare) {
+  const Drawn d;
+  expect_gains(d, PieceModel(d.sums, d.dictionary), Eigen::MatrixXd::Identity(rows, rows));
+}
+
+// A process of few columns is taken off the functions' information, with one of many it is reckoned anew.
+TEST(PieceModel, IntegratesAProcessOut) {
+  const Drawn d;
+  for (const Eigen::Index count : {2, 3, 6}) {
+    const Eigen::MatrixXd X = drawn(columns, count, 4);
+    PieceModel model(d.sums, d.dictionary);
+    model.integrate_out(X, q);
+    const Eigen::MatrixXd random = d.Z * X;
+    expect_gains(d, model, Eigen::MatrixXd::Identity(rows, rows) + q * random * random.transpose());
+    model.integrate_out(drawn(columns, 2, 5), q);  // and another one beside it
+    const Eigen::MatrixXd more = d.Z * drawn(columns, 2, 5);
+    expect_gains(d, model,
+                 Eigen::MatrixXd::Identity(rows, rows) + q * random * random.transpose() + q * more * more.transpose());
+  }
+}
+
+// Models of one information have residuals of their own.
+TEST(PieceModel, SharesTheInformationOfARecording) {
+  Drawn d;
+  const auto information = std::make_shared<const PieceInformation>(d.sums.sums.information, d.dictionary);
+  PieceModel first(d.sums, d.dictionary, information);
+  first.integrate_out(drawn(columns, 2, 4), q);
+  d.r = drawn(rows, 1, 6);
+  d.sums.sums.score = d.Z.transpose() * d.r;
+  d.sums.sums.square = d.r.squaredNorm();
+  expect_gains(d, PieceModel(d.sums, d.dictionary, information), Eigen::MatrixXd::Identity(rows, rows));
+}
+
+}  // namespace
+}  // namespace selfcal::discovery
