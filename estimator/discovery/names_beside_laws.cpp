@@ -51,18 +51,26 @@ struct Laws {
   }
 };
 
-double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
+double of_a_coefficient(double rows) { return std::log(std::max(2.0, rows)); }
+
+double cost_of_laws(std::size_t laws, double rows) {
+  return (of_a_law + of_a_coefficient(rows)) * static_cast<double>(laws);
+}
+
+double cost_of_names(const std::vector<ModelEffect>& names, double rows) {
   constexpr double counts = 3.0;
-  const double of_a_coefficient = std::log(std::max(2.0, found.rows));
-  // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
-  double cost = std::max(0.0, found.misfit_after);
-  cost += (of_a_law + of_a_coefficient) * static_cast<double>(found.fit.terms.size());
-  cost += of_a_law * static_cast<double>(found.processes.size());
+  double cost = 0.0;
   for (const ModelEffect& name : names) {
     const Eigen::ArrayXd z = name.size.array().abs() / name.covariance.diagonal().array().sqrt();
-    cost += of_a_name + of_a_coefficient * static_cast<double>(std::max<Eigen::Index>(1, (z > counts).count()));
+    cost += of_a_name + of_a_coefficient(rows) * static_cast<double>(std::max<Eigen::Index>(1, (z > counts).count()));
   }
   return cost;
+}
+
+double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
+  // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
+  return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
+         of_a_law * static_cast<double>(found.processes.size()) + cost_of_names(names, found.rows);
 }
 
 class Together {
@@ -114,8 +122,9 @@ class Together {
     return std::move(outcome.diagnosis);
   }
 
-  // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them.
-  std::optional<NamesBesideLaws> answer(const Diagnosis& of_rest) const {
+  // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them: no more of them than
+  // `most_laws`, names and laws cheaper than `most_cost`.
+  std::optional<NamesBesideLaws> answer(const Diagnosis& of_rest, std::size_t most_laws, double most_cost) const {
     Diagnosis named = diagnosis_;
     named.findings = of_rest.findings;
     named.model = of_rest.model;
@@ -133,8 +142,15 @@ class Together {
     if (!rest) {
       return std::nullopt;
     }
-    Discovery laws = discover(rest->recordings(), of_laws_, progress_);
-    if (laws.laws.empty() && laws.described.empty()) {
+    LawSearch search(rest->recordings(), of_laws_, progress_);
+    const auto stands = [&](const Discovery& found) {
+      return found.fit.terms.size() <= most_laws && cost_of(found, named.model) < most_cost;
+    };
+    if (!stands(search.fitted())) {
+      return std::nullopt;
+    }
+    Discovery laws = search.told();
+    if ((laws.laws.empty() && laws.described.empty()) || !stands(laws)) {
       return std::nullopt;
     }
     return NamesBesideLaws{std::move(named), std::move(*rest), std::move(laws)};
@@ -209,10 +225,12 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
     }
     tried.push_back(laws->forms());
     const std::optional<Diagnosis> of_rest = together.without(*laws);
-    auto both = of_rest ? together.answer(*of_rest) : std::nullopt;
+    // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further.
+    if (!of_rest || cost_of_laws(laws->terms.size(), alone.rows) + cost_of_names(of_rest->model, alone.rows) >= least) {
+      continue;
+    }
     // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
-    if (both && both->laws.fit.terms.size() <= laws->terms.size() &&
-        cost_of(both->laws, both->diagnosis.model) < least) {
+    if (auto both = together.answer(*of_rest, laws->terms.size(), least)) {
       return both;
     }
   }
