@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -40,14 +41,15 @@ class Changes {
  public:
   explicit Changes(const ExperimentLimits& limits) : limits_(limits) {}
 
-  // One position elsewhere, some time of one dwell given to another, or another rate of the turns, the dwells giving the time; the
-  // plan itself where that cannot be.
-  Schedule change(Schedule plan) {
+  // One position elsewhere, some time of one dwell given to another, or another rate of the turns, the dwells giving the time; none
+  // where that cannot be.
+  std::optional<Schedule> change(Schedule plan) {
     const auto count = static_cast<int>(plan.positions.size());
     const int what = below(8);
     if (what == 0) {
-      turn_at_another_rate(plan);
-    } else if (what < 6) {
+      return at_another_rate(std::move(plan));
+    }
+    if (what < 6) {
       const std::size_t k = 1U + static_cast<std::size_t>(below(count - 1));
       GimbalPosition to = plan.positions[k];
       double& angle = below(2) == 0 ? to.outer_deg : to.inner_deg;
@@ -56,31 +58,35 @@ class Changes {
       const bool within = std::abs(to.outer_deg) <= farthest_deg && std::abs(to.inner_deg) <= farthest_deg;
       const bool from_before = can_move(plan.positions[k - 1], to);
       const bool to_next = k + 1 == plan.positions.size() || can_move(to, plan.positions[k + 1]);
-      if (within && from_before && to_next) {
-        plan.positions[k] = to;
+      if (!within || !from_before || !to_next) {
+        return std::nullopt;
       }
+      plan.positions[k] = to;
     } else {
       const auto from = static_cast<std::size_t>(below(count)), to = static_cast<std::size_t>(below(count));
-      if (plan.dwell_s[from] - dwell_step_s >= least_dwell_s) {
-        plan.dwell_s[from] -= dwell_step_s;
-        plan.dwell_s[to] += dwell_step_s;
+      if (from == to || plan.dwell_s[from] - dwell_step_s < least_dwell_s) {
+        return std::nullopt;
       }
+      plan.dwell_s[from] -= dwell_step_s;
+      plan.dwell_s[to] += dwell_step_s;
     }
     return plan;
   }
 
  private:
-  void turn_at_another_rate(Schedule& plan) {
+  std::optional<Schedule> at_another_rate(Schedule plan) {
     const double rotation_s = limits_.rotation_s * turn_times[static_cast<std::size_t>(below(turn_times.size()))];
     const double less_s = (rotation_s - plan.rotation_s) * static_cast<double>(plan.dwell_s.size() - 1) /
                           static_cast<double>(plan.dwell_s.size());
     const double shortest = *std::min_element(plan.dwell_s.begin(), plan.dwell_s.end());
-    if (shortest - less_s >= least_dwell_s) {
-      plan.rotation_s = rotation_s;
-      for (double& dwell : plan.dwell_s) {
-        dwell = std::floor(dwell - less_s);
-      }
+    if (rotation_s == plan.rotation_s || shortest - less_s < least_dwell_s) {
+      return std::nullopt;
     }
+    plan.rotation_s = rotation_s;
+    for (double& dwell : plan.dwell_s) {
+      dwell = std::floor(dwell - less_s);
+    }
+    return plan;
   }
 
   int below(std::size_t n) { return below(static_cast<int>(n)); }
@@ -110,10 +116,10 @@ RatedPlan search_plan(const ExperimentLimits& limits, double merit_now,
       if (k >= drawn_plans && here.plan.positions.empty()) {
         break;
       }
-      RatedPlan next{k < drawn_plans ? drawn(shorter, k) : changed.change(here.plan), 0.0};
-      next.merit = merit(next.plan);
-      if (next.merit > here.merit) {
-        here = std::move(next);
+      std::optional<Schedule> next = k < drawn_plans ? drawn(shorter, k) : changed.change(here.plan);
+      const double merit_then = next ? merit(*next) : 0.0;
+      if (merit_then > here.merit) {
+        here = {std::move(*next), merit_then};
       }
     }
     if (here.merit > best.merit + worth_longer) {

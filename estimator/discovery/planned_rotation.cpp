@@ -10,7 +10,7 @@
 namespace selfcal::discovery {
 namespace {
 
-constexpr double planning_rate_hz = 20.0;
+constexpr double planning_rate_hz = 10.0;
 
 }  // namespace
 
