@@ -20,6 +20,7 @@ using discovery::ProcessKind;
 using nlohmann::ordered_json;
 
 constexpr std::size_t most_told = 3;  // equations in a sentence
+constexpr double worth_a_word = 0.1;  // odds of another explanation, in a verdict
 constexpr double sure = 0.9;          // that an equation holds on another plan; below it the verdict counts its rivals
 
 bool leaves_noise(const Discovery& found) { return found.misfit_after < 3.0 * std::sqrt(2.0 * found.rows); }
@@ -29,9 +30,10 @@ std::string process_unit(const DiscoveredProcess& p) {
 }
 
 // "accel_y and accel_z take a new offset at each turn"
-std::string processes_words(const Discovery& found, ProcessKind kind, const char* one, const char* several) {
+std::string processes_words(const std::vector<DiscoveredProcess>& processes, ProcessKind kind, const char* one,
+                            const char* several) {
   std::vector<std::string_view> axes;
-  for (const DiscoveredProcess& p : found.processes) {
+  for (const DiscoveredProcess& p : processes) {
     if (p.kind == kind) {
       axes.push_back(name_of_axis(p.axis));
     }
@@ -43,6 +45,16 @@ std::string processes_words(const Discovery& found, ProcessKind kind, const char
   axes.pop_back();
   return axes.empty() ? fmt::format("{} {}", last, one)
                       : fmt::format("{} and {} {}", fmt::join(axes, ", "), last, several);
+}
+
+std::vector<std::string> words_of(const std::vector<DiscoveredProcess>& processes) {
+  std::vector<std::string> all = {
+      processes_words(processes, ProcessKind::jump_per_turn, "takes a new offset at each turn",
+                      "take a new offset at each turn"),
+      processes_words(processes, ProcessKind::random_walk, "has a bias that walks at random",
+                      "have biases that walk at random")};
+  std::erase_if(all, [](const std::string& words) { return words.empty(); });
+  return all;
 }
 
 // Of what explains the recordings as well, what differs on another plan or another base.
@@ -169,17 +181,28 @@ std::string discovered_words(const Discovery& found) {
                               others > 0 ? fmt::format(" or one of {} others", others) : std::string(),
                               law.effect.empty() ? std::string() : fmt::format(" ({})", law.effect)));
   }
-  for (std::string words : {processes_words(found, ProcessKind::jump_per_turn, "takes a new offset at each turn",
-                                            "take a new offset at each turn"),
-                            processes_words(found, ProcessKind::random_walk, "has a bias that walks at random",
-                                            "have biases that walk at random")}) {
-    if (!words.empty()) {
-      all.push_back(std::move(words));
-    }
+  for (std::string& words : words_of(found.processes)) {
+    all.push_back(std::move(words));
   }
   const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
   all.resize(all.size() - more);
-  return fmt::format("{}{}", fmt::join(all, "; "), more > 0 ? fmt::format("; and {} more", more) : std::string());
+  return fmt::format(
+      "{}{}{}", fmt::join(all, "; "), more > 0 ? fmt::format("; and {} more", more) : std::string(),
+      found.instead && found.instead->odds > worth_a_word ? "; or " + instead_words(*found.instead) : std::string());
+}
+
+std::string instead_words(const discovery::OtherExplanation& instead) {
+  std::vector<std::string> all;
+  for (const discovery::OtherExplanation::Law& law : instead.laws) {
+    all.push_back(fmt::format("{} follows {}", name_of_axis(law.axis), law.expression));
+  }
+  for (std::string& words : words_of(instead.processes)) {
+    all.push_back(std::move(words));
+  }
+  const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
+  all.resize(all.size() - more);
+  return fmt::format("in place of all that {}{} (odds {:.2g})", fmt::join(all, " and "),
+                     more > 0 ? fmt::format(" and {} more", more) : std::string(), instead.odds);
 }
 
 const char* beyond_what(const Discovery& found) {
@@ -226,6 +249,16 @@ void add_discovery(ordered_json& document, const Discovery& found) {
                                      {"sigma", p.sigma},
                                      {"unit", unit_of_axis(p.axis)},
                                      {"log_likelihood_gain", p.log_likelihood_gain}});
+  }
+  if (found.instead) {
+    ordered_json laws = ordered_json::array(), processes = ordered_json::array();
+    for (const discovery::OtherExplanation::Law& law : found.instead->laws) {
+      laws.push_back({{"axis", name_of_axis(law.axis)}, {"expression", law.expression}});
+    }
+    for (const DiscoveredProcess& p : found.instead->processes) {
+      processes.push_back({{"axis", name_of_axis(p.axis)}, {"process", discovery::name_of(p.kind)}});
+    }
+    document["instead"] = {{"laws", laws}, {"processes", processes}, {"odds", found.instead->odds}};
   }
   document["discovery"] = {{"functions_tried", found.functions_tried},
                            {"misfit_before", found.misfit_before},

@@ -34,6 +34,8 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::
 // they differ on another plan; empty where nothing was found. "(accel_relaxation)" behind an equation that this effect of the catalogue
 // makes too.
 std::string discovered_words(const discovery::Discovery& found);
+// "in place of all that gyro_z has a bias that walks at random (odds 0.05)"
+std::string instead_words(const discovery::OtherExplanation& instead);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
 std::string discovered_figures(const discovery::Discovery& found);
 // The same without what they make of NIS.

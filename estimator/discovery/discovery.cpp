@@ -13,6 +13,7 @@
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/laws_leave.hpp"
 #include "estimator/discovery/scene.hpp"
+#include "estimator/discovery/search_state.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/discovery/stability.hpp"
 #include "estimator/statistics/distributions.hpp"
@@ -114,6 +115,7 @@ class LawSearch::Search {
         law.sigma = std::max(law.sigma, spread->coefficient);
         law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
       }
+      law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
       law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
       const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
       law.significance =
@@ -131,17 +133,6 @@ class LawSearch::Search {
   const DiscoveryOptions& options() const { return options_; }
 
  private:
-  // All that the search has decided.
-  struct State {
-    std::vector<LawTerm> terms;
-    std::vector<double> costs;  // of the terms
-    LawFit fit;
-    std::vector<DiscoveredProcess> processes;
-    double half_log_determinant = 0.0;  // of the processes: what their freedom costs
-    double log_p_remaining = 0.0;
-    std::string refused;
-  };
-
   template <typename F>
   std::invoke_result_t<F> said(const char* words, F&& work) {
     if (progress_) {
@@ -211,7 +202,7 @@ class LawSearch::Search {
 
   void processes_too() {
     take_processes();
-    const State laws_first = state_;
+    const SearchState laws_first = state_;
     const double laws_first_posterior = log_posterior();
     state_ = empty_;
     if (raw_score_.size() > 0) {
@@ -222,7 +213,12 @@ class LawSearch::Search {
     model_ = model_of_sums();
     take_processes();
     take_laws();
-    if (state_.processes.empty() || log_posterior() < laws_first_posterior) {
+    const double ahead = state_.processes.empty() ? -1.0 : log_posterior() - laws_first_posterior;
+    if (!state_.processes.empty()) {
+      result_.instead = ahead < 0.0 ? other_explanation(laws_first, state_, -ahead, options_.least_odds)
+                                    : other_explanation(state_, laws_first, ahead, options_.least_odds);
+    }
+    if (ahead < 0.0) {
       state_ = laws_first;
       if (state_.processes.empty()) {
         // What may stand in a law's place is asked of the recording with no process in it.
@@ -454,7 +450,7 @@ class LawSearch::Search {
   std::unique_ptr<PieceModel> raw_model_;  // of the recording with its laws, once settle() took them out
   Shortlist shortlist_;
   Discovery result_;
-  State empty_, state_;
+  SearchState empty_, state_;
   Eigen::VectorXd raw_score_;  // before settle()
   double raw_square_ = 0.0;
 };

@@ -75,6 +75,17 @@ struct DiscoveredProcess {
   double log_likelihood_gain = 0.0;
 };
 
+// What explains the recordings in the place of all that is told: a walk may stand for a drift, and laws added up for a walk.
+struct OtherExplanation {
+  struct Law {
+    int axis = 0;
+    std::string expression;
+  };
+  std::vector<Law> laws;
+  std::vector<DiscoveredProcess> processes;
+  double odds = 0.0;  // against what is told, 1 at most
+};
+
 // The 24 over all equations that the recordings leave open (class_average.hpp).
 struct ClassAverage {
   std::vector<ParameterVector> parameters;  // [recordings] SI, what is shared imposed
@@ -94,6 +105,7 @@ struct Discovery {
   // the equation alone, and `carries_over` and `stability` are 0.
   std::vector<DiscoveredLaw> described;
   std::vector<DiscoveredProcess> processes;
+  std::optional<OtherExplanation> instead;         // of odds of DiscoveryOptions::least_odds or better
   double misfit_before = 0.0, misfit_after = 0.0;  // squares of the residuals beyond their number
   double rows = 0.0;
   double log_p_remaining = 0.0;     // of the best function that was not taken, corrected for all that was tried

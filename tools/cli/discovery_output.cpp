@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 
 namespace selfcal::cli {
@@ -267,6 +268,9 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
     const bool walk = p.kind == discovery::ProcessKind::random_walk;
     text += fmt::format("  {}: a random process, {}: {}{}\n", name_of_axis(p.axis), discovery::name_of(p.kind),
                         with_sigma(p.size, p.sigma, unit_of_axis(p.axis)), walk ? "/sqrt(h)" : " (1 sigma)");
+  }
+  if (found.instead) {
+    text += "  or " + instead_words(*found.instead) + "\n";
   }
   return text + described_text(found) + left_text(found) + next_text(next);
 }

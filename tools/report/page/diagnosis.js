@@ -200,7 +200,7 @@ function showDiagnosisTables(d) {
   if (found) {
     const symbols = lawSymbols(listOf(d.discovered).map((l) => textOf(l.expression)));
     add('Found beyond the catalogue', discoveredTable(listOf(d.discovered), listOf(d.processes), 'discovered'), element('p', {class: 'note symbols'}, symbols ? symbols + '.' : ''),
-        ...classTables(listOf(d.discovered)), nextExperiment(listOf(d.discovered)));
+        ...classTables(listOf(d.discovered)), insteadNote(d.instead), nextExperiment(listOf(d.discovered)));
   }
   if (correctedByLaws(d)) {
     add('What the omission did to the 24', element('p', {class: 'note', id: 'corrections'}, correctionWords(listOf(d.parameters))));

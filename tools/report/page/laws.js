@@ -59,6 +59,20 @@ function classTables(laws) {
   });
 }
 
+// What explains the recording in the place of all that was found; nothing where nothing does.
+function insteadNote(instead) {
+  const parts = [];
+  for (const law of listOf(objectOf(instead).laws).map(objectOf)) {
+    parts.push([`${textOf(law.axis)} follows `, lawAsMath(textOf(law.expression))]);
+  }
+  for (const process of listOf(objectOf(instead).processes).map(objectOf)) {
+    parts.push([`a ${textOf(process.process)} of ${textOf(process.axis)}`]);
+  }
+  const words = parts.flatMap((part, k) => (k > 0 ? [' and ', ...part] : part));
+  return element('p', {class: 'note', id: 'instead'},
+                 ...(parts.length > 0 ? ['In place of all that this explains the recording too: ', ...words, `. Odds ${significant(instead.odds, 2)}.`] : []));
+}
+
 // How the equations that are left open can be told apart; nothing where none is.
 function nextExperiment(laws) {
   const open = laws.map(objectOf).some((law) => listOf(law.class).length > 1);
