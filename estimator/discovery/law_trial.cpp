@@ -82,7 +82,8 @@ std::vector<double> logarithmic(double low, double high, double ratio) {
   return values;
 }
 
-// Where the constants of one law start: the best of a grid over the pieces, given what the model has chosen.
+// Where the constants of one law start: the best of a grid over the pieces, given what the model has chosen. Of values that fit alike,
+// phases a whole turn apart, periods of either sign, the small and positive ones: they are tried first.
 class Start {
  public:
   Start(const PieceSums& sums, const PieceModel& model, LawTerm& term) : sums_(sums), model_(model), term_(term) {}
@@ -134,7 +135,8 @@ class Start {
       return 0.0;
     }
     const double gain = model_.gain(term_.axis, sums_.means(values));
-    if (gain > best_gain_) {
+    constexpr double fits_better = 0.5;
+    if (gain > best_gain_ + fits_better) {
       best_gain_ = gain;
       best_ = std::move(constants);
     }
