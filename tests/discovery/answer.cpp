@@ -1,16 +1,19 @@
 // Answers one recording of the discovery trial. Links no simulation.
 //
-//   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process] [--plan FILE]
+//   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ...]
+//     [--plan FILE]
 //
-// One JSON line. Without a way: as `selfcal diagnose` does it, the catalogue and what it leaves; --discover: discovery alone; the others
-// are rivals (rivals.hpp). Further
-// recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
+// One JSON line. Without a way: as `selfcal diagnose` does it, the catalogue and what it leaves; --discover: discovery alone; --form, once
+// for each law: these forms and no others, coefficients and the constants `?` fitted, which is the best that a search can do; the others are
+// rivals (rivals.hpp). Further recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -25,6 +28,7 @@
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/law_trial.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
@@ -122,8 +126,24 @@ DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
   return answer;
 }
 
+// Laws whose forms are known.
+ordered_json fitted_json(std::span<const discovery::UnitRecording> recordings,
+                         const std::vector<discovery::LawTerm>& forms) {
+  ordered_json j = {
+      {"laws", ordered_json::array()}, {"described", ordered_json::array()}, {"processes", ordered_json::array()}};
+  const std::vector<double> stated(forms.size(), std::numeric_limits<double>::quiet_NaN());
+  if (const auto tried = discovery::try_laws(recordings, forms, stated)) {
+    for (const discovery::TriedLaw& law : *tried) {
+      j["laws"].push_back(
+          {{"axis", law.term.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
+    }
+  }
+  return j;
+}
+
 struct Request {
   std::string way, plan;  // plan: where the schedule of the next experiment goes
+  std::vector<discovery::LawTerm> forms;
   std::vector<std::string> files;
 };
 
@@ -181,6 +201,8 @@ int answer(const Request& request) {
   if (recordings.size() == all.size()) {
     if (request.way == "--stepwise" || request.way == "--process") {
       j["discovery"] = rival_json(request.way, all.front()->data, all.front()->calibration);
+    } else if (request.way == "--form") {
+      j["discovery"] = fitted_json(recordings, request.forms);
     } else {
       const discovery::Discovery found = discovery::discover(recordings, {});
       j["discovery"] = to_json(found);
@@ -205,6 +227,15 @@ bool parse(std::span<char*> arguments, Request& request) {
     const std::string word = arguments[k];
     if (word == "--plan" && k + 1 < arguments.size()) {
       request.plan = arguments[++k];
+    } else if (word == "--form" && k + 2 < arguments.size()) {
+      request.way = word;
+      const int axis = std::atoi(arguments[++k]);
+      auto expression = laws::Expression::parse(arguments[++k]);
+      if (!expression || axis < 0 || axis >= discovery::axis_count) {
+        return false;
+      }
+      const std::vector<double> constants(expression->free_constants(), 1.0);
+      request.forms.push_back({axis, std::move(*expression), constants});
     } else if (word == "--discover" || word == "--catalogue" || word == "--stepwise" || word == "--process") {
       request.way = word;
     } else if (!word.starts_with("-")) {
@@ -225,7 +256,7 @@ int main(int count, char** values) {
     if (!parse(arguments, request)) {
       fmt::print(stderr,
                  "usage: selfcal_discovery_answer RECORDING [RECORDING...] "
-                 "[--discover | --catalogue | --stepwise | --process] [--plan FILE]\n");
+                 "[--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ...] [--plan FILE]\n");
       return 2;
     }
     return answer(request);

@@ -1,5 +1,6 @@
 """Laws as an answer tells them, for the programs of the trial."""
 import json
+import re
 import subprocess
 
 AXES = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
@@ -17,9 +18,25 @@ def left_elsewhere(programs, key, number, laws, folder):
     return json.loads(done.stdout)
 
 
+# Constants of the forms that the generator draws, each to be fitted: of a creep, of a warm-up, of a wave.
+CONSTANTS = ((r"exp\(-(t|since)/[0-9.e+-]+\)", r"exp(-\1/?)"), (r"log\(1\+(rest|since)/[0-9.e+-]+\)", r"log(1+\1/?)"),
+             (r"sin\(2\*pi\*t/[0-9.e+-]+\+-?[0-9.e+-]+\)", "sin(2*pi*t/?+?)"))
+
+
+def form_of(expression):
+    """The expression with `?` in the place of its kernel's constants."""
+    for number, free in CONSTANTS:
+        expression = re.sub(number, free, expression)
+    return expression
+
+
 def answer_of(programs, way, case, recording, folder):
     """The answer to a case's recording, with what its laws leave elsewhere. Of a case the answering program knows nothing."""
     words = [] if case["kind"] in ("effect", "beside") and way == "discover" else [f"--{way}"]
+    if way == "form":
+        if not case["laws"] or any(law["process"] for law in case["laws"]):
+            return {"seconds": 0.0}
+        words = [word for law in case["laws"] for word in ("--form", str(law["axis"]), form_of(law["expression"]))]
     out = subprocess.run([f"{programs}/selfcal_discovery_answer", str(recording), *words], check=True, capture_output=True, text=True).stdout
     answer = json.loads(out)
     if case["laws"] and not any(law["process"] for law in case["laws"]) and "discovery" in answer:
