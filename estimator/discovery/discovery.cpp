@@ -74,11 +74,12 @@ class LawSearch::Search {
   // Laws first, and beside them what a random process takes up; then processes first. The way of the greater posterior
   // probability is reported: a process can stand for any law, and laws added up can stand for a process.
   void fit() {
-    const bool process_alone = significant(best_process());
+    const ProcessFit alone = best_process();
+    const bool may_stand_alone = significant(alone);
     take_laws();
     settle();
     take_laws();
-    if (process_alone || significant(best_process())) {
+    if (significant(best_process()) || (may_stand_alone && !laws_are_likelier(alone))) {
       processes_too();
     }
     if (state_.processes.empty()) {
@@ -244,6 +245,17 @@ class LawSearch::Search {
     return 2.0 * process.log_likelihood_gain > least_share * taken_off &&
            log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
                std::log(options_.false_alarm_rate);
+  }
+
+  // Whether the process costs more than all laws do, were the rest as they leave it: then no way that begins with it is the likelier
+  // one, nor one with odds that are worth a word.
+  bool laws_are_likelier(const ProcessFit& alone) const {
+    double saved = -std::log(options_.least_odds);
+    for (const double cost : state_.costs) {
+      saved += cost;
+    }
+    return !state_.terms.empty() &&
+           alone.half_log_determinant + std::log(process_count) - 0.5 * absorbed(*model_, alone) > saved;
   }
 
   void take_processes() {

@@ -1,5 +1,6 @@
 #include "estimator/discovery/process.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
@@ -62,9 +63,18 @@ ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKi
   }
   fit.log_likelihood_gain = std::max(0.0, gain(best));
   fit.size = std::exp(0.5 * best);
+  fit.half_log_determinant = 0.5 * (1.0 + std::exp(best) * d).log().sum();
   const double curvature = (gain(best + step) + gain(best - step) - 2.0 * gain(best)) / (step * step);
   fit.sigma = 0.5 * fit.size / std::sqrt(std::max(-curvature, 1e-6));
   return fit;
+}
+
+double absorbed(const PieceModel& model, const ProcessFit& process) {
+  const Eigen::MatrixXd means =
+      process.columns(Eigen::seqN(process.axis, process.columns.rows() / axis_count, axis_count), Eigen::all);
+  auto [J, b] = model.project(process.axis, means);
+  J.diagonal().array() += 1.0 / (process.size * process.size);
+  return b.dot(J.ldlt().solve(b));
 }
 
 }  // namespace selfcal::discovery

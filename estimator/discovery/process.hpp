@@ -18,11 +18,14 @@ struct ProcessFit {
   ProcessKind kind = ProcessKind::jump_per_turn;
   int axis = 0;
   double log_likelihood_gain = 0.0;
-  double size = 0.0, sigma = 0.0;  // standard deviation of a jump, or per sqrt(h); in unit_of(axis)
-  Eigen::MatrixXd columns;         // independent draws of unit variance, over the columns of the sums
+  double half_log_determinant = 0.0;  // what its freedom costs: half the logarithm of |1 + size^2 X'GX|
+  double size = 0.0, sigma = 0.0;     // standard deviation of a jump, or per sqrt(h); in unit_of(axis)
+  Eigen::MatrixXd columns;            // independent draws of unit variance, over the columns of the sums
 };
 
 // The size of greatest likelihood, given what the model has chosen.
 ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKind kind, int axis);
+// Fall of the square of the model's residual by this process at its size.
+double absorbed(const PieceModel& model, const ProcessFit& process);
 
 }  // namespace selfcal::discovery
