@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "estimator/geometry/earth.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/recording/atomic_file.hpp"
 
@@ -28,6 +29,8 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
   input.gyro = rates(recording.delta_theta_rad);
   input.accel = rates(recording.delta_v_mps);
   input.accel_unit = 1.0;
+  input.gravity = earth::normal_gravity(recording.latitude_deg * units::degree, recording.height_m);
+  input.latitude = recording.latitude_deg * units::degree;
   for (std::size_t i = 0; i < recording.temperature_c.size(); i += recording.temperature_channels) {
     input.temperature_c.push_back(recording.temperature_c[i]);
   }

@@ -114,9 +114,9 @@ std::string parameters_text(const std::vector<diagnosis::PoseParameter>& paramet
 
 std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
   std::string text = fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms",
-                                 !d.accel_tested    ? "not tested beyond bias, scale and misalignment"
-                                 : d.accel_adequate ? "adequate"
-                                                    : "misfit",
+                                 !d.accel_adequate ? "misfit"
+                                 : d.accel_tested  ? "adequate"
+                                                   : "not tested beyond bias, scale and misalignment",
                                  1e3 * d.accel_rms_g);
   if (d.accel_tested) {
     text += fmt::format(", held out {:.3f} mg", 1e3 * d.accel_held_out_rms_g);
@@ -127,6 +127,14 @@ std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const Units& 
   }
   text += d.force_at_rest_g > 0.0 ? fmt::format("; at rest they read {:.4f} g\n", d.force_at_rest_g) : "\n";
   text += parameters_text(d.accel_parameters, shown, false);
+  for (const diagnosis::PoseEffect& e : d.accel_named) {
+    text += fmt::format("  {} named, taken out above: log10 p {:.1f}\n", e.effect->id, e.log_p / std::log(10.0));
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      const diagnosis::EffectParameter& p = e.effect->parameters[k];
+      text += fmt::format("    {:16} {:+9.4g} +- {:.2g} {}\n", p.name, e.value[k] / p.si_per_unit,
+                          e.sigma[k] / p.si_per_unit, p.unit);
+    }
+  }
   if (d.settling) {
     const diagnosis::Settling& s = *d.settling;
     text += fmt::format("  accel_relaxation: settling after each turn, {}exp(-s/{:.0f} s), log10 p {:.1f}\n",
@@ -159,8 +167,9 @@ std::string confounded_text(const diagnosis::PoseDiagnosis& d) {
 }
 
 std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
-  std::string text = fmt::format("gyros in the poses, {}: bias {} +- {}\n", shown.gyro_name,
-                                 three(d.gyro_bias, shown.gyro), three(d.gyro_bias_sigma, shown.gyro));
+  std::string text =
+      fmt::format("gyros in the poses, {}: bias {} +- {}{}\n", shown.gyro_name, three(d.gyro_bias, shown.gyro),
+                  three(d.gyro_bias_sigma, shown.gyro), d.earth_taken_out ? ", the Earth's rate taken out" : "");
   text += fmt::format("  rms, poses left out in turn: bias alone {} (white noise {})\n",
                       three(d.gyro_held_out_rms, shown.gyro), three(d.gyro_white_rms, shown.gyro));
   for (const diagnosis::PoseEffect& e : d.gyro_tried) {
@@ -169,8 +178,10 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
   }
   text += d.gyro_named.empty() ? "nothing named\n" : "named:\n";
   for (const diagnosis::PoseEffect& e : d.gyro_named) {
-    text += fmt::format("  {}{}{} leaves {}\n", e.effect->id, e.equivalent.empty() ? "" : ", or as well ",
-                        fmt::join(diagnosis::ids_of(e.equivalent), ", "), three(e.held_out_rms, shown.gyro));
+    text += fmt::format("  {}{}{}{} leaves {}\n", e.effect->id,
+                        e.effect->temperature == diagnosis::TemperatureUse::measured ? ", per degC" : "",
+                        e.equivalent.empty() ? "" : ", or as well ", fmt::join(diagnosis::ids_of(e.equivalent), ", "),
+                        three(e.held_out_rms, shown.gyro));
     text += effect_text(e, shown);
     if (!std::isnan(e.constant)) {
       text += fmt::format("    {:4} {:9.3g} {}\n", e.effect->constant.name, e.constant, e.effect->constant.unit);
@@ -397,10 +408,12 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"gravity_span_deg", d.gravity_span_deg},
             {"parameters", to_json(d.accel_parameters)},
             {"settling", settling},
+            {"findings", to_json(d.accel_named)},
             {"tried", to_json(d.accel_tried)}}},
           {"gyros",
            {{"bias", d.gyro_bias},
             {"bias_sigma", d.gyro_bias_sigma},
+            {"earth_taken_out", d.earth_taken_out},
             {"held_out_rms", d.gyro_held_out_rms},
             {"white_rms", d.gyro_white_rms},
             {"noise_at_rest", noise_json(d.gyro_noise)},
@@ -423,7 +436,7 @@ bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
   const bool nonlinear =
       d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
                                  [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
-  return !d.accel_adequate || !d.gyro_named.empty() || d.settling.has_value() || nonlinear ||
+  return !d.accel_adequate || !d.accel_named.empty() || !d.gyro_named.empty() || d.settling.has_value() || nonlinear ||
          (d.rest && drifts(*d.rest));
 }
 

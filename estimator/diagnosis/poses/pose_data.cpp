@@ -20,13 +20,13 @@ AccelModel assumed(const PoseInput& input, const std::vector<Pose>& poses) {
     high = high.cwiseMax(p.accel);
   }
   const bool nominal = input.accel_unit > 0.0;
-  m.raw_per_g = nominal ? 9.80665 / input.accel_unit : 0.5 * (high - low).maxCoeff();
+  m.raw_per_g = nominal ? input.gravity / input.accel_unit : 0.5 * (high - low).maxCoeff();
   m.T = Matrix3::Identity() / m.raw_per_g;
   m.bias = nominal ? Vector3(Vector3::Zero()) : Vector3(0.5 * (low + high));
-  constexpr double nominal_bias = 0.2, nominal_scale = 0.1, raw_bias = 0.3, raw_scale = 0.3, misalignment = 0.03;
+  constexpr double nominal_bias = 0.2, nominal_scale = 0.1, raw_bias = 0.3, raw_scale = 0.3;
   m.before << Vector3::Constant((nominal ? nominal_bias : raw_bias) * m.raw_per_g),
       Vector3::Constant((nominal ? nominal_scale : raw_scale) / m.raw_per_g),
-      Vector3::Constant(misalignment / m.raw_per_g);
+      Vector3::Constant(misalignment_before / m.raw_per_g);
   // An axis along which gravity hardly moves shows in |f| by its square alone, and would take on what is anything else's: its
   // bias, scale and misalignments stay what they are assumed to be.
   constexpr double reached = 0.5, held = 1e-6;  // of g, and of sigma before
@@ -48,9 +48,10 @@ void linearise(const std::vector<Pose>& poses, AccelModel& m) {
   m.residual.resize(n);
   m.jacobian.resize(n, 9);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Vector3 d = poses[static_cast<std::size_t>(k)].accel - m.bias;
-    const Vector3 u = m.T * d;
+    const Vector3 u = m.direction(poses[static_cast<std::size_t>(k)].accel);
     const Vector3 e = u.normalized();
+    // Of the direction alone: with the reading's own size the columns would hold the residual, and a test could take noise for an effect.
+    const Vector3 d = (poses[static_cast<std::size_t>(k)].accel - m.bias) / u.norm();
     m.residual(k) = m.weight(k) * (u.norm() - 1.0);
     m.jacobian.block<1, 3>(k, 0) = -m.weight(k) * (e.transpose() * m.T);
     for (std::size_t j = 0; j < free_elements.size(); ++j) {
@@ -142,7 +143,8 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
     descend(poses, start, noise, step.cwiseProduct(m.before), m);
     const double seen = std::sqrt(m.residual.squaredNorm() / std::max(1.0, m.free));
     constexpr double enough = 3.0, least = 1e-7;  // of g
-    noise = std::max(least, std::max(noise_of_means(m, poses), m.free >= enough ? seen : 0.0));
+    m.noise_of_means = noise_of_means(m, poses);
+    noise = std::max(least, std::max(m.noise_of_means, m.free >= enough ? seen : 0.0));
     m.weight = weights_of(m, poses, noise);
   }
   linearise(poses, m);

@@ -13,6 +13,7 @@ struct Pose {
   std::size_t first = 0, last = 0;                         // samples
   std::vector<std::pair<std::size_t, std::size_t>> quiet;  // of them those without a disturbance
   double middle_s = 0.0;
+  double temperature = 0.0;         // mean, less that of all poses, degC; zero: no channel that moves
   Vector3 gyro, accel;              // means, raw
   Vector3 gyro_white, accel_white;  // sigma of the mean by white noise, raw
   Vector3 gyro_half, accel_half;    // half the difference between the means of both halves, raw
@@ -26,10 +27,16 @@ std::vector<LeftOut> find_left_out(const PoseInput& input);
 
 // Poses by the motion: stretches of 1 s and more in which both triads scatter little, put together where neither gravity nor
 // the gyros show a turn between them, and without those in which the sensor turns steadily.
-std::vector<Pose> find_poses(const PoseInput& input);
+struct FoundPoses {
+  std::vector<Pose> poses;
+  int steady_turns = 0;  // stretches as quiet as a pose that turn
+};
+FoundPoses find_poses(const PoseInput& input);
 
 // Axes that stand at the end of their range, which no other value approaches as often.
 std::vector<Clipping> find_clipping(const PoseInput& input);
+
+constexpr double misalignment_before = 0.03;  // rad, sigma of what an accelerometer's is before
 
 // u = T (a - b), T upper triangular.
 struct AccelModel {
@@ -44,6 +51,8 @@ struct AccelModel {
       Eigen::Array<bool, 9, 1>::Constant(false);  // left as assumed: gravity does not reach them
   double raw_per_g = 1.0;
   double free = 0.0;  // degrees of freedom that the residuals have left
+  double noise_of_means =
+      0.0;  // of |u|, by the halves of the poses: slow noise included, and nothing that differs from pose to pose
   Vector3 direction(const Vector3& raw) const { return T * (raw - bias); }
 };
 // With what any accelerometer is before: misaligned by 0.03, its scale and bias within 0.1 and 0.2 g of the nominal ones.

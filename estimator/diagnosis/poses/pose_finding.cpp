@@ -141,6 +141,10 @@ bool same_pose(const PoseInput& input, const Pose& a, const Pose& b, double raw_
   if ((b.accel - a.accel).norm() > limit * raw_per_g) {
     return false;
   }
+  constexpr double steady = units::degree;  // a second: no bias changes by that much, and one of them turns
+  if ((b.gyro - a.gyro).norm() * input.gyro_unit > steady && input.accel_unit > 0.0) {
+    return false;
+  }
   const Vector3 bias = 0.5 * (a.gyro + b.gyro);
   Vector3 turned = Vector3::Zero();
   for (std::size_t i = a.last; i < b.first; ++i) {
@@ -185,8 +189,36 @@ double sample_sigma(const std::vector<Pose>& poses, Eigen::Index axis) {
   return quantile(all, 0.5);
 }
 
+double length_of(const PoseInput& input, const Pose& p) { return input.time_s[p.last - 1] - input.time_s[p.first]; }
+
+// What the gyros read at rest where most stretches turn, as on a rate table without an angle: of the rates that are alike
+// within `alike` those that last longest, and of such as last about as long the least.
+Vector3 rate_at_rest(const PoseInput& input, const std::vector<Pose>& poses, const Vector3& alike) {
+  struct Candidate {
+    Vector3 rate;
+    double seconds;
+  };
+  std::vector<Candidate> all;
+  double longest = 0.0;
+  for (const Pose& a : poses) {
+    Candidate c{a.gyro, 0.0};
+    for (const Pose& b : poses) {
+      const bool same = ((a.gyro - b.gyro).cwiseAbs().array() <= alike.array()).all();
+      c.seconds += same ? length_of(input, b) : 0.0;
+    }
+    longest = std::max(longest, c.seconds);
+    all.push_back(c);
+  }
+  constexpr double about = 0.7;
+  std::erase_if(all, [&](const Candidate& c) { return c.seconds < about * longest; });
+  return std::min_element(all.begin(), all.end(),
+                          [](const Candidate& a, const Candidate& b) { return a.rate.norm() < b.rate.norm(); })
+      ->rate;
+}
+
 // A steady turn is as quiet as a pose. Gyros that read a degree a second, and twenty times the usual deviation, away from
-// where they mostly are turn; so do read-outs that move. Of gyros alone, whose unit need not be known, ten times the noise of a sample counts as much
+// where they mostly are turn; so do read-outs that move. Biases of one sensor in SI differ by less than a degree a second:
+// where most stretches differ by more they turn, and where they rest follows from them. Of gyros alone, whose unit need not be known, ten times the noise of a sample counts as much
 // as a degree a second.
 void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
   Vector3 middle, spread, least;
@@ -202,6 +234,11 @@ void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
       off.push_back(std::abs(v - middle(axis)));
     }
     spread(axis) = quantile(off, 0.5);
+  }
+  const bool si = input.accel_unit > 0.0 && input.sensors == Sensors::both;
+  if (si && (spread.array() > least.array()).any()) {
+    middle = rate_at_rest(input, poses, least);
+    spread.setZero();
   }
   constexpr double deviations = 20.0, read_out = 0.1 * units::degree;
   std::erase_if(poses, [&](const Pose& p) {
@@ -240,20 +277,22 @@ Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
   return Eigen::Map<const Vector3>(series[i].data());
 }
 
-std::vector<Pose> find_poses(const PoseInput& input) {
+FoundPoses find_poses(const PoseInput& input) {
   const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
   const auto window = std::max<std::size_t>(4, static_cast<std::size_t>(std::lround(rate)));  // 1 s, or four samples
   if (input.time_s.size() < 20 * window) {
     return {};
   }
-  std::vector<Pose> poses = put_together(input, quiet_stretches(input, window));
-  if (!poses.empty()) {
-    drop_steady_turns(input, poses);
+  FoundPoses found{put_together(input, quiet_stretches(input, window)), 0};
+  if (!found.poses.empty()) {
+    const std::size_t before = found.poses.size();
+    drop_steady_turns(input, found.poses);
+    found.steady_turns = static_cast<int>(before - found.poses.size());
   }
   if (input.sensors == Sensors::gyros) {
-    drop_what_turns(input, poses);
+    drop_what_turns(input, found.poses);
   }
-  return poses;
+  return found;
 }
 
 std::vector<LeftOut> find_left_out(const PoseInput& input) {

@@ -10,15 +10,6 @@
 namespace selfcal::diagnosis {
 namespace {
 
-std::vector<double> middles(const std::vector<Pose>& poses) {
-  std::vector<double> time_s;
-  time_s.reserve(poses.size());
-  for (const Pose& p : poses) {
-    time_s.push_back(p.middle_s);
-  }
-  return time_s;
-}
-
 bool has(const std::vector<PoseEffect>& list, const Effect* effect) {
   return std::any_of(list.begin(), list.end(), [effect](const PoseEffect& p) { return p.effect == effect; });
 }
@@ -27,32 +18,10 @@ void best_first(std::vector<PoseEffect>& all) {
   std::stable_sort(all.begin(), all.end(), [](const PoseEffect& a, const PoseEffect& b) { return a.log_p < b.log_p; });
 }
 
-// One axis with and without the columns. Of the pose an effect is asked beside a random walk, for poses that follow one
-// another differ in time too; what changes with time is asked beside white noise, for a walk would be its rival.
-struct Comparison {
-  Regression with;
-  double log_p = 0.0;
-};
-Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
-                   const std::vector<double>& time_s, bool of_time) {
-  const auto n = y.size();
-  if (of_time) {
-    const Regression with = regress(joined(known, columns), y);
-    return {with, log_p_of(regress(known, y), with, n)};
-  }
-  const Whitener white(known, y, time_s);
-  const Eigen::VectorXd whitened = white(y);
-  Comparison c;
-  c.with = regress(white(joined(known, columns)), whitened);
-  c.log_p = log_p_of(regress(white(known), whitened), c.with, n);
-  c.with.held_out_rms = regress(joined(known, columns), y).held_out_rms;  // in the reading's unit
-  return c;
-}
-
 class Gyros {
  public:
-  Gyros(const std::vector<Pose>& poses, double duration_s)
-      : poses_(poses), time_s_(middles(poses)), duration_s_(duration_s) {
+  Gyros(const std::vector<Pose>& poses, double duration_s, bool has_temperature)
+      : poses_(poses), time_s_(middles(poses)), duration_s_(duration_s), has_temperature_(has_temperature) {
     const auto n = static_cast<Eigen::Index>(poses.size());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       known_[axis] = Eigen::MatrixXd::Ones(n, 1);
@@ -93,6 +62,7 @@ class Gyros {
   const std::vector<Pose>& poses_;
   std::vector<double> time_s_;
   double duration_s_;
+  bool has_temperature_;
   std::array<Eigen::MatrixXd, 3> known_;
   std::array<Eigen::VectorXd, 3> y_;
 };
@@ -120,7 +90,7 @@ std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) con
   std::vector<PoseEffect> all;
   double tried = 0.0;
   for (const Effect& effect : catalogue()) {
-    if (has(named, &effect) || !acts_on(effect, true)) {
+    if (has(named, &effect) || !acts_on(effect, true, has_temperature_)) {
       continue;
     }
     PoseEffect best;
@@ -202,8 +172,8 @@ void add_confounded(const Gyros& gyros, const std::vector<PoseEffect>& tried, Po
 
 }  // namespace
 
-void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s, double alpha,
-                          PoseDiagnosis& d) {
+void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s,
+                          bool has_temperature, double alpha, PoseDiagnosis& d) {
   const auto n = model.residual.size();
   const Regression plain = regress(model.jacobian, model.residual);
   d.accel_rms_g = std::sqrt(model.residual.squaredNorm() / static_cast<double>(n));
@@ -211,17 +181,21 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
   // Three degrees of freedom beside the nine; and where the poses leave one of the nine open, its column is made of the noise of
   // the readings themselves and explains it.
   constexpr Eigen::Index least = 12;
-  d.accel_tested = n >= least && std::all_of(d.accel_parameters.begin(), d.accel_parameters.end(),
-                                             [](const PoseParameter& p) { return p.determined; });
+  constexpr double well = 0.1;  // of sigma before
+  d.accel_tested = n >= least && !model.held.any() && (model.sigma.array() < well * model.before.array()).all();
   if (!d.accel_tested) {
-    d.accel_adequate = true;
+    // Slow noise between poses is a few times that inside them; ten times as much is something else.
+    constexpr double times = 10.0;
+    const double left = std::sqrt(model.residual.squaredNorm() / std::max(1.0, model.free));
+    d.accel_adequate = model.held.any() || model.free < 1.0 || left < times * model.noise_of_means;
     return;
   }
   double tried = 0.0;
   const std::vector<double> time_s = middles(poses);
   for (const Effect& effect : catalogue()) {
-    if (!acts_on(effect, false)) {
-      continue;
+    if (!acts_on(effect, false, has_temperature) ||
+        (has_temperature && effect.temperature == TemperatureUse::measured)) {
+      continue;  // what follows the channel was taken out before
     }
     for (const double constant : effect.constant.tried()) {
       const Trial trial = trial_of(effect, constant, poses, duration_s, 3);
@@ -251,8 +225,9 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
   d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
 }
 
-void judge_gyros(const std::vector<Pose>& poses, double duration_s, double alpha, PoseDiagnosis& d) {
-  Gyros gyros(poses, duration_s);
+void judge_gyros(const std::vector<Pose>& poses, double duration_s, bool has_temperature, double alpha,
+                 PoseDiagnosis& d) {
+  Gyros gyros(poses, duration_s, has_temperature);
   gyros.add_bias(d);
   d.gyro_held_out_rms = gyros.held_out_rms();
   const double limit = std::log(alpha);

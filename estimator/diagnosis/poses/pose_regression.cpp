@@ -11,8 +11,9 @@
 namespace selfcal::diagnosis {
 namespace {
 
-EffectContext context_of(double middle_s, const Vector3& u, double duration_s) {
+EffectContext context_of(double middle_s, const Vector3& u, double temperature, double duration_s) {
   EffectContext c;
+  c.temperature = temperature;
   c.start_s = middle_s - 0.5;
   c.end_s = middle_s + 0.5;
   c.dt = 1.0;
@@ -24,11 +25,12 @@ EffectContext context_of(double middle_s, const Vector3& u, double duration_s) {
   return c;
 }
 
-Eigen::RowVectorXd row_of(const Effect& effect, double constant, double middle_s, const Vector3& u, double duration_s,
-                          int axis) {
+// At a pose: its middle, the direction of its specific force, its temperature.
+Eigen::RowVectorXd row_of(const Effect& effect, double constant, const Pose& pose, double duration_s, int axis) {
   const auto count = static_cast<Eigen::Index>(effect.parameters.size());
   Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, count), angle = velocity;
-  effect.sensor(context_of(middle_s, u, duration_s), constant, velocity, angle);
+  const Vector3 u = pose.u.normalized();  // its size holds the reading's own noise
+  effect.sensor(context_of(pose.middle_s, u, pose.temperature, duration_s), constant, velocity, angle);
   return axis < 3 ? Eigen::RowVectorXd(angle.row(axis)) : Eigen::RowVectorXd(u.transpose() * velocity);
 }
 
@@ -61,13 +63,20 @@ double restricted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eige
 
 }  // namespace
 
+Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duration_s) {
+  const auto count = static_cast<Eigen::Index>(effect.parameters.size());
+  Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, count), angle = velocity;
+  effect.sensor(context_of(pose.middle_s, pose.u.normalized(), pose.temperature, duration_s), NAN, velocity, angle);
+  return velocity;
+}
+
 Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis) {
   const auto n = static_cast<Eigen::Index>(poses.size());
   const auto count = static_cast<Eigen::Index>(effect.parameters.size());
   Eigen::MatrixXd all(n, count);
   for (Eigen::Index k = 0; k < n; ++k) {
     const Pose& pose = poses[static_cast<std::size_t>(k)];
-    all.row(k) = row_of(effect, constant, pose.middle_s, pose.u, duration_s, axis);
+    all.row(k) = row_of(effect, constant, pose, duration_s, axis);
   }
   Trial t{&effect, constant, Eigen::MatrixXd(n, 0), {}};
   for (Eigen::Index j = 0; j < count; ++j) {
@@ -82,9 +91,13 @@ Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& p
 
 bool changes_with_time(const Effect& effect, double duration_s, int axis) {
   const double constant = effect.constant.tried().front();
-  const Vector3 u = Vector3(0.6, 0.48, 0.64);  // any direction that is along no axis
-  const Eigen::RowVectorXd early = row_of(effect, constant, 0.1 * duration_s, u, duration_s, axis);
-  const Eigen::RowVectorXd late = row_of(effect, constant, 0.9 * duration_s, u, duration_s, axis);
+  Pose pose;
+  pose.u = Vector3(0.6, 0.48, 0.64);  // any direction that is along no axis
+  pose.temperature = 1.0;             // the same early and late: not the time is what such an effect follows
+  pose.middle_s = 0.1 * duration_s;
+  const Eigen::RowVectorXd early = row_of(effect, constant, pose, duration_s, axis);
+  pose.middle_s = 0.9 * duration_s;
+  const Eigen::RowVectorXd late = row_of(effect, constant, pose, duration_s, axis);
   return (late - early).norm() > 1e-6 * (late.norm() + early.norm());
 }
 
@@ -109,8 +122,8 @@ double tests_worth(const Effect& effect, const std::vector<Pose>& poses, double 
   return std::max(1.0, roots * roots / std::max(1e-300, values.sum()));
 }
 
-bool acts_on(const Effect& effect, bool gyro) {
-  return effect.sensor != nullptr && applies(effect, false) && !effect.needs_heading &&
+bool acts_on(const Effect& effect, bool gyro, bool has_temperature) {
+  return effect.sensor != nullptr && applies(effect, has_temperature) && !effect.needs_heading &&
          effect.triad == (gyro ? Triad::gyro : Triad::accelerometer);
 }
 
@@ -128,6 +141,31 @@ Regression regress(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
   const Eigen::MatrixXd G = X.transpose() * X;
   r.sigma = (G.completeOrthogonalDecomposition().pseudoInverse().diagonal() * variance).cwiseMax(0.0).cwiseSqrt();
   return r;
+}
+
+Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                   const std::vector<double>& time_s, bool of_time) {
+  const auto n = y.size();
+  if (of_time) {
+    const Regression with = regress(joined(known, columns), y);
+    return {with, log_p_of(regress(known, y), with, n)};
+  }
+  const Whitener white(known, y, time_s);
+  const Eigen::VectorXd whitened = white(y);
+  Comparison c;
+  c.with = regress(white(joined(known, columns)), whitened);
+  c.log_p = log_p_of(regress(white(known), whitened), c.with, n);
+  c.with.held_out_rms = regress(joined(known, columns), y).held_out_rms;  // in the reading's unit
+  return c;
+}
+
+std::vector<double> middles(const std::vector<Pose>& poses) {
+  std::vector<double> time_s;
+  time_s.reserve(poses.size());
+  for (const Pose& p : poses) {
+    time_s.push_back(p.middle_s);
+  }
+  return time_s;
 }
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {

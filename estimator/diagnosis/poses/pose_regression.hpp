@@ -30,6 +30,16 @@ class Whitener {
   Eigen::MatrixXd lower_;  // Cholesky factor of the covariance; empty: white
 };
 
+// With and without the columns. Of the pose an effect is asked beside a random walk, for poses that follow one another differ in time
+// too; what changes with time (`of_time`) is asked beside white noise, for a walk would be its rival.
+struct Comparison {
+  Regression with;
+  double log_p = 0.0;
+};
+Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                   const std::vector<double>& time_s, bool of_time);
+std::vector<double> middles(const std::vector<Pose>& poses);
+
 // Columns of one axis' readings (or of |f|, axis 3) for one effect: [poses x coefficients], those that vanish left out.
 struct Trial {
   const Effect* effect = nullptr;
@@ -37,12 +47,15 @@ struct Trial {
   Eigen::MatrixXd columns;
   std::vector<std::string> names;
 };
+// d(specific force)/d(coefficient) at a pose, SI, [3 x coefficients], of an effect that changes neither with time nor with a constant.
+Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duration_s);
 Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis);
 // Whether a pose that lasts for ever would show it.
 bool changes_with_time(const Effect& effect, double duration_s, int axis);
 // How many tests the grid of an effect's constant is worth: time constants that are near each other ask the same. By the
 // eigenvalues of the correlation of their columns beside a constant, (sum sqrt(l))^2 / sum l (Galwey 2009).
 double tests_worth(const Effect& effect, const std::vector<Pose>& poses, double duration_s, int axis);
-bool acts_on(const Effect& effect, bool gyro);
+// `has_temperature`: whether the poses have one, so that what follows it follows the channel.
+bool acts_on(const Effect& effect, bool gyro, bool has_temperature);
 
 }  // namespace selfcal::diagnosis

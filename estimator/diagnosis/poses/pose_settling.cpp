@@ -4,6 +4,7 @@
 
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_regression.hpp"
+#include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
@@ -18,23 +19,31 @@ struct Course {
   double length_s = 0.0;
 };
 
-Course course_of(const PoseInput& input, const std::vector<Pose>& poses, std::size_t k, const AccelModel& model) {
+Course course_of(const PoseInput& input, const std::vector<Pose>& poses, std::size_t k, const AccelModel& model,
+                 const std::vector<PoseEffect>& thermal) {
   const Pose& p = poses[k];
+  const double duration_s = input.time_s.back() - input.time_s.front();
+  Pose warmer = p;  // by a degree
+  warmer.temperature += 1.0;
+  const double per_degree =
+      thermal.empty()
+          ? 0.0
+          : p.u.normalized().dot(thermal_force(thermal, warmer, duration_s) - thermal_force(thermal, p, duration_s));
   Course c;
   c.pose = k;
   c.length_s = input.time_s[p.last - 1] - input.time_s[p.first];
   const double block_s = std::max(0.5, c.length_s / 60.0);
   std::vector<double> since, force;
   Vector3 sum = Vector3::Zero();
-  double when = 0.0, count = 0.0;
+  double when = 0.0, count = 0.0, warm = 0.0;
   std::size_t number = 0;
   const auto close = [&] {
     if (count > 0.0) {
       since.push_back(when / count);
-      force.push_back(model.direction(sum / count).norm());
+      force.push_back(model.direction(sum / count).norm() - warm / count * per_degree);
     }
     sum.setZero();
-    when = count = 0.0;
+    when = count = warm = 0.0;
   };
   for (const auto& [first, last] : p.quiet) {
     for (std::size_t i = first; i < last; ++i) {
@@ -45,6 +54,7 @@ Course course_of(const PoseInput& input, const std::vector<Pose>& poses, std::si
       }
       sum += at(input.accel, i);
       when += s;
+      warm += thermal.empty() ? 0.0 : input.temperature_c[i] - input.temperature_c[p.first];
       count += 1.0;
     }
   }
@@ -75,10 +85,10 @@ Eigen::MatrixXd design(const std::vector<Course>& courses, const std::vector<Pos
 }  // namespace
 
 std::optional<Settling> find_settling(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model,
-                                      double alpha) {
+                                      const std::vector<PoseEffect>& thermal, double alpha) {
   std::vector<Course> courses;
   for (std::size_t k = 1; k < poses.size(); ++k) {  // before the first there was no turn
-    courses.push_back(course_of(input, poses, k, model));
+    courses.push_back(course_of(input, poses, k, model, thermal));
   }
   std::optional<Settling> best;
   int tried = 0;

@@ -24,7 +24,8 @@ Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to
 }
 
 struct TurnFit {
-  double noise = 0.0;  // rad, of a component
+  double noise = 0.0;        // rad, of a component
+  Eigen::MatrixXd response;  // of S to the directions' errors, [9 x 3 turns]
   Eigen::Matrix<double, 9, 1> sigma = Eigen::Matrix<double, 9, 1>::Zero();
 };
 
@@ -62,6 +63,7 @@ TurnFit fit_turns(const PoseInput& input, const std::vector<Pose>& poses, const 
     for (Eigen::Index j = 0; j < 9; ++j) {
       model.S(j / 3, j % 3) += step(j);
     }
+    fit.response = -solver.solve(J.transpose());
     // A turn gives two components of a direction.
     const double free = std::max(1.0, 2.0 * static_cast<double>(turns.size()) - 9.0);
     fit.noise = std::max(1e-6, std::sqrt((r + J * step).squaredNorm() / free));
@@ -102,8 +104,48 @@ GyroModel static_model(const std::vector<Pose>& poses, std::size_t without, bool
   return m;
 }
 
-// Turns without a sample at the end of the gyros' range.
-std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagnosis& d) {
+// Sigma of S by what the poses leave open of the accelerometers' misalignments: directions of gravity are wrong by as much, and
+// gyros that carry them from pose to pose seem misaligned.
+Eigen::Matrix<double, 9, 1> sigma_by_accelerometers(const PoseInput& input, const std::vector<Pose>& poses,
+                                                    const std::vector<std::size_t>& turns, const AccelModel& accel,
+                                                    const TurnFit& fit, const GyroModel& model) {
+  Eigen::Matrix<double, 9, 1> square = Eigen::Matrix<double, 9, 1>::Zero();
+  constexpr std::array<std::pair<int, int>, 3> elements = {{{0, 1}, {0, 2}, {1, 2}}};
+  constexpr double h = 1e-4;  // rad
+  for (std::size_t e = 0; e < elements.size(); ++e) {
+    AccelModel moved = accel;
+    moved.T(elements[e].first, elements[e].second) += h / accel.raw_per_g;
+    std::vector<Pose> others = poses;
+    for (Pose& p : others) {
+      p.u = moved.direction(p.accel);
+    }
+    Eigen::VectorXd change(3 * static_cast<Eigen::Index>(turns.size()));
+    for (std::size_t t = 0; t < turns.size(); ++t) {
+      const std::size_t k = turns[t];
+      change.segment<3>(3 * static_cast<Eigen::Index>(t)) = direction_error(input, others[k], others[k + 1], model) -
+                                                            direction_error(input, poses[k], poses[k + 1], model);
+    }
+    const auto j = 6 + static_cast<Eigen::Index>(e);
+    const double sigma = accel.held(j) ? misalignment_before : accel.sigma(j) * accel.raw_per_g;
+    square += (fit.response * change * (sigma / h)).cwiseAbs2();
+  }
+  return square.cwiseSqrt();
+}
+
+void add_parameters(const GyroModel& model, const Eigen::Matrix<double, 9, 1>& sigma, PoseDiagnosis& d) {
+  for (Eigen::Index j = 0; j < 9; ++j) {
+    const bool diagonal = j % 4 == 0;
+    const std::string axes = diagonal ? std::string(1, "xyz"[j / 3]) : std::string{"xyz"[j / 3], "xyz"[j % 3]};
+    // True rate = S times reading: the sensor's own error is the inverse, to first order.
+    const double value = diagonal ? 1.0 / model.S(j / 3, j % 3) - 1.0 : -model.S(j / 3, j % 3);
+    d.gyro_parameters.push_back(
+        {(diagonal ? "scale_" : "misalignment_") + axes, "1", value, sigma(j), sigma(j) < 0.5 * scale_before});
+  }
+}
+
+}  // namespace
+
+std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d) {
   std::vector<std::size_t> turns;
   for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
     bool clipped = false;
@@ -117,31 +159,18 @@ std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<
     for (const LeftOut& out : d.left_out) {
       clipped |= out.last_s >= from && out.first_s <= to;
     }
-    if (clipped) {
-      ++d.turns_clipped;
-    } else {
+    if (!clipped) {
       turns.push_back(k);
     }
   }
   return turns;
 }
 
-void add_parameters(const GyroModel& model, const TurnFit& fit, PoseDiagnosis& d) {
-  for (Eigen::Index j = 0; j < 9; ++j) {
-    const bool diagonal = j % 4 == 0;
-    const std::string axes = diagonal ? std::string(1, "xyz"[j / 3]) : std::string{"xyz"[j / 3], "xyz"[j % 3]};
-    // True rate = S times reading: the sensor's own error is the inverse, to first order.
-    const double value = diagonal ? 1.0 / model.S(j / 3, j % 3) - 1.0 : -model.S(j / 3, j % 3);
-    d.gyro_parameters.push_back(
-        {(diagonal ? "scale_" : "misalignment_") + axes, "1", value, fit.sigma(j), fit.sigma(j) < 0.5 * scale_before});
-  }
-}
-
-}  // namespace
-
-void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, PoseDiagnosis& d) {
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, bool linear,
+                 PoseDiagnosis& d) {
   const std::vector<std::size_t> turns = usable_turns(input, poses, d);
   d.turns = static_cast<int>(turns.size());
+  d.turns_clipped = static_cast<int>(poses.size() - 1 - turns.size());
   if (turns.empty()) {
     return;
   }
@@ -159,12 +188,13 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool li
     const auto n = static_cast<double>(turns.size());
     (with ? d.direction_after : d.direction_before) = std::sqrt(square / n);
     (with ? d.direction_after_held_out : d.direction_before_held_out) = std::sqrt(held_out_square / n);
-    if (with) {
-      add_parameters(all, fit, d);
-    } else if (!linear) {
+    if (with || !linear) {
+      const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
+      add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
+    }
+    if (!with && !linear) {
       d.direction_after = d.direction_before;
       d.direction_after_held_out = d.direction_before_held_out;
-      add_parameters(all, fit, d);
       break;
     }
   }

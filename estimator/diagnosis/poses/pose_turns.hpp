@@ -14,7 +14,13 @@ struct GyroModel {
   Matrix3 G = Matrix3::Zero();     // raw per g
 };
 
-// Direction of gravity before and after what is named, fitted and held out, into `d`; turns with clipped samples left out.
-void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, bool linear, PoseDiagnosis& d);
+// Numbers of the poses behind which a turn begins that holds no sample at the end of the gyros' range (d.clipped) and none that was
+// left out.
+std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d);
+
+// Direction of gravity before and after what is named, fitted and held out, into `d`; turns with clipped samples left out. Sigma of
+// the parameters holds what the poses leave open of the accelerometers' misalignments.
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, bool linear,
+                 PoseDiagnosis& d);
 
 }  // namespace selfcal::diagnosis

@@ -4,8 +4,10 @@
 #include <cmath>
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
+#include "estimator/diagnosis/poses/pose_earth.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
+#include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 #include "estimator/diagnosis/poses/read_outs.hpp"
 #include "estimator/geometry/units.hpp"
@@ -76,7 +78,7 @@ void add_invisible_of_accelerometers(PoseDiagnosis& d) {
   add_untested(d);
 }
 
-void calibrate(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
+AccelModel calibrate(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   const auto fit = [&] {
     AccelModel model = fit_accelerometers(input, poses);
     for (Pose& p : poses) {
@@ -85,14 +87,42 @@ void calibrate(const PoseInput& input, double alpha, std::vector<Pose>& poses, P
     return model;
   };
   AccelModel accel = fit();
-  d.settling = find_settling(input, poses, accel, 0.5 * alpha);
+  const double duration_s = input.time_s.back() - input.time_s.front();
+  constexpr double of_temperature = 0.3;
+  const double left = d.has_temperature ? (1.0 - of_temperature) * alpha : alpha;
+  if (d.has_temperature) {
+    d.accel_named = name_thermal(accel, poses, duration_s, of_temperature * alpha);
+    take_out(d.accel_named, accel, duration_s, poses);
+    accel = fit();
+    // What the poses differed by before was noise of the first fit, and a hundredth of g is not small: to convergence.
+    constexpr int rounds = 3;
+    for (int round = 0; round < rounds && !d.accel_named.empty(); ++round) {
+      take_out(refine_thermal(accel, poses, duration_s, d.accel_named), accel, duration_s, poses);
+      accel = fit();
+    }
+  }
+  d.settling = find_settling(input, poses, accel, d.accel_named, 0.5 * left);
   if (d.settling) {
     take_out(*d.settling, input, accel, poses);
     accel = fit();
   }
   d.accel_parameters = parameters_of(accel);
   d.gravity_span_deg = span_of(poses);
-  judge_accelerometers(accel, poses, input.time_s.back() - input.time_s.front(), 0.5 * alpha, d);
+  judge_accelerometers(accel, poses, duration_s, d.has_temperature, 0.5 * left, d);
+  return accel;
+}
+
+// The poses with the Earth's rate taken out of the gyros' means: beside a sensor that sees it, it goes with the pose as a
+// g-sensitivity does.
+std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagnosis& d) {
+  const bool carried = usable_turns(input, poses, d).size() + 1 == poses.size();
+  const EarthInPoses earth = earth_in_poses(input, poses, carried);
+  d.earth_taken_out = earth.heading;
+  std::vector<Pose> still = poses;
+  for (std::size_t k = 0; k < still.size(); ++k) {
+    still[k].gyro -= earth.rate[k];
+  }
+  return still;
 }
 
 }  // namespace
@@ -101,11 +131,12 @@ namespace {
 
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
-  calibrate(input, 0.5 * alpha, poses, d);
-  judge_gyros(poses, input.time_s.back() - input.time_s.front(), 0.5 * alpha, d);
+  const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
+  judge_gyros(without_earth(input, poses, d), input.time_s.back() - input.time_s.front(), d.has_temperature,
+              0.5 * alpha, d);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
-  judge_turns(input, poses, linear, d);
+  judge_turns(input, poses, accel, linear, d);
   add_invisible(d);
 }
 
@@ -126,6 +157,10 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
     }
   }
   add_read_outs(input, d);
+  if (d.steady_turns > 0 && input.outer.empty()) {
+    d.invisible.push_back("scale factors by " + std::to_string(d.steady_turns) +
+                          " stretches that turn steadily: the recording holds no angle of the table");
+  }
 }
 
 std::string counted(int count, const std::string& what) {
@@ -212,7 +247,24 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
 
 }  // namespace
 
-PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
+namespace {
+
+// An encoder counts from 0 to 360 deg and begins again: no sample turns by more than half a turn.
+void unwrap(std::vector<double>& angle) {
+  double whole = 0.0;
+  for (std::size_t i = 1, n = angle.size(); i < n; ++i) {
+    const double step = angle[i] + whole - angle[i - 1];
+    whole -= 2.0 * M_PI * std::round(step / (2.0 * M_PI));
+    angle[i] += whole;
+  }
+}
+
+bool wraps(const std::vector<double>& angle) {
+  return std::adjacent_find(angle.begin(), angle.end(), [](double a, double b) { return std::abs(b - a) > M_PI; }) !=
+         angle.end();
+}
+
+PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   PoseDiagnosis d;
   if (input.time_s.size() < 100 || input.gyro.size() != input.time_s.size() ||
       input.accel.size() != input.time_s.size()) {
@@ -222,9 +274,12 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   d.sensors = input.sensors;
   d.clipped = find_clipping(input);
   d.left_out = find_left_out(input);
-  std::vector<Pose> poses = find_poses(input);
+  FoundPoses found = find_poses(input);
+  std::vector<Pose>& poses = found.poses;
+  d.steady_turns = found.steady_turns;
   if (!poses.empty()) {
     add_noise(input, poses, d);
+    d.has_temperature = take_temperatures(input, poses);
   }
   d.by_poses = poses.size() >= least_poses && input.sensors != Sensors::gyros;
   if (input.sensors == Sensors::gyros) {
@@ -256,6 +311,18 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
   }
   add_supports(input, d);
   return d;
+}
+
+}  // namespace
+
+PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
+  if (!wraps(input.outer) && !wraps(input.inner)) {
+    return diagnose_continuous(input, alpha);
+  }
+  PoseInput continuous = input;
+  unwrap(continuous.outer);
+  unwrap(continuous.inner);
+  return diagnose_continuous(continuous, alpha);
 }
 
 }  // namespace selfcal::diagnosis

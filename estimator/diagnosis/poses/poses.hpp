@@ -27,7 +27,9 @@ struct PoseInput {
   Sensors sensors = Sensors::both;
   double gyro_unit = 1.0;             // nominal rad/s per raw unit
   double accel_unit = 0.0;            // nominal m/s^2 per raw unit; 0: not known
-  std::vector<double> outer, inner;   // angle read-outs, rad; empty: none
+  double gravity = 9.80665;           // m/s^2 where it was recorded
+  std::optional<double> latitude;     // rad where it was recorded; none: not known
+  std::vector<double> outer, inner;   // angle read-outs, rad, of any whole turns; empty: none
   std::vector<double> temperature_c;  // empty: no channel
 };
 
@@ -140,19 +142,23 @@ struct PoseDiagnosis {
   std::vector<PoseParameter> accel_parameters;
   std::vector<PoseEffect> accel_tried;  // best first
   std::optional<Settling> settling;
+  std::vector<PoseEffect> accel_named;  // what follows a measured temperature, SI; taken out of the parameters
+  bool has_temperature = false;         // whether a channel of temperature moves from pose to pose
   // Gyros in the poses.
   std::array<double, 3> gyro_bias{}, gyro_bias_sigma{};  // raw units
-  std::array<double, 3> gyro_held_out_rms{};             // bias alone, raw units
-  std::array<double, 3> gyro_white_rms{};                // what white noise would leave of a pose's mean
-  std::vector<PoseEffect> gyro_tried;                    // each alone, best first
-  std::vector<PoseEffect> gyro_named;                    // forward selection
-  std::vector<PoseEffect> gyro_open;                     // what is left beside what is named: coefficients and sigma
+  bool earth_taken_out = false;  // whether the Earth's rate was taken out of the gyros' means, heading included
+  std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
+  std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
+  std::vector<PoseEffect> gyro_tried;         // each alone, best first
+  std::vector<PoseEffect> gyro_named;         // forward selection
+  std::vector<PoseEffect> gyro_open;          // what is left beside what is named: coefficients and sigma
   std::vector<Confounded> confounded;
   // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted.
   int turns = 0, turns_clipped = 0;
   std::vector<PoseParameter> gyro_parameters;
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
+  int steady_turns = 0;  // stretches that are quiet and turn: no poses
   std::optional<ReadOuts> read_outs;
   std::optional<Rest> rest;                        // of fewer poses than calibrate
   std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first

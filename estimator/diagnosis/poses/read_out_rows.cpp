@@ -157,12 +157,12 @@ std::vector<Delay> delays_of_turns(const PoseInput& input, const std::vector<Tur
   std::vector<Delay> delays;
   for (const TurnRow& row : rows) {
     const bool outer = std::abs(row.outer) > std::abs(row.inner);
-    const ReadOutAxis* axis = axis_called(found, outer);
-    if (axis == nullptr) {
+    if (axis_called(found, outer) == nullptr) {
       continue;
     }
     const std::vector<double>& angle = outer ? input.outer : input.inner;
-    const Vector3 along = axis->response * (input.gyro_unit / axis->response.squaredNorm());
+    const Vector3 along =
+        row.turned.normalized();  // the axis of this turn: that of the outer one goes with the inner angle
     const double middle = 0.5 * (input.time_s[row.first] + input.time_s[row.last]);
     double by_gyros = 0.0, by_read_out = 0.0;  // first moments
     for (std::size_t i = row.first + 1; i <= row.last; ++i) {
