@@ -126,7 +126,7 @@ class Guesser {
     }
     const double si = roles_.time_is_date ? 1.0 : find_unit(map.time.unit)->si;
     const RateOfStamps rate = rate_of(roles_.stamps, static_cast<long double>(si));
-    map.sample_rate_hz = rate.rate_hz;
+    map.sample_rate_hz = is_doubted("time.unit") ? std::nullopt : std::optional(rate.rate_hz);  // by what is settled
     interval_s_ = 1.0 / rate.rate_hz;
     say("time.unit", fmt::format("{}: {} Hz; intervals vary by {:.2g} % rms{}", map.time.unit, rate.rate_hz,
                                  rate.jitter < 1e-9 ? 0.0 : 100.0 * rate.jitter,
@@ -442,7 +442,8 @@ class Guesser {
     }
     const std::vector<double>& values = values_[roles_.temperature.front()];
     const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-    const TemperatureFit fit = temperature_unit(mean, named_[roles_.temperature.front()].unit);
+    const bool whole = std::all_of(values.begin(), values.end(), [](double v) { return v == std::floor(v); });
+    const TemperatureFit fit = temperature_unit(mean, named_[roles_.temperature.front()].unit, whole);
     map.temperature_unit = fit.unit;
     guess_.remarks.push_back({"temperature.unit", fit.words, fit.doubt});
   }

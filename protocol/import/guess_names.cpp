@@ -347,6 +347,12 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   if (column.role == Role::time && thermal && is_one_of(words, {"t"})) {
     column.role = Role::temperature;
   }
+  // "axis1_rate_dps": how fast a table turns is no read-out of where it stands.
+  const auto unit_said = find_unit(column.unit);
+  const bool turns = unit_said && unit_said->quantity == Quantity::angular_rate;
+  if (turns && (column.role == Role::outer || column.role == Role::inner || column.role == Role::gimbal)) {
+    column.role = Role::other;
+  }
   if (column.role == Role::temperature && column.unit.empty()) {
     column.unit = unit_among(words, {{"c", "C"}, {"k", "K"}, {"f", "F"}});
   }

@@ -10,34 +10,15 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/guess_axes.hpp"
+#include "protocol/import/guess_time.hpp"
 #include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/units.hpp"
 
 namespace selfcal::import {
 namespace {
 
 bool all_finite(const std::vector<double>& values) {
   return !values.empty() && std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
-
-template <typename Number>
-bool increasing(const std::vector<Number>& values) {
-  return values.size() > 2 &&
-         std::adjacent_find(values.begin(), values.end(), [](Number a, Number b) { return !(b > a); }) == values.end();
-}
-
-// Nearly all intervals of about the same length: a time, and no slowly rising quantity.
-template <typename Number>
-bool even(const std::vector<Number>& values) {
-  std::vector<Number> steps;
-  for (std::size_t k = 1; k < values.size(); ++k) {
-    steps.push_back(values[k] - values[k - 1]);
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  const Number typical = *middle;
-  const auto like = std::count_if(steps.begin(), steps.end(),
-                                  [typical](Number s) { return s > typical / 2 && s < typical + typical / 2; });
-  return static_cast<double>(like) > 0.9 * static_cast<double>(steps.size());
 }
 
 class Assigner {
@@ -90,7 +71,7 @@ class Assigner {
       if (data) {
         leave_out(lost_, *data);
       }
-      if (data && increasing(data->stamps) && even(data->stamps)) {
+      if (data && rises_evenly(data->stamps)) {
         roles_.time = column;
         roles_.time_is_date = date;
         roles_.stamps = data->stamps;
@@ -112,7 +93,7 @@ class Assigner {
         if (try_time(k)) {
           return say("time.column", fmt::format("{}, by its name; it increases evenly", source_.title(k)));
         }
-        named_but = source_.title(k);
+        named_but = fmt::format("{} is named so, but {}", source_.title(k), why_uneven(values_[k]));
       }
     }
     // A column that rises by 1 is a counter as well as a time.
@@ -130,7 +111,7 @@ class Assigner {
       }
     }
     if (!named_but.empty()) {
-      doubt("time.column", fmt::format("{} is named so, but does not increase evenly", named_but));
+      doubt("time.column", named_but);
     }
   }
 
@@ -368,7 +349,7 @@ class Assigner {
     constexpr double good_turns = 0.95;
     std::optional<GimbalPair> best;
     const auto is_free = [&](std::size_t k) {
-      return !used_[k] && std::find(gyro.begin(), gyro.end(), k) == gyro.end();
+      return !used_[k] && !is_rate(k) && std::find(gyro.begin(), gyro.end(), k) == gyro.end();
     };
     for (std::size_t k = 0; k + 1 < values_.size(); ++k) {
       if (!is_free(k) || !is_free(k + 1)) {
@@ -417,9 +398,13 @@ class Assigner {
     return named_[column].role == Role::gimbal ||
            says(column, {"gimbal", "outer", "inner", "axis", "angle", "table", "encoder"});
   }
+  bool is_rate(std::size_t column) const {
+    const auto unit = find_unit(named_[column].unit);
+    return unit && unit->quantity == Quantity::angular_rate;
+  }
   bool is_angle(std::size_t column) const {
     const std::string& unit = named_[column].unit;
-    if (named_[column].role == Role::other) {
+    if (named_[column].role == Role::other || is_rate(column)) {
       return false;
     }
     return unit == "deg" || unit == "rad" || is_read_out(column) || says(column, {"azimuth", "pitch", "yaw", "roll"});
@@ -443,6 +428,11 @@ class Assigner {
         angles.push_back(k);
       }
     }
+    // A table's own angle before an attitude beside it.
+    if (angles.size() > 1 &&
+        std::count_if(angles.begin(), angles.end(), [this](auto k) { return is_read_out(k); }) == 1) {
+      std::erase_if(angles, [this](std::size_t k) { return !is_read_out(k); });
+    }
     if (angles.size() == 1 && all_finite(values_[angles.front()])) {
       roles_.angle = angles.front();
       roles_.angle_of_a_table = is_read_out(angles.front());
@@ -455,6 +445,12 @@ class Assigner {
                                   source_.title(angles.front())));
     }
     for (std::size_t k = 0; k < values_.size(); ++k) {
+      if (is_free(k) && is_rate(k) && is_read_out(k) && !roles_.gimbal && !roles_.angle) {
+        say("gimbal",
+            fmt::format(
+                "{}: a table's rate, which no map takes; its running sum times the interval, as a column, is the angle",
+                source_.title(k)));
+      }
       if (is_free(k)) {
         rest += fmt::format("{}{}", rest.empty() ? "" : ", ", source_.title(k));
       }

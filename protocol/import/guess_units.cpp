@@ -97,7 +97,7 @@ std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const 
                    {0.08, 0.03});
 }
 
-TemperatureFit temperature_unit(double mean, const std::string& claimed) {
+TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole) {
   if (claimed == "C" || claimed == "K" || claimed == "F") {
     const double celsius_of = celsius(mean, claimed);
     const bool fits = celsius_of > -60.0 && celsius_of < 130.0;
@@ -107,7 +107,7 @@ TemperatureFit temperature_unit(double mean, const std::string& claimed) {
             !fits};
   }
   if (mean > 200.0) {
-    const bool fits = mean < 400.0;
+    const bool fits = mean < 400.0 && !whole;
     return {"K", fmt::format("{}: {:.4g}", fits ? "K" : "K, or counts", mean), !fits};
   }
   if (mean > -40.0 && mean < 45.0) {

@@ -34,7 +34,8 @@ struct TemperatureFit {
   bool doubt = false;
 };
 // Of a column with this mean; CLAIMED may be empty.
-TemperatureFit temperature_unit(double mean, const std::string& claimed);
+// `whole`: all values are whole numbers: 293 may be a register's 29.3 degC as well as 20 degC in K.
+TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole);
 
 // Units (s, ms, us, ns) in which times with this interval make 1 Hz to 20 kHz, the likeliest first.
 std::vector<std::string> time_units(double interval);

@@ -32,6 +32,8 @@ struct Log {
   double delay_s = 0.0;    // of the read-out
   bool follows = true;     // else the angle does something else
   bool with_angle = true;
+  bool with_rate = false;  // the table's own, beside its angle
+  double restart_s = 0.0;  // the logger's time begins anew then; 0: never
 };
 
 class GuessTable : public ::testing::Test {
@@ -41,18 +43,19 @@ class GuessTable : public ::testing::Test {
     std::mt19937 engine(7);
     std::normal_distribution<double> normal;
     std::string text = "time_s,gx_dps,gy_dps,gz_dps,ax_mps2,ay_mps2,az_mps2";
-    text += log.with_angle ? "," + log.angle_name + "\n" : "\n";
+    text += (log.with_rate ? ",table_rate_dps" : "") + (log.with_angle ? "," + log.angle_name + "\n" : "\n");
     const int samples = static_cast<int>(12.0 * (stop_s + turn_s) * rate_hz);
     for (int k = 1; k <= samples; ++k) {
       const double t = k / rate_hz, dt = 1.0 / rate_hz;
       const double rate = log.gyro_sign * (table_angle(t) - table_angle(t - dt)) / dt;
-      text += fmt::format("{:.2f}", t);
+      text += fmt::format("{:.2f}", log.restart_s > 0.0 && t > log.restart_s ? t - log.restart_s : t);
       for (const double value : {0.1, -0.2, rate + 0.05}) {
         text += fmt::format(",{:.6f}", value + 0.02 * normal(engine));
       }
       for (const double value : {0.01, 0.02, 9.807}) {
         text += fmt::format(",{:.6f}", value + 0.003 * normal(engine));
       }
+      text += log.with_rate ? fmt::format(",{:.4f}", rate) : "";
       const double angle = log.follows ? table_angle(std::max(0.0, t - log.delay_s)) : 40.0 * std::sin(t);
       text += log.with_angle ? fmt::format(",{:.5f}\n", std::fmod(angle, 360.0)) : "\n";
     }
@@ -95,6 +98,24 @@ TEST_F(GuessTable, LateAndReversed) {
   ASSERT_TRUE(guess.map.gimbal.outer);
   EXPECT_EQ(guess.map.gimbal.signs[0], -1.0);
   EXPECT_THAT(guess.map.unsettled, Not(Contains("gimbal")));
+}
+
+TEST_F(GuessTable, ATablesRateBesideItsAngleIsNoSecondAngle) {
+  const Guess guess = guess_of({.with_rate = true});
+  ASSERT_TRUE(guess.map.gimbal.outer);
+  EXPECT_EQ(guess.map.gimbal.outer->name, "table_angle_deg");
+  EXPECT_THAT(guess.map.unsettled, Not(Contains("gimbal")));
+}
+
+TEST_F(GuessTable, ATablesRateAloneIsSaidToBeNoAngle) {
+  const Guess guess = guess_of({.with_angle = false, .with_rate = true});
+  EXPECT_THAT(said(guess, "gimbal", false), HasSubstr("column 8 (table_rate_dps): a table's rate"));
+}
+
+TEST_F(GuessTable, WhereATimeBeginsAnewIsSaid) {
+  const Guess guess = guess_of({.restart_s = 40.0});
+  EXPECT_THAT(said(guess, "time.column", true),
+              HasSubstr("in 1 place, first from 40 to 0.02 at row 2001 of the numbers"));
 }
 
 TEST_F(GuessTable, WhatTheGyrosDoNotFollowIsDoubted) {

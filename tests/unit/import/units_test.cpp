@@ -50,6 +50,14 @@ TEST(Units, TurnsTellRatesFromIncrements) {
   EXPECT_EQ(gyro_unit(4.848e-8, 0.01, {}).value().unit, "deg/h");
 }
 
+// 29.3 degC in a register of 0.1 degC a count, and 20 degC in K.
+TEST(Units, WholeNumbersOfATemperatureMayBeCounts) {
+  EXPECT_TRUE(temperature_unit(293.0, {}, true).doubt);
+  EXPECT_FALSE(temperature_unit(293.1, {}, false).doubt);
+  EXPECT_EQ(temperature_unit(293.1, {}, false).unit, "K");
+  EXPECT_FALSE(temperature_unit(293.0, "K", true).doubt);
+}
+
 TEST(Units, TimesThatMakeASampleRate) {
   EXPECT_THAT(time_units(0.01), ElementsAre("s"));
   EXPECT_THAT(time_units(10000), ElementsAre("us"));
