@@ -31,6 +31,7 @@ RawColumns raw_columns(const PosesArguments& arguments) {
   columns.sensors = arguments.only == "gyros"            ? diagnosis::Sensors::gyros
                     : arguments.only == "accelerometers" ? diagnosis::Sensors::accelerometers
                                                          : diagnosis::Sensors::both;
+  columns.raw_gyros = arguments.gyro_unit != 1.0;
   columns.angle = static_cast<std::size_t>(arguments.angle_column.value_or(0));
   columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
@@ -51,15 +52,18 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   if (const auto columns = check_columns(arguments, is_recording); !columns) {
     return tl::unexpected(columns.error());
   }
-  Expected<diagnosis::PoseInput> input =
-      is_recording
-          ? read_hdf5(arguments.file, lenient).map([](const auto& loaded) { return pose_input_of(loaded.recording); })
-          : read_raw_poses(arguments.file, raw_columns(arguments));
-  if (!input) {
-    return tl::unexpected(input.error());
+  Expected<RawLog> log = is_recording ? read_hdf5(arguments.file, lenient).map([](const auto& loaded) {
+    return RawLog{pose_input_of(loaded.recording), true, {}};
+  })
+                                      : read_raw_poses(arguments.file, raw_columns(arguments));
+  if (!log) {
+    return tl::unexpected(log.error());
   }
-  input->gyro_unit = arguments.gyro_unit;
-  const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(*input, arguments.false_alarm_rate);
+  if (!log->notes.empty()) {
+    fmt::print(stderr, "selfcal poses: {}: {}\n", arguments.file, log->notes);
+  }
+  log->input.gyro_unit = arguments.gyro_unit;
+  const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
   if (!d.failure.empty()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.file, d.failure));
   }
@@ -70,7 +74,7 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
     }
     fmt::print("{}\n", document::with_head(document::poses, poses_json(d), *file).dump());
   } else {
-    fmt::print("{}", poses_text(d, is_recording));
+    fmt::print("{}", poses_text(d, log->si));
   }
   return poses_mismatch(d) ? 1 : 0;
 }
@@ -78,7 +82,7 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<PosesArguments>();
   options.text("FILE", arguments->file,
-               "CSV with a header: time in s, gyros x y z, accelerometers x y z, raw; or a recording (.h5)",
+               "a log: columns by their names, else time in s, gyros x y z, accelerometers x y z; or a recording (.h5)",
                Needed::yes);
   options.choice("--only", arguments->only, {"gyros", "accelerometers"},
                  "gyros or accelerometers: the CSV holds these alone, time in s and then x y z");

@@ -285,6 +285,14 @@ Json read_outs_json(const diagnosis::ReadOuts& r) {
 
 std::string axis_text(const diagnosis::ReadOutAxis& a) {
   const Eigen::Index k = main_axis(a);
+  const double gain = std::abs(a.response(k));
+  constexpr double any_gain = 2.0;  // beyond it the gyros' unit is not that which was told
+  if (gain > any_gain || gain < 1.0 / any_gain) {
+    return fmt::format(
+        "  {} axis, {} {}: gyro {}{} {:.6g} +- {:.2g} raw units per rad/s ({:.6g} per deg/s; --gyro-unit says it)\n",
+        a.name, a.rows, a.steady ? "steady rates" : "turns", a.response(k) < 0.0 ? "-" : "", "xyz"[k], gain, a.sigma(k),
+        gain * units::degree);
+  }
   std::string text = fmt::format(
       "  {} axis, {} {}{}: gyro {}{} {:+.2f} +- {:.2f} %", a.name, a.rows, a.steady ? "steady rates" : "turns",
       a.steady ? fmt::format(" of {:.0f} to {:.0f} deg/s", a.slowest_deg_per_s, a.fastest_deg_per_s)
