@@ -176,6 +176,13 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
   for (const std::string& words : undetermined_at_rest(*d.rest, d)) {
     d.invisible.push_back(words);
   }
+  constexpr double most = 0.7;
+  const double all = input.time_s.back() - input.time_s.front();
+  if (d.steady_turns == 0 && !d.read_outs && d.static_seconds < most * all) {
+    d.invisible.push_back("what happens in " + std::to_string(std::lround(all - d.static_seconds)) + " of " +
+                          std::to_string(std::lround(all)) +
+                          " s: the sensor shakes or moves more than at rest there, and they are left out");
+  }
 }
 
 // Gyros alone: nothing says where down is, so that only rest and a table's angles are left to hold them against.
