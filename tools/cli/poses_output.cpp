@@ -422,6 +422,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
            {{"bias", d.gyro_bias},
             {"bias_sigma", d.gyro_bias_sigma},
             {"earth_taken_out", d.earth_taken_out},
+            {"accelerometers_reversed", d.accel_reversed},
             {"held_out_rms", d.gyro_held_out_rms},
             {"white_rms", d.gyro_white_rms},
             {"noise_at_rest", noise_json(d.gyro_noise)},

@@ -71,13 +71,21 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
     return earth;
   }
   const Vector3 omega_n = earth::omega_ie_n(*input.latitude) / input.gyro_unit;  // north, up, east
-  std::vector<Vector3> reading;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    earth.rate[k] = omega_n.y() * poses[k].u.normalized();
-    reading.emplace_back(poses[k].gyro - earth.rate[k]);
-  }
+  const auto less_vertical = [&](double up) {
+    std::vector<Vector3> reading;
+    for (const Pose& p : poses) {
+      reading.emplace_back(p.gyro - up * p.u.normalized());
+    }
+    return reading;
+  };
+  const auto take = [&](double up) {
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      earth.rate[k] = up * poses[k].u.normalized();
+    }
+  };
   constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
   if (!carried || poses.size() < enough) {
+    take(omega_n.y());
     return earth;
   }
   const std::vector<Vector3> first = carried_direction(input, poses);
@@ -85,10 +93,17 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   for (std::size_t k = 0; k < poses.size(); ++k) {
     second.emplace_back(poses[k].u.normalized().cross(first[k]));
   }
-  const Heading found = find_heading(poses, reading, first, second, omega_n.x());
   const double free = 3.0 * static_cast<double>(poses.size() - 1);
   constexpr double likelier = 6.0;
-  earth.heading = 0.5 * free * std::log(found.without / std::max(1e-300, found.with)) > likelier;
+  const auto shows = [free](double without, double with) {
+    return 0.5 * free * std::log(without / std::max(1e-300, with)) > likelier;
+  };
+  Heading found = find_heading(poses, less_vertical(omega_n.y()), first, second, omega_n.x());
+  const Heading other = find_heading(poses, less_vertical(-omega_n.y()), first, second, omega_n.x());
+  earth.reversed = shows(found.with, other.with);
+  found = earth.reversed ? other : found;
+  earth.heading = shows(found.without, found.with);
+  take(earth.reversed ? -omega_n.y() : omega_n.y());
   for (std::size_t k = 0; k < poses.size(); ++k) {
     earth.rate[k] += omega_n.x() * (std::cos(found.angle) * first[k] + std::sin(found.angle) * second[k]);
   }

@@ -118,6 +118,7 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   const bool carried = usable_turns(input, poses, d).size() + 1 == poses.size();
   const EarthInPoses earth = earth_in_poses(input, poses, carried);
   d.earth_taken_out = earth.heading;
+  d.accel_reversed = earth.reversed;
   std::vector<Pose> still = poses;
   for (std::size_t k = 0; k < still.size(); ++k) {
     still[k].gyro -= earth.rate[k];

@@ -97,6 +97,26 @@ TEST(BenchPoses, TheEarthsRateIsNoGSensitivity) {
   EXPECT_GT(unknown.gyro_bias_sigma[0], 10.0 * d.gyro_bias_sigma[0]);
 }
 
+// As of a log in which an axis that points up reads -g: the bias of the gyros is the same, and the reason is said.
+TEST(BenchPoses, TheEarthsRateTellsAccelerometersThatAreReversed) {
+  Bench b = navigation_grade(1);
+  for (const int k : {0, 2, 1, 3, 4, 5, 0}) {
+    b.turn_to(b.tilted(faces[static_cast<std::size_t>(k)], 0.01));
+    b.rest(20.0);
+  }
+  EXPECT_FALSE(diagnose_poses(b.input, 0.01).accel_reversed);
+  for (std::array<double, 3>& f : b.input.accel) {
+    f = {-f[0], -f[1], -f[2]};
+  }
+  const PoseDiagnosis d = diagnose_poses(b.input, 0.01);
+  EXPECT_TRUE(d.accel_reversed);
+  EXPECT_TRUE(d.gyro_named.empty());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_LT(std::abs(d.gyro_bias[axis] - b.gyro_bias(static_cast<Eigen::Index>(axis))),
+              6.0 * d.gyro_bias_sigma[axis]);
+  }
+}
+
 TEST(BenchPoses, AGSensitivityIsNamedBesideTheEarthsRate) {
   Bench b = navigation_grade(2);
   b.G << 0.0, 4.0, 0.0, 0.0, 0.0, -3.0, 5.0, 0.0, 0.0;  // deg/h/g
