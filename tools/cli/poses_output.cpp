@@ -170,6 +170,9 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
   std::string text =
       fmt::format("gyros in the poses, {}: bias {} +- {}{}\n", shown.gyro_name, three(d.gyro_bias, shown.gyro),
                   three(d.gyro_bias_sigma, shown.gyro), d.earth_taken_out ? ", the Earth's rate taken out" : "");
+  if (d.accel_reversed) {
+    text += "  the Earth's rate shows all accelerometers reversed: they read acceleration, no specific force\n";
+  }
   text += fmt::format("  rms, poses left out in turn: bias alone {} (white noise {})\n",
                       three(d.gyro_held_out_rms, shown.gyro), three(d.gyro_white_rms, shown.gyro));
   for (const diagnosis::PoseEffect& e : d.gyro_tried) {
