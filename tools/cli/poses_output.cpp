@@ -25,6 +25,7 @@ Json to_json(const std::vector<diagnosis::PoseEffect>& effects) {
       j["parameters"].push_back({{"name", e.parameters[k]}, {"value", e.value[k]}, {"sigma", e.sigma[k]}});
     }
     j["equivalent"] = ids(e.equivalent);
+    j["may_be_flicker"] = e.may_be_flicker;
     if (!std::isnan(e.constant)) {
       j["constant"] = e.constant;
     }
@@ -188,6 +189,12 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
     text += effect_text(e, shown);
     if (!std::isnan(e.constant)) {
       text += fmt::format("    {:4} {:9.3g} {}\n", e.effect->constant.name, e.constant, e.effect->constant.unit);
+    }
+    if (e.may_be_flicker) {
+      text +=
+          "    or a bias that wanders by itself: beside 1/f noise as large as the halves of the poses differ by it is "
+          "not seen;\n"
+          "    the same poses once more, just switched on, would tell\n";
     }
     if (!e.equivalent.empty()) {
       text += "    these poses do not tell them apart; the same poses once more in another order do\n";

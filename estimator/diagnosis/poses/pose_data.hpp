@@ -12,7 +12,7 @@ namespace selfcal::diagnosis {
 struct Pose {
   std::size_t first = 0, last = 0;                         // samples
   std::vector<std::pair<std::size_t, std::size_t>> quiet;  // of them those without a disturbance
-  double middle_s = 0.0;
+  double middle_s = 0.0, length_s = 0.0;
   double temperature = 0.0;         // mean, less that of all poses, degC; zero: no channel that moves
   Vector3 gyro, accel;              // means, raw
   Vector3 gyro_white, accel_white;  // sigma of the mean by white noise, raw

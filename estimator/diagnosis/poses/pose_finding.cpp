@@ -63,6 +63,7 @@ void take_means(const PoseInput& input, Pose& p) {
   }
   const auto n = static_cast<double>(total);
   p.middle_s = middle / n;
+  p.length_s = input.time_s[p.last - 1] - input.time_s[p.first];
   p.gyro = (gyro[0] + gyro[1]) / n;
   p.accel = (accel[0] + accel[1]) / n;
   p.gyro_half = 0.5 * (gyro[1] / count[1] - gyro[0] / count[0]);

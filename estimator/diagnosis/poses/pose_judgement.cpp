@@ -75,8 +75,11 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
     const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, of_time(effect));
+    const double beside_flicker =
+        of_time(effect) ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i]) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;
     result.log_p = std::min(result.log_p, c.log_p);
+    result.log_p_beside_flicker = std::min(result.log_p_beside_flicker, std::max(c.log_p, beside_flicker));
     for (std::size_t j = 0; j < trial.names.size(); ++j) {
       result.parameters.push_back(trial.names[j]);
       result.value.push_back(c.with.value(known_[i].cols() + static_cast<Eigen::Index>(j)));
@@ -107,6 +110,7 @@ std::vector<PoseEffect> Gyros::try_all(const std::vector<PoseEffect>& named) con
   }
   for (PoseEffect& p : all) {
     p.log_p = log_corrected(p.log_p, 3.0 * tried);
+    p.log_p_beside_flicker = log_corrected(p.log_p_beside_flicker, 3.0 * tried);
   }
   best_first(all);
   return all;
@@ -235,6 +239,7 @@ void judge_gyros(const std::vector<Pose>& poses, double duration_s, bool has_tem
   std::vector<PoseEffect> left = d.gyro_tried;
   while (!left.empty() && left.front().log_p < limit) {
     PoseEffect chosen = left.front();
+    chosen.may_be_flicker = chosen.log_p_beside_flicker > limit;
     gyros.keep(chosen);
     std::vector<PoseEffect> named = d.gyro_named;
     named.push_back(chosen);

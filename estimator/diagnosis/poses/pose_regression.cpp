@@ -159,6 +159,48 @@ Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns,
   return c;
 }
 
+double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
+                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
+  const auto n = static_cast<Eigen::Index>(poses.size());
+  constexpr double median_of_square =
+      0.4549;  // of a normal number of unit variance: a pose in which something else moved counts once
+  double length_s = 0.0;
+  Eigen::VectorXd white(n);
+  std::vector<double> halves;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Pose& p = poses[static_cast<std::size_t>(k)];
+    white(k) = p.gyro_white(axis) * p.gyro_white(axis);
+    halves.push_back(p.gyro_half(axis) * p.gyro_half(axis));
+    length_s += p.length_s / static_cast<double>(n);
+  }
+  std::nth_element(halves.begin(), halves.begin() + n / 2, halves.end());
+  const double half = halves[static_cast<std::size_t>(n / 2)] / median_of_square;
+  const double level = (half - white.mean()) / std::log(2.0);
+  const double times = (time_s.back() - time_s.front()) / length_s;
+  if (!(level > 0.0) || !(times > 1.0)) {
+    return -HUGE_VAL;
+  }
+  constexpr double far_apart = 1.5, beyond = 1.0;
+  const double variance = std::log(times) + far_apart + beyond;  // any constant is the bias
+  Eigen::MatrixXd covariance = white.asDiagonal();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double apart_s = std::abs(time_s[static_cast<std::size_t>(i)] - time_s[static_cast<std::size_t>(j)]);
+      covariance(i, j) +=
+          level * (i == j ? variance : variance - far_apart - std::log(std::max(1.0, apart_s / length_s)));
+    }
+  }
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  if (root.info() != Eigen::Success) {
+    return -HUGE_VAL;
+  }
+  const Eigen::VectorXd whitened = root.matrixL().solve(y);
+  const Regression without = regress(root.matrixL().solve(known), whitened);
+  const Regression with = regress(root.matrixL().solve(joined(known, columns)), whitened);
+  const auto more = static_cast<double>(with.rank - without.rank);
+  return more < 1.0 ? 0.0 : log_chi_squared_tail(std::max(0.0, without.square - with.square), more);
+}
+
 std::vector<double> middles(const std::vector<Pose>& poses) {
   std::vector<double> time_s;
   time_s.reserve(poses.size());

@@ -41,6 +41,9 @@ struct PoseEffect {
   double log_p = 0.0;                     // F test, corrected for axes, effects and constants tried
   std::array<double, 3> held_out_rms{};   // of poses left out in turn, raw units, with this and what was named before
   std::vector<const Effect*> equivalent;  // explain the poses as well: the order of the poses does not tell them apart
+  // Of what changes with time: the same test beside a 1/f noise as large as the halves of the poses show, corrected likewise; else `log_p`.
+  double log_p_beside_flicker = 0.0;
+  bool may_be_flicker = false;  // named, and not seen beside that noise
 };
 
 // How much of what one effect would do another one does too, over the times and directions of these poses.
