@@ -1,0 +1,158 @@
+"""The motion of a parked vehicle, as its laser gyros and accelerometers recorded it, under a gimbal that turns.
+
+Kept physical: what gyros and accelerometers feel is one motion of one body. Rates and forces are those of the level vehicle; the
+gimbal turns them into the sensors as the schedule goes. Gravity follows the angle that the gyros integrate to, where pieces meet too,
+and the Earth's rate of the simulated site follows it. A piece is altered only as a motion can be: turned about the vertical by any
+heading, mirrored (forces as a mirror shows them, rates with the other sign), run backwards (rates with the other sign, forces not).
+The vehicle settles: its tilt as the accelerometers show it says what the gyros' mean rate holds besides, so that the turning of
+the base is no drift of a sensor. About the vertical nothing says that, and the mean rate is taken out.
+
+Lost: the sensors' own noise, their quanta included, turns with the vehicle, not with the sensor that makes it. Where two pieces meet
+the horizontal force goes on at the mean of what it was (over 40 s), so that what it wanders by more slowly than a piece is not the
+recording's. What the vertical force wanders by in minutes is left out: that is the sensor's, and turning with the vehicle it would be
+a gravity that changes.
+Shared with the product: nothing.
+"""
+import math
+
+import numpy
+
+GRAVITY = 9.80665
+EARTH_RATE = 7.292115e-5  # rad/s
+UP = numpy.array((0.0, 1.0, 0.0))  # x forward, y up, z right
+RATE_HZ = 100.0
+MIRROR = numpy.array((-1.0, -1.0, 1.0, 1.0, 1.0, -1.0))  # at the plane of x and y: rates are axial, forces polar
+REVERSED = numpy.array((-1.0, -1.0, -1.0, 1.0, 1.0, 1.0))
+
+
+def turning(angle):
+    """About up, of a rate and a force side by side: rows times this."""
+    c, s = math.cos(angle), math.sin(angle)
+    one = numpy.array(((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)))
+    both = numpy.zeros((6, 6))
+    both[:3, :3] = both[3:, 3:] = one.T
+    return both
+
+
+def rotation_vector(rates):
+    """Of a body that starts at zero and turns by little: to second order of the angle."""
+    angle = numpy.cumsum(rates, axis=0) / RATE_HZ
+    return angle + numpy.cumsum(numpy.cross(angle, rates), axis=0) / (2.0 * RATE_HZ)
+
+
+def change_of(vector, phi):
+    """How a vector that stands still changes in a body that has turned by phi, to second order."""
+    first = numpy.cross(phi, vector)
+    return -first + 0.5 * numpy.cross(phi, first)
+
+
+def low_pass(series, samples):
+    """Running mean, edges by what is there."""
+    ones = numpy.ones(samples)
+    weight = numpy.convolve(numpy.ones(len(series)), ones, "same")
+    return numpy.column_stack([numpy.convolve(column, ones, "same") / weight for column in series.T])
+
+
+def levelled(rates):
+    """In axes whose y is along the mean force."""
+    up = rates[:, 3:].mean(axis=0)
+    up /= numpy.linalg.norm(up)
+    axis = numpy.cross(up, UP)
+    sine, cosine = numpy.linalg.norm(axis), up @ UP
+    k = numpy.cross(numpy.eye(3), axis / sine)  # this times a vector: axis x vector
+    turn = numpy.eye(3) + sine * k + (1.0 - cosine) * (k @ k)
+    return numpy.hstack((rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T))
+
+
+def motion_of(rates):
+    """(rates of the vehicle against the Earth, forces less gravity as those turn it) of the level vehicle, from what its sensors read."""
+    rates = levelled(rates)
+    force = rates[:, 3:] - rates[:, 3:].mean(axis=0)
+    earth = rates[:, :3].mean(axis=0)
+    second = int(RATE_HZ)
+    whole = len(rates) // second * second
+    own = rates[:, :3] - earth
+    for _ in range(4):
+        phi = rotation_vector(own)
+        left = force - GRAVITY * change_of(UP, phi)
+        # Tilt that the gyros' mean rate makes and the accelerometers do not see: not the base's. f_x = g phi_z, f_z = -g phi_x.
+        seconds = left[:whole].reshape(-1, second, 3).mean(axis=1)
+        slope = numpy.polyfit(numpy.arange(len(seconds)), seconds, 1)[0] / GRAVITY
+        earth = earth - numpy.array((-slope[2], 0.0, slope[0]))
+        own = rates[:, :3] - earth - change_of(earth, phi)
+    left = force - GRAVITY * change_of(UP, rotation_vector(own))
+    slow = int(120 * RATE_HZ)  # no vehicle rises for minutes: what the vertical force wanders by is the sensor's
+    left[:, 1:2] -= low_pass(low_pass(left[:, 1:2], slow), slow)
+    return own, left - left.mean(axis=0)
+
+
+class Piece:
+    """Of a recording: its slow rates, and the noise of their integral about its mean over a second."""
+
+    def __init__(self, slow, noise):
+        self.slow, self.noise = slow, noise
+
+    @staticmethod
+    def of(rates, rate_hz):
+        window = int(rate_hz) | 1
+        integral = numpy.cumsum(rates, axis=0) / rate_hz
+        mean = numpy.column_stack([numpy.convolve(column, numpy.ones(window) / window, "same") for column in integral.T])
+        inside = slice(window, len(rates) - window)
+        return Piece(numpy.diff(mean, axis=0)[inside] * rate_hz, (integral - mean)[1:][inside])
+
+
+def seamless(pieces, rate_hz):
+    """Rates: what white noise of an integral does where two pieces meet is the difference of its values on both sides, no step."""
+    noise = numpy.concatenate([p.noise for p in pieces])
+    return numpy.concatenate([p.slow for p in pieces]) + numpy.diff(noise, axis=0, prepend=noise[:1]) * rate_hz
+
+
+def altered(piece, random):
+    alter = turning(random.uniform(0.0, 2.0 * math.pi))
+    if random.random() < 0.5:
+        alter = numpy.diag(MIRROR) @ alter
+    slow, noise = piece.slow, piece.noise
+    if random.random() < 0.5:
+        slow, noise = REVERSED * slow[::-1], -REVERSED * noise[::-1]
+    return Piece(slow @ alter, noise @ alter)
+
+
+class ParkedVehicle:
+    """Draws of its motion. `rates`: rows of rate and force as its sensors read them, forward, up, right."""
+
+    rate_hz = RATE_HZ
+
+    def __init__(self, rates, latitude_deg, pieces=3):
+        self.earth = EARTH_RATE * numpy.array((math.cos(math.radians(latitude_deg)), math.sin(math.radians(latitude_deg)), 0.0))
+        motion = numpy.hstack(motion_of(rates))
+        length = len(motion) // pieces
+        self.pieces = [Piece.of(motion[k * length:(k + 1) * length], RATE_HZ) for k in range(pieces)]
+        self.seconds = sum(len(p.slow) for p in self.pieces) / RATE_HZ
+
+    def drawn(self, random):
+        """Rows of what rate and force change by in the vehicle that is level at first, heading north."""
+        parts = [altered(self.pieces[k], random) for k in random.permutation(len(self.pieces))]
+        window = numpy.hanning(int(40 * RATE_HZ))
+        window /= window.sum()
+        for before, behind in zip(parts, parts[1:]):  # a step of the horizontal force would be a tilt that no gyro feels
+            step = window @ behind.slow[:len(window), 3:] - window @ before.slow[-len(window):, 3:]
+            behind.slow[:, 3:] -= (1.0 - UP) * step
+        motion = seamless(parts, RATE_HZ)
+        phi = rotation_vector(motion[:, :3])
+        rate = motion[:, :3] + change_of(self.earth, phi)
+        force = motion[:, 3:] - motion[:, 3:].mean(axis=0) + GRAVITY * change_of(UP, phi)
+        return numpy.hstack((rate, force))
+
+    @staticmethod
+    def in_sensors(drawn, outer, inner):
+        """Of a gimbal with these angles at the end of each sample: C_bv = (Rz(outer) Ry(inner))^T."""
+        def of_sample(angle):
+            return angle - 0.5 * numpy.diff(angle, prepend=angle[0])
+
+        o, i = of_sample(outer)[:, None], of_sample(inner)[:, None]
+        out = []
+        for v in (drawn[:, :3], drawn[:, 3:]):
+            x, y, z = v[:, :1], v[:, 1:2], v[:, 2:]
+            x, y = numpy.cos(o) * x + numpy.sin(o) * y, numpy.cos(o) * y - numpy.sin(o) * x
+            out += [numpy.cos(i) * x - numpy.sin(i) * z, y, numpy.sin(i) * x + numpy.cos(i) * z]
+        return numpy.hstack(out)
