@@ -7,10 +7,11 @@ heading, mirrored (forces as a mirror shows them, rates with the other sign), ru
 The vehicle settles: its tilt as the accelerometers show it says what the gyros' mean rate holds besides, so that the turning of
 the base is no drift of a sensor. About the vertical nothing says that, and the mean rate is taken out.
 
-Lost: the sensors' own noise, their quanta included, turns with the vehicle, not with the sensor that makes it. Where two pieces meet
-the horizontal force goes on at the mean of what it was (over 40 s), so that what it wanders by more slowly than a piece is not the
-recording's. What the vertical force wanders by in minutes is left out: that is the sensor's, and turning with the vehicle it would be
-a gravity that changes.
+What the force wanders by more slowly than 20 s, and no turning of gravity explains, is the accelerometers': it stays with them as the
+gimbal turns, forwards or backwards, every axis with its own sign.
+
+Lost: the sensors' faster noise, their quanta included, turns with the vehicle, not with the sensor that makes it. What the gyros' noise
+is wrong by after 20 s and more stands in the accelerometers' wander, and the gyros take it for the base's.
 Shared with the product: nothing.
 """
 import math
@@ -65,7 +66,8 @@ def levelled(rates):
 
 
 def motion_of(rates):
-    """(rates of the vehicle against the Earth, forces less gravity as those turn it) of the level vehicle, from what its sensors read."""
+    """Of the level vehicle, from what its sensors read: its rates against the Earth, the forces that shake it, less gravity as the
+    rates turn it, and what the accelerometers wander by."""
     rates = levelled(rates)
     force = rates[:, 3:] - rates[:, 3:].mean(axis=0)
     earth = rates[:, :3].mean(axis=0)
@@ -81,9 +83,16 @@ def motion_of(rates):
         earth = earth - numpy.array((-slope[2], 0.0, slope[0]))
         own = rates[:, :3] - earth - change_of(earth, phi)
     left = force - GRAVITY * change_of(UP, rotation_vector(own))
-    slow = int(120 * RATE_HZ)  # no vehicle rises for minutes: what the vertical force wanders by is the sensor's
-    left[:, 1:2] -= low_pass(low_pass(left[:, 1:2], slow), slow)
-    return own, left - left.mean(axis=0)
+    # No vehicle is pushed one way for long: 5 ug over 20 s are a centimetre. What the force wanders by more slowly is the accelerometers',
+    # and what they drift by in half an hour is no noise: a cubic, as of the LN-100.
+    smooth = int(20 * RATE_HZ)
+    wander = low_pass(low_pass(left, smooth), smooth)
+    left -= wander
+    inside = slice(2 * smooth, -2 * smooth)
+    x = numpy.linspace(-1.0, 1.0, len(left))[inside]
+    polynomial = numpy.polynomial.polynomial
+    wander = wander[inside] - polynomial.polyval(x, polynomial.polyfit(x, wander[inside], 3)).T
+    return own, left, wander
 
 
 class Piece:
@@ -124,24 +133,22 @@ class ParkedVehicle:
 
     def __init__(self, rates, latitude_deg, pieces=3):
         self.earth = EARTH_RATE * numpy.array((math.cos(math.radians(latitude_deg)), math.sin(math.radians(latitude_deg)), 0.0))
-        motion = numpy.hstack(motion_of(rates))
+        own, shaken, self.wander = motion_of(rates)
+        motion = numpy.hstack((own, shaken))
         length = len(motion) // pieces
         self.pieces = [Piece.of(motion[k * length:(k + 1) * length], RATE_HZ) for k in range(pieces)]
-        self.seconds = sum(len(p.slow) for p in self.pieces) / RATE_HZ
+        self.seconds = min(sum(len(p.slow) for p in self.pieces), len(self.wander)) / RATE_HZ
 
     def drawn(self, random):
-        """Rows of what rate and force change by in the vehicle that is level at first, heading north."""
+        """Rows of what rate and force change by in the vehicle that is level at first, heading north, and of the accelerometers' wander."""
         parts = [altered(self.pieces[k], random) for k in random.permutation(len(self.pieces))]
-        window = numpy.hanning(int(40 * RATE_HZ))
-        window /= window.sum()
-        for before, behind in zip(parts, parts[1:]):  # a step of the horizontal force would be a tilt that no gyro feels
-            step = window @ behind.slow[:len(window), 3:] - window @ before.slow[-len(window):, 3:]
-            behind.slow[:, 3:] -= (1.0 - UP) * step
         motion = seamless(parts, RATE_HZ)
         phi = rotation_vector(motion[:, :3])
         rate = motion[:, :3] + change_of(self.earth, phi)
-        force = motion[:, 3:] - motion[:, 3:].mean(axis=0) + GRAVITY * change_of(UP, phi)
-        return numpy.hstack((rate, force))
+        force = motion[:, 3:] + GRAVITY * change_of(UP, phi)
+        wander = random.choice((-1.0, 1.0), 3) * self.wander[::random.choice((-1, 1))]
+        n = min(len(rate), len(wander))
+        return numpy.hstack((rate[:n], force[:n], wander[:n]))
 
     @staticmethod
     def in_sensors(drawn, outer, inner):
@@ -151,8 +158,10 @@ class ParkedVehicle:
 
         o, i = of_sample(outer)[:, None], of_sample(inner)[:, None]
         out = []
-        for v in (drawn[:, :3], drawn[:, 3:]):
+        for v in (drawn[:, :3], drawn[:, 3:6]):
             x, y, z = v[:, :1], v[:, 1:2], v[:, 2:]
             x, y = numpy.cos(o) * x + numpy.sin(o) * y, numpy.cos(o) * y - numpy.sin(o) * x
             out += [numpy.cos(i) * x - numpy.sin(i) * z, y, numpy.sin(i) * x + numpy.cos(i) * z]
-        return numpy.hstack(out)
+        both = numpy.hstack(out)
+        both[:, 3:] += drawn[:, 6:]
+        return both
