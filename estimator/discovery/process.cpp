@@ -56,9 +56,11 @@ ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKi
     const double q = std::exp(log_q);
     return 0.5 * (q * u2 / (1.0 + q * d) - (1.0 + q * d).log()).sum();
   };
-  constexpr double low = -14.0, high = 16.0, step = 0.1;
+  constexpr double low = -14.0, step = 0.1;
+  constexpr int steps = 300;
   double best = low;
-  for (double x = low; x <= high; x += step) {
+  for (int k = 0; k <= steps; ++k) {
+    const double x = low + step * k;
     best = gain(x) > gain(best) ? x : best;
   }
   fit.log_likelihood_gain = std::max(0.0, gain(best));

@@ -134,8 +134,7 @@ ordered_json fitted_json(std::span<const discovery::UnitRecording> recordings,
   const std::vector<double> stated(forms.size(), std::numeric_limits<double>::quiet_NaN());
   if (const auto tried = discovery::try_laws(recordings, forms, stated)) {
     for (const discovery::TriedLaw& law : *tried) {
-      j["laws"].push_back(
-          {{"axis", law.term.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
+      j["laws"].push_back({{"axis", law.term.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
     }
   }
   return j;
