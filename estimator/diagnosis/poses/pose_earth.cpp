@@ -73,6 +73,7 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   const Vector3 omega_n = earth::omega_ie_n(*input.latitude) / input.gyro_unit;  // north, up, east
   const auto less_vertical = [&](double up) {
     std::vector<Vector3> reading;
+    reading.reserve(poses.size());
     for (const Pose& p : poses) {
       reading.emplace_back(p.gyro - up * p.u.normalized());
     }

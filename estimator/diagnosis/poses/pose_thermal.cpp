@@ -101,6 +101,7 @@ std::vector<PoseEffect> name_thermal(const AccelModel& model, const std::vector<
       break;
     }
     std::vector<PoseEffect> all;
+    all.reserve(candidates.size());
     for (const Effect* effect : candidates) {
       all.push_back(attempt(*effect, known, model, poses, duration_s));
     }
