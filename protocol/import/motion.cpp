@@ -5,7 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "estimator/geometry/angles.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -32,18 +33,6 @@ Vector3 median_rate(const std::vector<Block>& blocks, double samples, bool quiet
       }
     }
     all[k] = values.empty() ? 0.0 : median(std::move(values));
-  }
-  return all;
-}
-
-std::vector<double> unwrapped(const std::vector<double>& angle) {
-  std::vector<double> all(angle.size());
-  double turned = 0.0;
-  for (std::size_t row = 0; row < angle.size(); ++row) {
-    if (row > 0) {
-      turned += std::remainder(angle[row] - angle[row - 1], 2.0 * std::numbers::pi);
-    }
-    all[row] = angle[0] + turned;
   }
   return all;
 }

@@ -190,11 +190,9 @@ double sample_sigma(const std::vector<Pose>& poses, Eigen::Index axis) {
   return quantile(all, 0.5);
 }
 
-double length_of(const PoseInput& input, const Pose& p) { return input.time_s[p.last - 1] - input.time_s[p.first]; }
-
 // What the gyros read at rest where most stretches turn, as on a rate table without an angle: of the rates that are alike
 // within `alike` those that last longest, and of such as last about as long the least.
-Vector3 rate_at_rest(const PoseInput& input, const std::vector<Pose>& poses, const Vector3& alike) {
+Vector3 rate_at_rest(const std::vector<Pose>& poses, const Vector3& alike) {
   struct Candidate {
     Vector3 rate;
     double seconds;
@@ -205,7 +203,7 @@ Vector3 rate_at_rest(const PoseInput& input, const std::vector<Pose>& poses, con
     Candidate c{a.gyro, 0.0};
     for (const Pose& b : poses) {
       const bool same = ((a.gyro - b.gyro).cwiseAbs().array() <= alike.array()).all();
-      c.seconds += same ? length_of(input, b) : 0.0;
+      c.seconds += same ? b.length_s : 0.0;
     }
     longest = std::max(longest, c.seconds);
     all.push_back(c);
@@ -238,7 +236,7 @@ void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
   }
   const bool si = input.accel_unit > 0.0 && input.sensors == Sensors::both;
   if (si && (spread.array() > least.array()).any()) {
-    middle = rate_at_rest(input, poses, least);
+    middle = rate_at_rest(poses, least);
     spread.setZero();
   }
   constexpr double deviations = 20.0, read_out = 0.1 * units::degree;

@@ -71,20 +71,17 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   PoseEffect result;
   result.effect = &effect;
   result.constant = constant;
+  const bool with_time = of_time(effect);
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
-    const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, of_time(effect));
+    const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
     const double beside_flicker =
-        of_time(effect) ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i]) : -HUGE_VAL;
+        with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i]) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;
     result.log_p = std::min(result.log_p, c.log_p);
     result.log_p_beside_flicker = std::min(result.log_p_beside_flicker, std::max(c.log_p, beside_flicker));
-    for (std::size_t j = 0; j < trial.names.size(); ++j) {
-      result.parameters.push_back(trial.names[j]);
-      result.value.push_back(c.with.value(known_[i].cols() + static_cast<Eigen::Index>(j)));
-      result.sigma.push_back(c.with.sigma(known_[i].cols() + static_cast<Eigen::Index>(j)));
-    }
+    add_coefficients(trial, c, known_[i].cols(), result);
   }
   return result;
 }
@@ -208,17 +205,7 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
       }
       const Comparison c = compare(model.jacobian, model.weight.asDiagonal() * trial.columns, model.residual, time_s,
                                    changes_with_time(effect, duration_s, 3));
-      PoseEffect p;
-      p.effect = &effect;
-      p.constant = constant;
-      p.log_p = c.log_p;
-      p.held_out_rms.fill(c.with.held_out_rms);
-      for (std::size_t j = 0; j < trial.names.size(); ++j) {
-        p.parameters.push_back(trial.names[j]);
-        p.value.push_back(c.with.value(9 + static_cast<Eigen::Index>(j)));
-        p.sigma.push_back(c.with.sigma(9 + static_cast<Eigen::Index>(j)));
-      }
-      d.accel_tried.push_back(p);
+      d.accel_tried.push_back(effect_in_force(trial, c, model.jacobian.cols()));
     }
     tried += tests_worth(effect, poses, duration_s, 3);
   }

@@ -25,13 +25,23 @@ EffectContext context_of(double middle_s, const Vector3& u, double temperature, 
   return c;
 }
 
-// At a pose: its middle, the direction of its specific force, its temperature.
-Eigen::RowVectorXd row_of(const Effect& effect, double constant, const Pose& pose, double duration_s, int axis) {
+// Per coefficient, in one second at a pose: its middle, the direction of its specific force, whose size holds the reading's own noise, its
+// temperature.
+struct PerCoefficient {
+  Eigen::Matrix3Xd velocity, angle;
+};
+PerCoefficient at_pose(const Effect& effect, double constant, const Pose& pose, double duration_s) {
   const auto count = static_cast<Eigen::Index>(effect.parameters.size());
-  Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, count), angle = velocity;
-  const Vector3 u = pose.u.normalized();  // its size holds the reading's own noise
-  effect.sensor(context_of(pose.middle_s, u, pose.temperature, duration_s), constant, velocity, angle);
-  return axis < 3 ? Eigen::RowVectorXd(angle.row(axis)) : Eigen::RowVectorXd(u.transpose() * velocity);
+  PerCoefficient p{Eigen::Matrix3Xd::Zero(3, count), Eigen::Matrix3Xd::Zero(3, count)};
+  effect.sensor(context_of(pose.middle_s, pose.u.normalized(), pose.temperature, duration_s), constant, p.velocity,
+                p.angle);
+  return p;
+}
+
+Eigen::RowVectorXd row_of(const Effect& effect, double constant, const Pose& pose, double duration_s, int axis) {
+  const PerCoefficient p = at_pose(effect, constant, pose, duration_s);
+  return axis < 3 ? Eigen::RowVectorXd(p.angle.row(axis))
+                  : Eigen::RowVectorXd(pose.u.normalized().transpose() * p.velocity);
 }
 
 // White noise and a random walk of this share: covariance of readings at these times.
@@ -64,10 +74,25 @@ double restricted(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, const Eige
 }  // namespace
 
 Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duration_s) {
-  const auto count = static_cast<Eigen::Index>(effect.parameters.size());
-  Eigen::Matrix3Xd velocity = Eigen::Matrix3Xd::Zero(3, count), angle = velocity;
-  effect.sensor(context_of(pose.middle_s, pose.u.normalized(), pose.temperature, duration_s), NAN, velocity, angle);
-  return velocity;
+  return at_pose(effect, NAN, pose, duration_s).velocity;
+}
+
+void add_coefficients(const Trial& trial, const Comparison& c, Eigen::Index known, PoseEffect& effect) {
+  for (std::size_t j = 0; j < trial.names.size(); ++j) {
+    effect.parameters.push_back(trial.names[j]);
+    effect.value.push_back(c.with.value(known + static_cast<Eigen::Index>(j)));
+    effect.sigma.push_back(c.with.sigma(known + static_cast<Eigen::Index>(j)));
+  }
+}
+
+PoseEffect effect_in_force(const Trial& trial, const Comparison& c, Eigen::Index known) {
+  PoseEffect p;
+  p.effect = trial.effect;
+  p.constant = trial.constant;
+  p.log_p = c.log_p;
+  p.held_out_rms.fill(c.with.held_out_rms);
+  add_coefficients(trial, c, known, p);
+  return p;
 }
 
 Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis) {

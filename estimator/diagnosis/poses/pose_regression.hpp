@@ -52,6 +52,10 @@ struct Trial {
   Eigen::MatrixXd columns;
   std::vector<std::string> names;
 };
+// Adds the trial's coefficients to an effect: those behind the first `known` ones of the comparison.
+void add_coefficients(const Trial& trial, const Comparison& c, Eigen::Index known, PoseEffect& effect);
+// An effect in |f|, as the comparison has it.
+PoseEffect effect_in_force(const Trial& trial, const Comparison& c, Eigen::Index known);
 // d(specific force)/d(coefficient) at a pose, SI, [3 x coefficients], of an effect that changes neither with time nor with a constant.
 Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duration_s);
 Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis);

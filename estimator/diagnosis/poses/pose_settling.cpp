@@ -31,7 +31,7 @@ Course course_of(const PoseInput& input, const std::vector<Pose>& poses, std::si
           : p.u.normalized().dot(thermal_force(thermal, warmer, duration_s) - thermal_force(thermal, p, duration_s));
   Course c;
   c.pose = k;
-  c.length_s = input.time_s[p.last - 1] - input.time_s[p.first];
+  c.length_s = p.length_s;
   const double block_s = std::max(0.5, c.length_s / 60.0);
   std::vector<double> since, force;
   Vector3 sum = Vector3::Zero();

@@ -15,23 +15,17 @@ bool follows_channel(const Effect& effect) {
   return effect.temperature == TemperatureUse::measured && acts_on(effect, false, true);
 }
 
-// One more effect beside what is known; its coefficients are the last columns. `beside`: the columns of what is named already.
+// In |f| - g, weighted as its residuals are, per SI.
+Eigen::MatrixXd columns_of(const Trial& trial, const AccelModel& model) {
+  return model.weight.asDiagonal() * trial.columns / units::standard_gravity;
+}
+
+// One more effect beside what is known; its coefficients are the last columns.
 PoseEffect attempt(const Effect& effect, const Eigen::MatrixXd& known, const AccelModel& model,
                    const std::vector<Pose>& poses, double duration_s) {
   const Trial trial = trial_of(effect, NAN, poses, duration_s, 3);
-  const Eigen::MatrixXd columns = model.weight.asDiagonal() * trial.columns / units::standard_gravity;  // per SI
-  const Comparison c = compare(known, columns, model.residual, middles(poses), false);
-  PoseEffect p;
-  p.effect = &effect;
-  p.constant = NAN;
-  p.log_p = c.log_p;
-  p.held_out_rms.fill(c.with.held_out_rms);
-  for (std::size_t j = 0; j < trial.names.size(); ++j) {
-    p.parameters.push_back(trial.names[j]);
-    p.value.push_back(c.with.value(known.cols() + static_cast<Eigen::Index>(j)));
-    p.sigma.push_back(c.with.sigma(known.cols() + static_cast<Eigen::Index>(j)));
-  }
-  return p;
+  const Comparison c = compare(known, columns_of(trial, model), model.residual, middles(poses), false);
+  return effect_in_force(trial, c, known.cols());
 }
 
 Eigen::MatrixXd columns_beside(const PoseEffect* without, const std::vector<PoseEffect>& named, const AccelModel& model,
@@ -39,8 +33,7 @@ Eigen::MatrixXd columns_beside(const PoseEffect* without, const std::vector<Pose
   Eigen::MatrixXd known = model.jacobian;
   for (const PoseEffect& p : named) {
     if (&p != without) {
-      known = joined(known, model.weight.asDiagonal() * trial_of(*p.effect, NAN, poses, duration_s, 3).columns /
-                                units::standard_gravity);
+      known = joined(known, columns_of(trial_of(*p.effect, NAN, poses, duration_s, 3), model));
     }
   }
   return known;

@@ -166,9 +166,8 @@ std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<
   return turns;
 }
 
-void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, bool linear,
-                 PoseDiagnosis& d) {
-  const std::vector<std::size_t> turns = usable_turns(input, poses, d);
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
+                 const AccelModel& accel, bool linear, PoseDiagnosis& d) {
   d.turns = static_cast<int>(turns.size());
   d.turns_clipped = static_cast<int>(poses.size() - 1 - turns.size());
   if (turns.empty()) {

@@ -18,9 +18,9 @@ struct GyroModel {
 // left out.
 std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d);
 
-// Direction of gravity before and after what is named, fitted and held out, into `d`; turns with clipped samples left out. Sigma of
+// Direction of gravity before and after what is named, fitted and held out, into `d`; `turns`: those that are usable. Sigma of
 // the parameters holds what the poses leave open of the accelerometers' misalignments.
-void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, bool linear,
-                 PoseDiagnosis& d);
+void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
+                 const AccelModel& accel, bool linear, PoseDiagnosis& d);
 
 }  // namespace selfcal::diagnosis

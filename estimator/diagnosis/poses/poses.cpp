@@ -10,6 +10,7 @@
 #include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 #include "estimator/diagnosis/poses/read_outs.hpp"
+#include "estimator/geometry/angles.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -114,8 +115,9 @@ AccelModel calibrate(const PoseInput& input, double alpha, std::vector<Pose>& po
 
 // The poses with the Earth's rate taken out of the gyros' means: beside a sensor that sees it, it goes with the pose as a
 // g-sensitivity does.
-std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagnosis& d) {
-  const bool carried = usable_turns(input, poses, d).size() + 1 == poses.size();
+std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>& poses,
+                                const std::vector<std::size_t>& usable, PoseDiagnosis& d) {
+  const bool carried = usable.size() + 1 == poses.size();
   const EarthInPoses earth = earth_in_poses(input, poses, carried);
   d.earth_taken_out = earth.heading;
   d.accel_reversed = earth.reversed;
@@ -126,18 +128,15 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   return still;
 }
 
-}  // namespace
-
-namespace {
-
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
-  judge_gyros(without_earth(input, poses, d), input.time_s.back() - input.time_s.front(), d.has_temperature,
+  const std::vector<std::size_t> turns = usable_turns(input, poses, d);
+  judge_gyros(without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(), d.has_temperature,
               0.5 * alpha, d);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
-  judge_turns(input, poses, accel, linear, d);
+  judge_turns(input, poses, turns, accel, linear, d);
   add_invisible(d);
 }
 
@@ -253,20 +252,7 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
   }
 }
 
-}  // namespace
-
-namespace {
-
-// An encoder counts from 0 to 360 deg and begins again: no sample turns by more than half a turn.
-void unwrap(std::vector<double>& angle) {
-  double whole = 0.0;
-  for (std::size_t i = 1, n = angle.size(); i < n; ++i) {
-    const double step = angle[i] + whole - angle[i - 1];
-    whole -= 2.0 * M_PI * std::round(step / (2.0 * M_PI));
-    angle[i] += whole;
-  }
-}
-
+// Whether it is that of an encoder which counts from 0 to 360 deg and begins again.
 bool wraps(const std::vector<double>& angle) {
   return std::adjacent_find(angle.begin(), angle.end(), [](double a, double b) { return std::abs(b - a) > M_PI; }) !=
          angle.end();
@@ -328,8 +314,8 @@ PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
     return diagnose_continuous(input, alpha);
   }
   PoseInput continuous = input;
-  unwrap(continuous.outer);
-  unwrap(continuous.inner);
+  continuous.outer = unwrapped(std::move(continuous.outer));
+  continuous.inner = unwrapped(std::move(continuous.inner));
   return diagnose_continuous(continuous, alpha);
 }
 
