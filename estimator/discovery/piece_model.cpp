@@ -41,16 +41,15 @@ void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
 
 std::shared_ptr<const PieceInformation> PieceInformation::less(const Eigen::MatrixXd& W,
                                                                const Dictionary& dictionary) const {
-  Eigen::MatrixXd rest = all;
-  rest.selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
-  rest.triangularView<Eigen::StrictlyUpper>() = rest.transpose();
-  const Eigen::Index pieces = all.rows() / axis_count;
-  if (W.cols() >= pieces / 2) {
-    return std::make_shared<const PieceInformation>(std::move(rest), dictionary);
-  }
   auto lower = std::make_shared<PieceInformation>(*this);
-  lower->all = std::move(rest);
+  lower->all.selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
+  lower->all.triangularView<Eigen::StrictlyUpper>() = lower->all.transpose();
+  const Eigen::Index pieces = all.rows() / axis_count;
   for (int axis = 0; axis < axis_count; ++axis) {
+    if (W.cols() >= pieces / 2) {
+      lower->of_axis(axis, dictionary);
+      continue;
+    }
     const auto rows = Eigen::seqN(axis, pieces, axis_count);
     const auto f = static_cast<std::size_t>(axis);
     lower->own[f] = lower->all(rows, rows);
