@@ -57,6 +57,14 @@ std::vector<std::string> words_of(const std::vector<DiscoveredProcess>& processe
   return all;
 }
 
+// The first few of them, and how many more there are.
+std::string first_of(std::vector<std::string> all, std::string_view between, std::string_view before_more) {
+  const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
+  all.resize(all.size() - more);
+  return fmt::format("{}{}", fmt::join(all, between),
+                     more > 0 ? fmt::format("{}and {} more", before_more, more) : std::string());
+}
+
 // Of what explains the recordings as well, what differs on another plan or another base.
 std::size_t others_elsewhere(const DiscoveredLaw& law) {
   std::size_t others = law.ambiguous.size() - std::min<std::size_t>(1, law.ambiguous.size());
@@ -184,11 +192,8 @@ std::string discovered_words(const Discovery& found) {
   for (std::string& words : words_of(found.processes)) {
     all.push_back(std::move(words));
   }
-  const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
-  all.resize(all.size() - more);
-  return fmt::format(
-      "{}{}{}", fmt::join(all, "; "), more > 0 ? fmt::format("; and {} more", more) : std::string(),
-      found.instead && found.instead->odds > worth_a_word ? "; or " + instead_words(*found.instead) : std::string());
+  const bool another = found.instead && found.instead->odds > worth_a_word;
+  return first_of(std::move(all), "; ", "; ") + (another ? "; or " + instead_words(*found.instead) : std::string());
 }
 
 std::string instead_words(const discovery::OtherExplanation& instead) {
@@ -199,10 +204,7 @@ std::string instead_words(const discovery::OtherExplanation& instead) {
   for (std::string& words : words_of(instead.processes)) {
     all.push_back(std::move(words));
   }
-  const std::size_t more = all.size() > most_told ? all.size() - most_told : 0;
-  all.resize(all.size() - more);
-  return fmt::format("in place of all that {}{} (odds {:.2g})", fmt::join(all, " and "),
-                     more > 0 ? fmt::format(" and {} more", more) : std::string(), instead.odds);
+  return fmt::format("in place of all that {} (odds {:.2g})", first_of(std::move(all), " and ", " "), instead.odds);
 }
 
 const char* beyond_what(const Discovery& found) {

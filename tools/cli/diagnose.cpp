@@ -307,16 +307,13 @@ Expected<int> diagnose_by_poses(const DiagnoseArguments& arguments, const Opened
 
 // Accelerometers of a cheap sensor are off by some per cent of g: of a log that stands no fault, and no reason to say nothing of it.
 bool off_at_rest(const diagnosis::Diagnosis& diagnosis, const Recording& recording) {
-  const auto zero = [](double angle) { return angle == 0.0; };
-  const bool no_gimbal = std::all_of(recording.gimbal_outer_rad.begin(), recording.gimbal_outer_rad.end(), zero) &&
-                         std::all_of(recording.gimbal_inner_rad.begin(), recording.gimbal_inner_rad.end(), zero);
   Vector3 sum = Vector3::Zero();
   for (const std::array<double, 3>& v : recording.delta_v_mps) {
     sum += Vector3(v[0], v[1], v[2]);
   }
   const double force = sum.norm() * recording.sample_rate_hz / static_cast<double>(recording.delta_v_mps.size());
   constexpr double most = 0.1;
-  return no_gimbal && std::abs(force / units::standard_gravity - 1.0) < most &&
+  return !has_read_outs(recording) && std::abs(force / units::standard_gravity - 1.0) < most &&
          std::all_of(diagnosis.faults.begin(), diagnosis.faults.end(),
                      [](const diagnosis::DataFault& fault) { return fault.id == "wrong_scale"; });
 }

@@ -17,6 +17,13 @@
 
 namespace selfcal::cli {
 
+bool has_read_outs(const Recording& recording) {
+  const auto zero = [](const std::vector<double>& angles) {
+    return std::all_of(angles.begin(), angles.end(), [](double angle) { return angle == 0.0; });
+  };
+  return !zero(recording.gimbal_outer_rad) || !zero(recording.gimbal_inner_rad);
+}
+
 diagnosis::PoseInput pose_input_of(const Recording& recording) {
   diagnosis::PoseInput input;
   input.time_s = recording.time_s;
@@ -37,10 +44,7 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
   for (std::size_t i = 0; i < recording.temperature_c.size(); i += recording.temperature_channels) {
     input.temperature_c.push_back(recording.temperature_c[i]);
   }
-  const auto zero = [](const std::vector<double>& angles) {
-    return std::all_of(angles.begin(), angles.end(), [](double angle) { return angle == 0.0; });
-  };
-  if (!zero(recording.gimbal_outer_rad) || !zero(recording.gimbal_inner_rad)) {
+  if (has_read_outs(recording)) {
     input.outer = recording.gimbal_outer_rad;
     input.inner = recording.gimbal_inner_rad;
   }
@@ -69,8 +73,12 @@ struct Layout {
   Triad gyro{}, accel{};
 };
 
+// Where no name says it.
+Layout plain_layout(diagnosis::Sensors sensors) {
+  return {0, {1, 2, 3}, sensors == diagnosis::Sensors::both ? Triad{4, 5, 6} : Triad{1, 2, 3}};
+}
+
 Layout layout_of(const std::vector<import::NamedColumn>& named, diagnosis::Sensors sensors) {
-  Layout plain{0, {1, 2, 3}, sensors == diagnosis::Sensors::both ? Triad{4, 5, 6} : Triad{1, 2, 3}};
   const auto one = [&](import::Role role) {
     const auto by_role = triad_of(named, role);
     return by_role || sensors == diagnosis::Sensors::both ? by_role : triad_of(named, import::Role::unknown);
@@ -79,7 +87,7 @@ Layout layout_of(const std::vector<import::NamedColumn>& named, diagnosis::Senso
   const bool enough =
       (gyro || sensors == diagnosis::Sensors::accelerometers) && (accel || sensors == diagnosis::Sensors::gyros);
   if (!enough) {
-    return plain;
+    return plain_layout(sensors);
   }
   const auto time =
       std::find_if(named.begin(), named.end(), [](const auto& c) { return c.role == import::Role::time; });
@@ -122,15 +130,11 @@ Expected<import::ColumnData> read_with_time(const import::ColumnSource& source,
       candidates.push_back(k);
     }
   }
-  request.stamp = time;
-  Expected<import::ColumnData> first = source.read(request);
+  std::optional<Expected<import::ColumnData>> first;
   const auto rises = [](const Expected<import::ColumnData>& data) {
     return data &&
            std::adjacent_find(data->stamps.begin(), data->stamps.end(), std::greater_equal<>()) == data->stamps.end();
   };
-  if (rises(first)) {
-    return first;
-  }
   for (const std::size_t candidate : candidates) {
     for (const bool date : {false, true}) {
       request.stamp = candidate;
@@ -140,9 +144,10 @@ Expected<import::ColumnData> read_with_time(const import::ColumnSource& source,
         time = candidate;
         return data;
       }
+      first = first ? std::move(first) : std::move(data);
     }
   }
-  return first;
+  return std::move(*first);
 }
 
 std::string numbers(const Triad& triad) { return fmt::format("{}, {}, {}", triad[0] + 1, triad[1] + 1, triad[2] + 1); }
@@ -150,7 +155,7 @@ std::string numbers(const Triad& triad) { return fmt::format("{}, {}, {}", triad
 std::string notes_of(const Layout& layout, const RawColumns& columns, const std::string& unit_of_time) {
   const bool gyros = columns.sensors != diagnosis::Sensors::accelerometers;
   const bool accels = columns.sensors != diagnosis::Sensors::gyros;
-  const Layout plain{0, {1, 2, 3}, gyros ? Triad{4, 5, 6} : Triad{1, 2, 3}};
+  const Layout plain = plain_layout(columns.sensors);
   const bool as_told = layout.time == plain.time && (!gyros || layout.gyro == plain.gyro) &&
                        (!accels || layout.accel == plain.accel) && unit_of_time == "s";
   if (as_told) {
@@ -214,11 +219,11 @@ Expected<RawLog> read_raw_poses(const std::string& path, const RawColumns& colum
   input.accel_unit = accels && accel_si > 0.0 ? 1.0 : 0.0;
   log.notes = notes_of(layout, columns, unit);
   const auto long_si = static_cast<long double>(import::find_unit(unit)->si);
+  // A time of the calendar in seconds leaves no digits of an interval: from the first one on.
+  const bool calendar = data->rows > 0 && std::abs(static_cast<double>(data->stamps.front() * long_si)) > 1e7;
+  const long double begin = calendar ? data->stamps.front() : 0.0L;
   for (std::size_t i = 0; i < data->rows; ++i) {
-    // A time of the calendar in seconds leaves no digits of an interval: from the first one on.
-    const bool calendar = std::abs(static_cast<double>(data->stamps.front() * long_si)) > 1e7;
-    const long double since = data->stamps[i] - (calendar ? data->stamps.front() : 0.0L);
-    input.time_s.push_back(static_cast<double>(since * long_si));
+    input.time_s.push_back(static_cast<double>((data->stamps[i] - begin) * long_si));
     std::array<double, 3> rate{}, force{};
     for (std::size_t k = 0; k < 3; ++k) {
       rate[k] = gyros ? data->values[gyro[k]][i] * (gyro_si > 0.0 ? gyro_si : 1.0) : 0.0;

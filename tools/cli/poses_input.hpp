@@ -9,7 +9,9 @@
 
 namespace selfcal::cli {
 
-// Increments to rates, rad/s and m/s^2; read-outs where they are not 0 throughout; the first temperature channel.
+// Whether its read-outs are not 0 throughout: such stand for none.
+bool has_read_outs(const Recording& recording);
+// Increments to rates, rad/s and m/s^2; read-outs where it has any; the first temperature channel.
 diagnosis::PoseInput pose_input_of(const Recording& recording);
 // A log as columns, whatever its form (protocol/import/column_source.hpp): those that their names call gyros and accelerometers, else time, three
 // gyros, three accelerometers, or one triad of them alone, in this order. What units the names say is taken to SI; everything else is raw.
