@@ -86,18 +86,22 @@ ordered_json to_json(const discovery::Discovery& d) {
   return j;
 }
 
-// The same recording answered by a rival, in the same form.
-ordered_json rival_json(const std::string& rival, const ImuData& data, const CalibrationResult& calibration) {
-  const discovery::Scene scene({data, calibration});
-  const discovery::PieceSums sums = discovery_trial::with_states_held(scene.motion, scene.input);
-  const auto laws = rival == "--stepwise" ? discovery_trial::stepwise(sums, scene.motion.available())
-                                          : discovery_trial::gaussian_process(sums, scene.motion.available());
+// Laws that are neither judged nor told with a class, in the same form.
+ordered_json to_json(const std::vector<discovery_trial::RivalLaw>& laws) {
   ordered_json j = {
       {"laws", ordered_json::array()}, {"described", ordered_json::array()}, {"processes", ordered_json::array()}};
   for (const discovery_trial::RivalLaw& law : laws) {
     j["laws"].push_back({{"axis", law.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
   }
   return j;
+}
+
+// The same recording answered by a rival.
+ordered_json rival_json(const std::string& rival, const ImuData& data, const CalibrationResult& calibration) {
+  const discovery::Scene scene({data, calibration});
+  const discovery::PieceSums sums = discovery_trial::with_states_held(scene.motion, scene.input);
+  return to_json(rival == "--stepwise" ? discovery_trial::stepwise(sums, scene.motion.available())
+                                       : discovery_trial::gaussian_process(sums, scene.motion.available()));
 }
 
 // What the catalogue says, and where it leaves something what discovery says, as the program does it.
@@ -129,15 +133,14 @@ DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
 // Laws whose forms are known.
 ordered_json fitted_json(std::span<const discovery::UnitRecording> recordings,
                          const std::vector<discovery::LawTerm>& forms) {
-  ordered_json j = {
-      {"laws", ordered_json::array()}, {"described", ordered_json::array()}, {"processes", ordered_json::array()}};
   const std::vector<double> stated(forms.size(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<discovery_trial::RivalLaw> laws;
   if (const auto tried = discovery::try_laws(recordings, forms, stated)) {
     for (const discovery::TriedLaw& law : *tried) {
-      j["laws"].push_back({{"axis", law.term.axis}, {"expression", law.expression}, {"coefficient", law.coefficient}});
+      laws.push_back({law.term.axis, law.expression, law.coefficient});
     }
   }
-  return j;
+  return to_json(laws);
 }
 
 struct Request {
