@@ -1,14 +1,32 @@
 #include "estimator/filter/ud_filter.hpp"
 
+#include <algorithm>
 #include <cassert>
 
 namespace selfcal {
+namespace {
+
+// The first columns of `out` = A B, of some ten rows: column by column of A, so that sums run beside each other. Of column j of B the first
+// `rows(j)` count, the others are zero.
+template <typename Right, typename Rows>
+void multiply(const MatrixX& A, const Right& B, MatrixX& out, Rows rows) {
+  for (Eigen::Index j = 0; j < B.cols(); ++j) {
+    auto column = out.col(j);
+    column.setZero();
+    for (Eigen::Index k = 0; k < rows(j); ++k) {
+      column += B(k, j) * A.col(k);
+    }
+  }
+}
+
+}  // namespace
 
 UdFilter::UdFilter(const VectorX& mean, const VectorX& sigma, int constants)
     : dynamic_(static_cast<int>(mean.size()) - constants),
       x_(mean),
       U_(MatrixX::Identity(mean.size(), mean.size())),
       D_(sigma.cwiseAbs2()),
+      product_(dynamic_, std::max(dynamic_, constants)),
       f_(mean.size()),
       v_(mean.size()),
       gain_(VectorX::Zero(mean.size())) {
@@ -33,13 +51,14 @@ void UdFilter::propagate(const MatrixX& Phi, const MatrixX& Gamma, const VectorX
   x_.head(d) = (Phi * x_.head(d)).eval() + Gamma * x_.tail(c) + drive;
 
   // (F2): U_xp' = Phi U_xp + Gamma U_pp, before U_xx changes.
-  const MatrixX U_xp = Phi.lazyProduct(U_.topRightCorner(d, c));
-  U_.topRightCorner(d, c) = U_xp;
+  multiply(Phi, U_.topRightCorner(d, c), product_, [&](Eigen::Index) { return d; });
+  U_.topRightCorner(d, c) = product_.leftCols(c);
   U_.topRightCorner(d, c).noalias() += Gamma * U_.bottomRightCorner(c, c).triangularView<Eigen::UnitUpper>();
 
   // (F1): U_xx' D_x' U_xx'^T = Phi U_xx D_x U_xx^T Phi^T + L q L^T by modified weighted Gram-Schmidt.
   work_.resize(d, d + q.size());
-  work_.leftCols(d).noalias() = Phi.lazyProduct(U_.topLeftCorner(d, d));
+  multiply(Phi, U_.topLeftCorner(d, d), product_, [](Eigen::Index j) { return j + 1; });
+  work_.leftCols(d) = product_.leftCols(d);
   work_.rightCols(q.size()) = L;
   weights_.resize(d + q.size());
   weights_ << D_.head(d), q;

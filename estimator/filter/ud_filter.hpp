@@ -48,6 +48,7 @@ class UdFilter {
   MatrixX U_;
   VectorX D_;
   using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  MatrixX product_;             // [d x the greater of c and d] what Phi makes of U
   RowMajorMatrix work_;         // [d x (d+k)] rows of the weighted Gram-Schmidt
   VectorX weights_, weighted_;  // [d+k]
   VectorX f_, v_, gain_;

@@ -20,8 +20,8 @@ Eigen::Quaterniond quaternion_from_rotation_vector(const Vector3& phi) {
   double cosine = 0.0;
   double half_sinc = 0.0;  // sin(|phi|/2) / |phi|
   if (h2 < 1e-4) {         // first term left out: h2^4/40320 < 1e-20
-    cosine = 1.0 - h2 / 2.0 * (1.0 - h2 / 12.0 * (1.0 - h2 / 30.0));
-    half_sinc = 0.5 * (1.0 - h2 / 6.0 * (1.0 - h2 / 20.0 * (1.0 - h2 / 42.0)));
+    cosine = 1.0 - 0.5 * h2 * (1.0 - 1.0 / 12.0 * h2 * (1.0 - 1.0 / 30.0 * h2));
+    half_sinc = 0.5 * (1.0 - 1.0 / 6.0 * h2 * (1.0 - 1.0 / 20.0 * h2 * (1.0 - 1.0 / 42.0 * h2)));
   } else {
     const double h = std::sqrt(h2);
     cosine = std::cos(h);

@@ -102,9 +102,10 @@ void IntervalNavigator::sample(std::size_t index, double length, Moments& m, Int
   const double dt = sample_dt(index);
   // (N2), (N3): rotation vector with the coning term, velocity with the rotation and sculling terms; second-order
   // polynomials through this sample and the one before.
-  const Vector3 turn = angle_ + previous_angle_.cross(angle_) / 12.0;
-  const Vector3 gain = velocity_ + 0.5 * angle_.cross(velocity_) + angle_.cross(angle_.cross(velocity_)) / 6.0 +
-                       (previous_angle_.cross(velocity_) + previous_velocity_.cross(angle_)) / 12.0;
+  constexpr double twelfth = 1.0 / 12.0, sixth = 1.0 / 6.0;
+  const Vector3 turn = angle_ + twelfth * previous_angle_.cross(angle_);
+  const Vector3 gain = velocity_ + 0.5 * angle_.cross(velocity_) + sixth * angle_.cross(angle_.cross(velocity_)) +
+                       twelfth * (previous_angle_.cross(velocity_) + previous_velocity_.cross(angle_));
   const Eigen::Quaterniond step = quaternion_from_rotation_vector(turn);
 
   if (extra_ != nullptr && m.open && extra_->block_ends_before(sign_ > 0.0 ? index : index + 1)) {

@@ -8,6 +8,13 @@
 namespace selfcal::diagnosis {
 namespace {
 
+// Z^T Z, of which one half is reckoned.
+Eigen::MatrixXd square_of(const Eigen::MatrixXd& Z) {
+  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(Z.cols(), Z.cols());
+  G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+  return G.selfadjointView<Eigen::Lower>();
+}
+
 std::vector<int> joined(std::vector<int> a, const std::vector<int>& b) {
   a.insert(a.end(), b.begin(), b.end());
   return a;
@@ -16,7 +23,7 @@ std::vector<int> joined(std::vector<int> a, const std::vector<int>& b) {
 }  // namespace
 
 Evidence::Evidence(const SignatureRows& r)
-    : information(r.columns.transpose() * r.columns),
+    : information(square_of(r.columns)),
       score(r.columns.transpose() * r.residual),
       square(r.residual.squaredNorm()),
       rows(static_cast<double>(r.residual.size())) {}
