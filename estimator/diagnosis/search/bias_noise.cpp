@@ -9,7 +9,7 @@
 
 #include "estimator/diagnosis/search/remains.hpp"
 #include "estimator/geometry/units.hpp"
-#include "estimator/statistics/climb.hpp"
+#include "estimator/statistics/newton_climb.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -90,46 +90,33 @@ BiasProcess as(Kind kind, BiasProcess p) {
   return p;
 }
 
-// Covariance of the logarithms, from the likelihood around its top; a quantity that it hardly holds has 1.
-Eigen::Matrix2d log_covariance(const std::function<double(const std::array<double, 2>&)>& log_likelihood,
-                               const std::array<double, 2>& top) {
-  constexpr double h = 0.1, least_information = 1.0;
-  const auto at = [&](double a, double b) {
-    return log_likelihood({top[0] * std::exp(h * a), top[1] * std::exp(h * b)});
-  };
-  const double middle = at(0.0, 0.0);
-  Eigen::Matrix2d information;
-  information(0, 0) = (2.0 * middle - at(1.0, 0.0) - at(-1.0, 0.0)) / (h * h);
-  information(1, 1) = (2.0 * middle - at(0.0, 1.0) - at(0.0, -1.0)) / (h * h);
-  information(0, 1) = information(1, 0) =
-      (at(1.0, -1.0) + at(-1.0, 1.0) - at(1.0, 1.0) - at(-1.0, -1.0)) / (4.0 * h * h);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(information);
-  const Eigen::Vector2d held = solver.eigenvalues().cwiseMax(least_information);
-  return solver.eigenvectors() * held.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+// Covariance of the logarithms, of which a quantity that the data hardly hold has 1.
+template <int N>
+Eigen::Matrix<double, N, N> log_covariance(const Eigen::Matrix<double, N, N>& information) {
+  constexpr double least_information = 1.0;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver(information);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(least_information).cwiseInverse().asDiagonal() *
+         solver.eigenvectors().transpose();
 }
 
 // Process i at the top of the likelihood, which is returned.
 double fit(const NoiseLikelihood& likelihood, std::vector<BiasProcess>& processes, std::size_t i) {
-  // Twenty times off what the columns showed it would be another process.
-  const Climb how{.factors = {2.0, 1.3, 1.06}, .most_rounds = 6, .most_moves = 4, .enough = 0.1, .farthest = 20.0};
-  const auto at = [&](const std::array<double, 2>& x) {
-    set(processes[i], x[0], x[1]);
+  const NewtonClimb how{.farthest = 20.0};  // farther off what the columns showed it would be another process
+  const auto at = [&](double growth, double correlation_s) {
+    set(processes[i], growth, correlation_s);
     return likelihood.of(processes);
   };
   BiasProcess& p = processes[i];
   if (p.kernel.kind == Kind::random_walk) {
-    const auto of_growth = [&](const std::array<double, 1>& x) { return at({x[0], 0.0}); };
-    const Summit<1> top = climb<1>({growth_of(p)}, how, of_growth);
-    constexpr double h = 0.1;
-    const double information =
-        (2.0 * top.log_likelihood - of_growth({top.at[0] * std::exp(h)}) - of_growth({top.at[0] * std::exp(-h)})) /
-        (h * h);
+    const NewtonTop<1> top =
+        newton_climb<1>({growth_of(p)}, how, [&](const std::array<double, 1>& x) { return at(x[0], 0.0); });
     set(p, top.at[0], 0.0);
-    p.sigma = 0.5 * p.size / std::sqrt(std::max(information, 1.0));
+    p.sigma = p.size * 0.5 * std::sqrt(log_covariance<1>(top.information)(0, 0));
     return top.log_likelihood;
   }
-  const Summit<2> top = climb<2>({growth_of(p), p.kernel.correlation_s}, how, at);
-  const Eigen::Matrix2d covariance = log_covariance(at, top.at);
+  const NewtonTop<2> top = newton_climb<2>({growth_of(p), p.kernel.correlation_s}, how,
+                                           [&](const std::array<double, 2>& x) { return at(x[0], x[1]); });
+  const Eigen::Matrix2d covariance = log_covariance<2>(top.information);
   set(p, top.at[0], top.at[1]);
   p.sigma = p.size * 0.5 * std::sqrt(covariance.sum());
   p.correlation_sigma_s = p.kernel.correlation_s * std::sqrt(covariance(1, 1));

@@ -8,6 +8,7 @@
 
 #include "estimator/statistics/climb.hpp"
 #include "estimator/statistics/distributions.hpp"
+#include "estimator/statistics/newton_climb.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal {
@@ -126,6 +127,50 @@ TEST(Climb, MovesAsOftenAsItMay) {
   how.most_rounds = 30;
   how.enough = 1.0;  // no single move gains as much: the first round is the last
   EXPECT_NEAR(climb<1>({1.0}, how, log_likelihood).at[0], 1.3, 1e-12);
+}
+
+// Log likelihood of the variance of n draws whose mean square is q: -n/2 (log v + q/v), its top at q, information of log v n/2.
+TEST(NewtonClimb, FindsAVariance) {
+  constexpr double n = 40.0, q = 7.0;
+  int asked = 0;
+  const std::function<double(const std::array<double, 1>&)> log_likelihood = [&](const std::array<double, 1>& v) {
+    ++asked;
+    return -0.5 * n * (std::log(v[0]) + q / v[0]);
+  };
+  for (const double start : {1.0, 3.5, 7.0, 14.0, 60.0}) {
+    asked = 0;
+    const NewtonTop<1> top = newton_climb<1>({start}, {}, log_likelihood);
+    EXPECT_NEAR(std::log(top.at[0] / q), 0.0, 0.1 / std::sqrt(0.5 * n)) << start;  // a tenth of sigma
+    EXPECT_EQ(top.log_likelihood, log_likelihood(top.at));
+    EXPECT_NEAR(top.information(0, 0), 0.5 * n, 0.2 * n) << start;
+    EXPECT_LE(asked, 20) << start;
+  }
+  const NewtonTop<1> edge = newton_climb<1>({1.0}, {.farthest = 3.0}, log_likelihood);
+  EXPECT_NEAR(edge.at[0], 3.0, 1e-12);
+}
+
+// Two quantities whose logarithms the data hold together to 0.1 and apart to 1: the top at (5, 0.02).
+TEST(NewtonClimb, FollowsARidge) {
+  using Point = std::array<double, 2>;
+  const std::function<double(const Point&)> log_likelihood = [](const Point& p) {
+    const double x = std::log(p[0] / 5.0), y = std::log(p[1] / 0.02);
+    return -0.5 * ((x + y) * (x + y) / 0.01 + (x - y) * (x - y));
+  };
+  const NewtonTop<2> top = newton_climb<2>({1.0, 0.08}, {}, log_likelihood);
+  const double x = std::log(top.at[0] / 5.0), y = std::log(top.at[1] / 0.02);
+  EXPECT_LT(std::abs(x + y), 0.01);
+  EXPECT_LT(std::abs(x - y), 0.2);
+  const Eigen::Matrix2d expected = (Eigen::Matrix2d() << 101.0, 99.0, 99.0, 101.0).finished();
+  EXPECT_LT((top.information - expected).norm(), 1e-3 * expected.norm());
+}
+
+// A likelihood that grows for ever ends where it may, one that falls to a quantity of nothing too.
+TEST(NewtonClimb, EndsWhereThereIsNoTop) {
+  for (const double way : {1.0, -1.0}) {
+    const NewtonTop<1> top = newton_climb<1>({2.0}, {.farthest = 20.0, .most_rounds = 12},
+                                             [&](const std::array<double, 1>& x) { return way * std::log(x[0]); });
+    EXPECT_NEAR(way * std::log(top.at[0] / 2.0), std::log(20.0), 1e-9);
+  }
 }
 
 }  // namespace
