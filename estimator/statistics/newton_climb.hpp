@@ -56,15 +56,25 @@ NewtonTop<N> newton_climb(const std::array<double, N>& start, const NewtonClimb&
       }
       return p.value;
     };
-    Vector slope;
+    // A quantity that stands at its limit, and would go beyond, is left there.
+    std::array<bool, N> held{};
+    Vector slope = Vector::Zero();
     for (int k = 0; k < N; ++k) {
-      const double up = at(middle.y + h * Vector::Unit(k)), down = at(middle.y - h * Vector::Unit(k));
-      slope(k) = (up - down) / (2.0 * h);
-      information(k, k) = (2.0 * middle.value - up - down) / (h * h);
+      const double up = at(middle.y + h * Vector::Unit(k));
+      held[static_cast<std::size_t>(k)] = std::abs(middle.y(k)) == limit && (up > middle.value) == (middle.y(k) > 0.0);
+      if (!held[static_cast<std::size_t>(k)]) {
+        const double down = at(middle.y - h * Vector::Unit(k));
+        slope(k) = (up - down) / (2.0 * h);
+        information(k, k) = (2.0 * middle.value - up - down) / (h * h);
+      }
     }
     for (int a = 0; a < N; ++a) {
-      for (int b = 0; b < a; ++b) {  // the corner that lies uphill
-        const double sa = slope(a) < 0.0 ? -1.0 : 1.0, sb = slope(b) < 0.0 ? -1.0 : 1.0;
+      for (int b = 0; b < a; ++b) {
+        if (held[static_cast<std::size_t>(a)] || held[static_cast<std::size_t>(b)]) {
+          information(a, b) = information(b, a) = 0.0;
+          continue;
+        }
+        const double sa = slope(a) < 0.0 ? -1.0 : 1.0, sb = slope(b) < 0.0 ? -1.0 : 1.0;  // the corner that lies uphill
         const double corner = at(middle.y + h * (sa * Vector::Unit(a) + sb * Vector::Unit(b)));
         const double straight =
             middle.value + h * (sa * slope(a) + sb * slope(b)) - 0.5 * h * h * (information(a, a) + information(b, b));
@@ -74,12 +84,14 @@ NewtonTop<N> newton_climb(const std::array<double, N>& start, const NewtonClimb&
     const Eigen::SelfAdjointEigenSolver<Matrix> axes(information);
     const Vector along = axes.eigenvectors().transpose() * slope;
     const double most = 2.0 * h;  // differences say nothing of what is farther
-    Vector step;
+    Vector step = Vector::Zero();
     double promised = 0.0;
     for (int k = 0; k < N; ++k) {
       const double curvature = axes.eigenvalues()(k);
-      step(k) = curvature * most > std::abs(along(k)) ? along(k) / curvature : std::copysign(most, along(k));
-      promised += along(k) * step(k) - 0.5 * curvature * step(k) * step(k);
+      if (along(k) != 0.0) {
+        step(k) = curvature * most > std::abs(along(k)) ? along(k) / curvature : std::copysign(most, along(k));
+        promised += along(k) * step(k) - 0.5 * curvature * step(k) * step(k);
+      }
     }
     const Vector there = within(middle.y + axes.eigenvectors() * step);
     const bool ends = promised < how.enough && h <= how.last_step;

@@ -101,7 +101,8 @@ Eigen::Matrix<double, N, N> log_covariance(const Eigen::Matrix<double, N, N>& in
 
 // Process i at the top of the likelihood, which is returned.
 double fit(const NoiseLikelihood& likelihood, std::vector<BiasProcess>& processes, std::size_t i) {
-  const NewtonClimb how{.farthest = 20.0};  // farther off what the columns showed it would be another process
+  // Farther off what the columns showed it would be another process.
+  const NewtonClimb how{.farthest = 20.0, .most_rounds = 5};
   const auto at = [&](double growth, double correlation_s) {
     set(processes[i], growth, correlation_s);
     return likelihood.of(processes);
