@@ -334,8 +334,6 @@ Summary summary_of_amended(const CalibrationResult& result, const Gate& gate, co
   }
 }
 
-namespace {}  // namespace
-
 Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (wanders_at_rest(d) && d.verdict != DiagnosisVerdict::data_fault) {
     return {SummaryStanding::open, "Nothing turned, and what the sensors read changes by more than white noise.",

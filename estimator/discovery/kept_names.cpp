@@ -1,10 +1,10 @@
 #include "estimator/discovery/kept_names.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "estimator/discovery/column_shares.hpp"
 #include "estimator/discovery/effect_columns.hpp"
 #include "estimator/discovery/scene.hpp"
 
@@ -20,27 +20,6 @@ std::vector<EffectTerm> terms_of(const std::vector<diagnosis::ModelEffect>& mode
     terms.push_back({effect.effect, effect.constant, effect.size, !std::isnan(effect.constant)});
   }
   return terms;
-}
-
-// Square of the residual that `columns` take up.
-double gain_of(const ColumnSums& sums, const std::vector<int>& columns) {
-  const Eigen::MatrixXd G = sums.information(columns, columns);
-  const Eigen::VectorXd b = sums.score(columns);
-  const Eigen::VectorXd scale = G.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd scaled = scale.asDiagonal() * G * scale.asDiagonal();
-  scaled.diagonal().array() += 1e-9;
-  const Eigen::VectorXd part = scale.cwiseProduct(b);
-  return part.dot(scaled.ldlt().solve(part));
-}
-
-// Share of the square of `signature` (a combination of the first columns) that `columns` cannot make.
-double share_beside(const ColumnSums& sums, const Eigen::VectorXd& signature, const std::vector<int>& columns) {
-  const auto n = signature.size();
-  const double square = signature.dot(sums.information.topLeftCorner(n, n) * signature);
-  ColumnSums as_data;
-  as_data.information = sums.information;
-  as_data.score = sums.information.leftCols(n) * signature;
-  return 1.0 - gain_of(as_data, columns) / square;
 }
 
 // What laws make of the innovations of a recording, and what effects can.

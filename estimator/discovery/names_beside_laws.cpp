@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "estimator/discovery/catalogue_reach.hpp"
 #include "estimator/discovery/kept_names.hpp"
 #include "estimator/discovery/scene.hpp"
 
@@ -173,31 +174,70 @@ const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
 }
 
 // What to take out so that a name may stand: a first guess of which laws are none of the catalogue's. Cheapest first; empty ones are
-// passed over.
-std::vector<std::function<std::optional<Laws>()>> guesses(const Together& together, const UnitRecording& recording,
-                                                          const std::vector<ModelEffect>& rejected, const Laws& alone,
-                                                          const std::stop_token& stop) {
-  std::vector<std::function<std::optional<Laws>()>> all;
-  all.emplace_back([&rejected, &alone, &recording, stop]() -> std::optional<Laws> {
-    const std::vector<bool> made = made_by_effects(recording, rejected, alone.terms, stop);
+// passed over, and so are those in whose place no effect makes a part worth the name.
+class Guesses {
+ public:
+  Guesses(const Together& together, const UnitRecording& recording, const std::vector<ModelEffect>& rejected,
+          const Laws& alone, const std::stop_token& stop)
+      : together_(together), recording_(recording), rejected_(rejected), alone_(alone), stop_(stop) {
+    all_.emplace_back([this] { return not_made_by_rejected(); });
+    if (const ModelEffect* name = strongest(rejected)) {
+      all_.emplace_back([this, name] { return beside(*name); });
+    }
+    // An effect of one triad may have been written as several laws of it.
+    const auto of_gyros = [&](std::size_t k) { return alone_.terms[k].axis < 3; };
+    const std::size_t laws = alone.terms.size();
+    std::size_t gyros = 0;
+    for (std::size_t k = 0; k < laws; ++k) {
+      gyros += of_gyros(k) ? 1 : 0;
+    }
+    if (gyros > 0 && gyros < laws) {
+      all_.emplace_back([this, of_gyros] { return where(of_gyros); });
+      all_.emplace_back([this, of_gyros] { return where([&](std::size_t k) { return !of_gyros(k); }); });
+    } else if (laws == 2) {
+      all_.emplace_back([this] { return where([](std::size_t k) { return k == 0; }); });
+      all_.emplace_back([this] { return where([](std::size_t k) { return k == 1; }); });
+    }
+  }
+  Guesses(const Guesses&) = delete;
+  Guesses& operator=(const Guesses&) = delete;
+  const std::vector<std::function<std::optional<Laws>()>>& all() const { return all_; }
+
+ private:
+  // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
+  static constexpr double least_share = 0.3;
+
+  const CatalogueReach& reach() {
+    if (!reach_) {
+      reach_.emplace(recording_, alone_.terms, alone_.coefficient, stop_);
+    }
+    return *reach_;
+  }
+  std::optional<Laws> not_made_by_rejected() const {
+    const std::vector<bool> made = made_by_effects(recording_, rejected_, alone_.terms, stop_);
     const bool any = std::find(made.begin(), made.end(), true) != made.end();
-    return any ? std::optional(alone.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
-  });
-  if (const ModelEffect* name = strongest(rejected)) {
-    all.emplace_back([&together, name] { return together.laws_beside(*name); });
+    return any ? std::optional(alone_.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
   }
-  // An effect of one triad may have been written as several laws of it.
-  const auto of_gyros = [&](std::size_t k) { return alone.terms[k].axis < 3; };
-  const Laws gyros = alone.where(of_gyros), accelerometers = alone.where([&](std::size_t k) { return !of_gyros(k); });
-  if (!gyros.terms.empty() && !accelerometers.terms.empty()) {
-    all.emplace_back([gyros] { return std::optional(gyros); });
-    all.emplace_back([accelerometers] { return std::optional(accelerometers); });
-  } else if (alone.terms.size() == 2) {
-    all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 0; }); });
-    all.emplace_back([&alone] { return alone.where([](std::size_t k) { return k == 1; }); });
+  std::optional<Laws> beside(const ModelEffect& name) {
+    return reach().largest_share(*name.effect) < least_share ? std::nullopt : together_.laws_beside(name);
   }
-  return all;
-}
+  template <typename Kept>
+  std::optional<Laws> where(Kept kept) {
+    std::vector<bool> in_place_of;
+    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
+      in_place_of.push_back(!kept(k));
+    }
+    return reach().share(in_place_of) < least_share ? std::nullopt : std::optional(alone_.where(kept));
+  }
+
+  const Together& together_;
+  const UnitRecording& recording_;
+  const std::vector<ModelEffect>& rejected_;
+  const Laws& alone_;
+  const std::stop_token& stop_;
+  std::vector<std::function<std::optional<Laws>()>> all_;
+  std::optional<CatalogueReach> reach_;
+};
 
 }  // namespace
 
@@ -215,7 +255,8 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   const double least = cost_of(alone, {});
   const Laws laws_alone = Laws::fitted(alone.fit);
   std::vector<std::string> tried;
-  for (const auto& guess : guesses(together, searched, rejected, laws_alone, of_laws.stop)) {
+  const Guesses guesses(together, searched, rejected, laws_alone, of_laws.stop);
+  for (const auto& guess : guesses.all()) {
     const std::optional<Laws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
       continue;

@@ -1,0 +1,83 @@
+#include "estimator/discovery/catalogue_reach.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/discovery/column_shares.hpp"
+#include "estimator/discovery/effect_columns.hpp"
+#include "estimator/discovery/scene.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+// Each effect of a sensor that may be seen on such a recording, at each value that its constant is tried at.
+std::vector<EffectTerm> all_effects(bool has_temperature) {
+  std::vector<EffectTerm> all;
+  for (const diagnosis::Effect& effect : diagnosis::catalogue()) {
+    if (effect.sensor != nullptr && diagnosis::applies(effect, has_temperature)) {
+      for (const double constant : effect.constant.tried()) {
+        all.push_back({&effect, constant, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(effect.parameters.size()))});
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+CatalogueReach::CatalogueReach(const UnitRecording& recording, const std::vector<LawTerm>& laws,
+                               const Eigen::VectorXd& coefficient, const std::stop_token& stop)
+    : coefficient_(coefficient) {
+  Scene scene(recording);
+  scene.table = collect_nodes(scene.motion, scene.input);
+  const std::vector<EffectTerm> terms = all_effects(scene.context.has_temperature());
+  LawColumns of_laws(scene.motion, scene.table, laws, false);
+  EffectColumns of_effects(scene.context, terms);
+  TwoSources source(of_laws, of_effects);
+  sums_ = run_columns(scene.input, scene.trace, source, stop);
+  int at = of_laws.count();
+  for (const EffectTerm& term : terms) {
+    Variant variant{term.effect, std::vector<int>(static_cast<std::size_t>(term.count()))};
+    std::iota(variant.columns.begin(), variant.columns.end(), at);
+    at += term.count();
+    variants_.push_back(std::move(variant));
+  }
+}
+
+double CatalogueReach::share(const Variant& variant, const Eigen::VectorXd& signature) const {
+  return 1.0 - share_beside(sums_, signature, variant.columns);
+}
+
+double CatalogueReach::share(const std::vector<bool>& in_place_of) const {
+  Eigen::VectorXd signature = coefficient_;
+  for (std::size_t k = 0; k < in_place_of.size(); ++k) {
+    signature(static_cast<Eigen::Index>(k)) *= in_place_of[k] ? 1.0 : 0.0;
+  }
+  double largest = 0.0;
+  if (signature.cwiseAbs().maxCoeff() > 0.0) {
+    for (const Variant& variant : variants_) {
+      largest = std::max(largest, share(variant, signature));
+    }
+  }
+  return largest;
+}
+
+double CatalogueReach::largest_share(const diagnosis::Effect& effect) const {
+  const auto laws = static_cast<std::size_t>(coefficient_.size());
+  double largest = 0.0;
+  for (std::size_t subset = 1; subset < std::size_t{1} << laws; ++subset) {
+    Eigen::VectorXd signature = coefficient_;
+    for (std::size_t k = 0; k < laws; ++k) {
+      signature(static_cast<Eigen::Index>(k)) *= (subset >> k & 1U) != 0 ? 1.0 : 0.0;
+    }
+    for (const Variant& variant : variants_) {
+      if (variant.effect == &effect) {
+        largest = std::max(largest, share(variant, signature));
+      }
+    }
+  }
+  return largest;
+}
+
+}  // namespace selfcal::discovery

@@ -1,0 +1,69 @@
+// What effects of the catalogue can make of laws, by what laws and effects are (handbook, "The catalogue as laws").
+#include "estimator/discovery/catalogue_reach.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/ideal_recording.hpp"
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::discovery {
+namespace {
+
+const diagnosis::Effect& effect_of(const std::string& id) {
+  for (const diagnosis::Effect& e : diagnosis::catalogue()) {
+    if (e.id == id) {
+      return e;
+    }
+  }
+  ADD_FAILURE() << "no " << id << " in the catalogue";
+  return diagnosis::catalogue().front();
+}
+
+LawTerm law(int axis, const std::string& expression) {
+  LawTerm term;
+  term.axis = axis;
+  term.expression = *laws::Expression::parse(expression);
+  return term;
+}
+
+// A creep on the z accelerometer, a cube of the force on x, and on the z gyro a strong wave that no effect has.
+class Reach : public testing::Test {
+ protected:
+  static CatalogueReach of_three() {
+    const diagnosis::IdealRecording ideal(*named_schedule("horizontal", 60.0, 5.0), {0.02, -0.03, 0.6}, {0.7, 0.2, 0.0},
+                                          50.0);
+    CalibrationResult calibration;
+    calibration.noise.gyro_arw = 0.001 * units::degree_per_sqrt_hour;
+    calibration.noise.accel_vrw = 5.0 * units::micro_g_per_sqrt_hz;
+    calibration.noise.observation.sigma = 3e-6;
+    calibration.linearised_value.setZero();
+    calibration.linearised_C_nb = ideal.C_nb_start();
+    return {{ideal.data(), calibration},
+            {law(5, "exp(-since/35)"), law(3, "fx**3"), law(2, "sin(2*pi*t/0.04)")},
+            Eigen::Vector3d(60.0, 40.0, 5.0)};
+  }
+};
+
+TEST_F(Reach, AnEffectMakesItsOwnLawAndNoOther) {
+  const CatalogueReach reach = of_three();
+  EXPECT_GT(reach.share({true, false, false}), 0.98);  // 35 s lies between two constants that are tried
+  EXPECT_GT(reach.share({false, true, false}), 0.999);
+  EXPECT_LT(reach.share({false, false, true}), 0.3);
+  EXPECT_GT(reach.largest_share(effect_of("accel_cubic")), 0.999);
+  EXPECT_GT(reach.largest_share(effect_of("accel_relaxation")), 0.98);
+  EXPECT_LT(reach.largest_share(effect_of("gyro_drift_ramp")), 0.3);
+}
+
+// The wave has by far the most of the square.
+TEST_F(Reach, IsThatOfTheSum) {
+  const CatalogueReach reach = of_three();
+  EXPECT_LT(reach.share({true, false, true}), 0.3);
+  EXPECT_EQ(reach.share({false, false, false}), 0.0);
+}
+
+}  // namespace
+}  // namespace selfcal::discovery
