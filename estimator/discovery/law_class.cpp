@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 namespace selfcal::discovery {
@@ -23,22 +22,45 @@ bool same_value(const LawTerm& a, const LawTerm& b) { return same_law(a, b) && n
 
 }  // namespace
 
+std::vector<double> shares_of(const std::vector<Candidate>& alternatives) {
+  const std::size_t n = alternatives.size();
+  std::vector<double> shares(n, 1.0);
+  if (n < 2 || !(alternatives.front().spacing > 0.0)) {
+    return shares;
+  }
+  const auto value = [&](std::size_t j) { return std::log(alternatives[j].term.constants.front()); };  // they ascend
+  for (std::size_t j = 0; j < n; ++j) {
+    const std::size_t below = j == 0 ? 0 : j - 1, above = std::min(n - 1, j + 1);
+    shares[j] = 0.5 * (value(above) - value(below)) / alternatives.front().spacing;
+  }
+  return shares;
+}
+
 LawClass::LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
                    const std::vector<Candidate>& own_values, double least_odds, const std::stop_token& stop)
     : own_(std::move(own)), tried_(best_of(others)), least_odds_(least_odds), possible_{own_} {
+  std::vector<double> share = {
+      own_values.empty() ? 1.0 : Shortlist::wave_step};  // of a function's belief, of each that is possible
   for (const std::vector<Candidate>& alternatives : others) {
-    for (Candidate c : alternatives) {
-      if (is_member(c) && !same_value(c.term, own_.term)) {
-        c.cost += std::log(static_cast<double>(alternatives.size()));
-        possible_.push_back(std::move(c));
+    const std::vector<double> shares = shares_of(alternatives);
+    for (std::size_t j = 0; j < alternatives.size(); ++j) {
+      if (same_value(alternatives[j].term, own_.term)) {
+        share.front() = std::min(share.front(), shares[j]);
+      } else if (is_member(alternatives[j])) {
+        possible_.push_back(alternatives[j]);
+        share.push_back(shares[j]);
       }
     }
   }
-  std::copy_if(own_values.begin(), own_values.end(), std::back_inserter(possible_),
-               [&](const Candidate& c) { return is_member(c); });
+  for (const Candidate& c : own_values) {
+    if (is_member(c)) {
+      possible_.push_back(c);
+      share.push_back(Shortlist::wave_step);
+    }
+  }
   laws_.reserve(possible_.size());
-  for (const Candidate& c : possible_) {
-    laws_.push_back({c.term, c.coefficient, odds(c)});
+  for (std::size_t j = 0; j < possible_.size(); ++j) {
+    laws_.push_back({possible_[j].term, possible_[j].coefficient, share[j] * odds(possible_[j])});
   }
   elsewhere_ = carry_over(like, laws_, stop);
 }

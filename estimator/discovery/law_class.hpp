@@ -10,6 +10,11 @@
 
 namespace selfcal::discovery {
 
+// Of the belief in a function with a constant, which is that of the constants about one value of the dictionary's, what each of these
+// stands for: as many of them as lie between it and the middles towards its neighbours. `alternatives`: of one function, constants
+// ascending. One alone, or one without a constant: all of it.
+std::vector<double> shares_of(const std::vector<Candidate>& alternatives);
+
 class LawClass {
  public:
   // `others`: every function that was tried in the place of `own`, each with several values of its constant. `like`: the unit,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -118,8 +119,7 @@ Eigen::MatrixXd Shortlist::waves(const std::string& sine, const std::string& cos
 }
 
 std::vector<Candidate> Shortlist::values_of_wave(const PieceModel& model, const Candidate& own) const {
-  constexpr int steps = 20;     // to either side
-  constexpr double step = 0.1;  // of half a period of resolution
+  constexpr int steps = 20;  // to either side
   std::vector<Candidate> values;
   for (const auto& [kernel, form] : {std::pair{Kernel::wave, over_time}, std::pair{Kernel::turn_wave, over_turns}}) {
     std::string sine = own.term.expression.text();
@@ -130,7 +130,7 @@ std::vector<Candidate> Shortlist::values_of_wave(const PieceModel& model, const 
     sine.replace(at, form.with_phase.size(), form.bare);
     std::string cosine = sine;
     cosine.replace(at, 3, "cos");
-    const double frequency = 1.0 / own.term.constants[0], apart = step / longest_of(kernel);
+    const double frequency = 1.0 / own.term.constants[0], apart = wave_step / longest_of(kernel);
     const double here = model.gain(own.term.axis, waves(sine, cosine, own.term.constants[0]));
     for (int k = -steps; k <= steps; ++k) {
       const double period = 1.0 / (frequency + k * apart);
@@ -196,6 +196,7 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
     });
     c.term.constants = {constant};
     limit(c.term, function.kernel);
+    c.spacing = spacing_of(function.kernel);
   }
   c.gain = std::max(c.gain, gain_of(model, c.term));
   return c;
@@ -260,6 +261,18 @@ void Shortlist::limit(LawTerm& term, Kernel kernel) const {
   }
   term.least = 0.5 * least;
   term.most = 2.0 * most;
+}
+
+double Shortlist::spacing_of(Kernel kernel) const {
+  std::set<double> constants;
+  for (const Factor& factor : dictionary_.factors) {
+    if (factor.kernel == kernel) {
+      constants.insert(factor.constant);
+    }
+  }
+  return constants.size() < 2
+             ? 0.0
+             : std::log(*constants.rbegin() / *constants.begin()) / static_cast<double>(constants.size() - 1);
 }
 
 std::vector<Constant> Shortlist::constants(const LawTerm& term) const {

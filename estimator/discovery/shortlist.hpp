@@ -19,6 +19,8 @@ struct Candidate {
   double gain = 0.0, cost = 0.0;  // as in Ranked and Function, the cost of a free phase included
   bool step = false;              // its constant is an instant
   double coefficient = 0.0;       // where it was fitted exactly
+  double spacing =
+      0.0;  // of the values of its constant that share the cost, in logarithms; 0: it has none, or is a wave
   double merit() const { return 0.5 * gain - cost; }
   std::string text() const { return term.expression.text(term.constants); }
 };
@@ -40,7 +42,8 @@ class Shortlist {
   // gain; best first.
   std::vector<Candidate> best(const PieceModel& model, std::size_t most) const;
   // A wave with other periods up to one of resolution away, amplitude and phase of greatest gain at each: where little of it is seen, several
-  // fit alike, far beyond the sigma of a linearised fit. Of another law none.
+  // fit alike, far beyond the sigma of a linearised fit. `wave_step` of the dictionary's periods apart. Of another law none.
+  static constexpr double wave_step = 0.1;
   std::vector<Candidate> values_of_wave(const PieceModel& model, const Candidate& own) const;
   // Columns of a term over the pieces: itself and its derivatives by its constants.
   void add_columns(const PieceModel& model, const LawTerm& term, std::vector<Eigen::VectorXd>& columns) const;
@@ -54,6 +57,7 @@ class Shortlist {
   Eigen::MatrixXd waves(const std::string& sine, const std::string& cosine, double period) const;
   std::pair<double, double> periods_about(const Function& wave) const;
   void limit(LawTerm& term, Kernel kernel) const;  // to twice the range in which its kernel is looked for
+  double spacing_of(Kernel kernel) const;          // of its constants in the dictionary, in logarithms
   double gain_of(const PieceModel& model, const LawTerm& term) const;
 
   const PieceSums& sums_;
