@@ -261,13 +261,15 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
       continue;
     }
-    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end()) {
+    const double cost = cost_of_laws(laws->terms.size(), alone.rows);
+    const double of_one_name = of_a_name + of_a_coefficient(alone.rows);
+    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end() || cost + of_one_name >= least) {
       continue;
     }
     tried.push_back(laws->forms());
     const std::optional<Diagnosis> of_rest = together.without(*laws);
     // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further.
-    if (!of_rest || cost_of_laws(laws->terms.size(), alone.rows) + cost_of_names(of_rest->model, alone.rows) >= least) {
+    if (!of_rest || cost + cost_of_names(of_rest->model, alone.rows) >= least) {
       continue;
     }
     // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
