@@ -155,7 +155,9 @@ Expected<std::unique_ptr<ColumnSource>> array_source(Arrays arrays, const std::s
       most = columns;
     }
   }
-  if (most < 2) {
+  // One column alone is one sensor's, if it is long: nothing but scalars may stand beside it.
+  constexpr std::size_t long_enough = 100;
+  if (most < 2 && (most == 0 || rows < long_enough || lengths.size() > (lengths.contains(1) ? 2U : 1U))) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: {}: holds no two columns of numbers of one length", file, arrays.form));
   }

@@ -10,6 +10,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/resample.hpp"
 #include "protocol/import/time_axis.hpp"
+#include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 #include "protocol/toml_file/nearest_word.hpp"
 
@@ -183,6 +184,20 @@ std::vector<double> intervals_of(const TimeAxis& axis, bool by_stamps) {
   return interval;
 }
 
+// A row that is the one before in its time and in all that is read of it was written twice.
+void take_once(ColumnData& data, std::vector<std::string>& notes) {
+  if (data.stamps.empty()) {
+    return;
+  }
+  const std::vector<bool> repeated = repeated_rows(data);
+  if (const auto count = std::count(repeated.begin(), repeated.end(), true); count > 0) {
+    const auto first = static_cast<std::size_t>(std::find(repeated.begin(), repeated.end(), true) - repeated.begin());
+    notes.push_back(fmt::format("{} rows are the row before once more and are taken once, the first at {}", count,
+                                data.place(first)));
+    leave_out(repeated, data);
+  }
+}
+
 // Strictly, or without the rows that lack a number, which the notes then say.
 Expected<ColumnData> read_rows(const ColumnSource& source, ColumnRequest request, const ImportMap& map,
                                const std::string& file, std::vector<std::string>& notes) {
@@ -221,9 +236,13 @@ Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const
     return tl::unexpected(*columns.fault);
   }
   Imported imported;
-  const Expected<ColumnData> data = read_rows(source, columns.request, map, file, imported.notes);
+  Expected<ColumnData> data = read_rows(source, columns.request, map, file, imported.notes);
   if (!data) {
     return tl::unexpected(data.error());
+  }
+  take_once(*data, imported.notes);
+  if (std::string words = continue_full_clocks(data->stamps); !words.empty()) {
+    imported.notes.push_back(std::move(words));
   }
   constexpr std::size_t fewest = 2;
   if (data->rows < fewest) {

@@ -60,8 +60,12 @@ struct Stranger {
 };
 constexpr std::string_view novatel =
     "a NovAtel log; `sed -n '/^[%#]RAWIMU/{s/^[^;]*;//;s/[*].*//;p}'` makes columns of its lines";
-constexpr std::array<Stranger, 6> strangers{
-    {{"%RAWIMU", novatel},
+constexpr std::string_view ardupilot =
+    "a log of ArduPilot; `sed -n '/^IMU, [0-9]*, [1-9],/d;s/^FMT.*, IMU, [A-Za-z]*, //p;s/^IMU, //p'` makes columns of "
+    "its first sensor's lines";
+constexpr std::array<Stranger, 7> strangers{
+    {{"FMT, 128, ", ardupilot},
+     {"%RAWIMU", novatel},
      {"#RAWIMU", novatel},
      {"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
      {"#ROSRECORD", "a ROS bag of version 1, which this program does not read; version 2.0 is read"},
@@ -74,8 +78,11 @@ Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& fi
                                                  const std::optional<std::string>& topic) {
   std::error_code none;
   if (std::filesystem::is_directory(file, none)) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: a folder; of a ROS 2 bag its .db3 file is wanted", file.string()));
+    return fail(
+        ErrorKind::bad_input,
+        fmt::format("{}: a folder; of a ROS 2 bag its .db3 file is wanted; files of a row each, as KITTI's oxts/data, "
+                    "become one with cat",
+                    file.string()));
   }
   const std::string head = first_bytes(file);
   if (head.starts_with("SQLite format 3")) {

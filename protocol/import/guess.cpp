@@ -13,6 +13,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/psins.hpp"
 #include "protocol/import/time_axis.hpp"
+#include "protocol/import/time_steps.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -26,7 +27,7 @@ std::string_view si_unit(const UnitClaim& said, std::string_view increments, std
 
 class Guesser {
  public:
-  Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values, std::vector<bool> lost)
+  Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values, LeftOutRows lost)
       : source_(source),
         known_(knowledge),
         values_(std::move(values)),
@@ -38,7 +39,7 @@ class Guesser {
       guess_.map.dialect = *source_.dialect();
     }
     psins_ = read_psins(source_.preamble());
-    roles_ = assign_roles(source_, named_, values_, lost_, psins_.has_value(), guess_.remarks);
+    roles_ = assign_roles(source_, named_, values_, lost_.rows, psins_.has_value(), guess_.remarks);
     guess_site();
     guess_time();
     guess_incomplete();
@@ -131,6 +132,9 @@ class Guesser {
     say("time.unit", fmt::format("{}: {} Hz; intervals vary by {:.2g} % rms{}", map.time.unit, rate.rate_hz,
                                  rate.jitter < 1e-9 ? 0.0 : 100.0 * rate.jitter,
                                  rate.gaps > 0 ? fmt::format(", {} gaps", rate.gaps) : ""));
+    if (!roles_.clock_words.empty()) {
+      say("time.column", roles_.clock_words);
+    }
     say("time.stamp", "a time is taken to be the end of its sample's interval");
     // A recording counts from its start.
     const double first_s = static_cast<double>(roles_.stamps.front()) * si;
@@ -145,11 +149,14 @@ class Guesser {
   }
 
   void guess_incomplete() {
-    const auto count = std::count(lost_.begin(), lost_.end(), true);
-    if (count == 0) {
+    if (lost_.repeated > 0 && roles_.time) {
+      say("time", fmt::format("{} of {} lines are the line before once more: each is taken once", lost_.repeated,
+                              lost_.rows.size()));
+    }
+    if (lost_.incomplete == 0) {
       return;
     }
-    const std::string lines = fmt::format("{} of {} lines lack a number", count, lost_.size());
+    const std::string lines = fmt::format("{} of {} lines lack a number", lost_.incomplete, lost_.rows.size());
     if (!roles_.time) {
       return doubt("time", lines + ", and no time says how long they were");
     }
@@ -342,9 +349,15 @@ class Guesser {
       gyro.unit = std::string(claimed ? claimed->name : si_unit(said, "rad", "rad/s"));
       gyro.increments = find_unit(gyro.unit)->quantity == Quantity::angle;
       const char* why = !interval_s_ ? "the sample rate is not known" : "no turn that shows it";
-      return claimed && interval_s_ ? say("gyro.unit", fmt::format("{} by its name; {}", gyro.unit, why))
-                                    : doubt("gyro.unit", fmt::format("{}{}: {}", gyro.unit,
-                                                                     claimed ? " by its name" : " or any other", why));
+      // "gyro_rad" of PX4 is a rate, other people's are increments.
+      const bool angle = claimed && gyro.increments && !said.increments;
+      if (angle) {
+        why = "increments, or so much a second; no turn shows which";
+      }
+      return claimed && interval_s_ && !angle
+                 ? say("gyro.unit", fmt::format("{} by its name; {}", gyro.unit, why))
+                 : doubt("gyro.unit",
+                         fmt::format("{}{}: {}", gyro.unit, claimed ? " by its name" : " or any other", why));
     }
     auto fit = gyro_unit(*orientation.rad_per_sample, *interval_s_, said);
     // "gyro_rad" of PX4 is a rate.
@@ -379,27 +392,10 @@ class Guesser {
                                 gyro.unit));
   }
 
-  // Size of the mean of blocks, the median of them.
-  double size_of_gravity() const {
-    const TriadColumns columns = triad_columns(values_, *roles_.accelerometer);
-    const Motion motion =
-        find_motion(columns, columns, std::nullopt, std::clamp<std::size_t>(columns.column[0]->size() / 2000, 2, 25));
-    std::vector<double> size;
-    for (const Block& block : motion.blocks) {
-      size.push_back(block.accel.norm());
-    }
-    if (size.empty()) {
-      return 0.0;
-    }
-    const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-    std::nth_element(size.begin(), middle, size.end());
-    return *middle;
-  }
-
   void guess_accelerometer_unit() {
     TriadMap& accel = guess_.map.accelerometer;
     const UnitClaim said = claim(*roles_.accelerometer, "accelerometer.unit");
-    const double size = size_of_gravity();
+    const double size = usual_force(triad_columns(values_, *roles_.accelerometer));
     // Without a rate only a named rate can be told.
     const auto claimed = find_unit(said.unit);
     const double interval = interval_s_.value_or(1.0);
@@ -422,14 +418,20 @@ class Guesser {
       return;
     }
     accel.increments = said.increments;
+    if (claimed && (claimed->quantity == Quantity::acceleration || claimed->quantity == Quantity::velocity)) {
+      accel.unit = claimed->name;
+      return doubt("accelerometer.unit",
+                   fmt::format("{} by the name, but the usual force is {:.5g} of it: a sensor that "
+                               "moves, or another unit",
+                               said.unit, size));
+    }
     accel.unit = std::string(si_unit(said, "m/s", "m/s^2"));
     const double scale = 9.80665 * (said.increments ? interval : 1.0) / size;
     accel.scale = {scale, scale, scale};
     doubt("accelerometer.unit",
-          claimed ? fmt::format("{} by the name, but gravity is {:.5g} of it", said.unit, size)
-                  : fmt::format("counts: gravity is {:.5g} of them, zero offsets included; scale and zero of the data "
-                                "sheet belong here",
-                                size));
+          fmt::format("counts: gravity is {:.5g} of them, zero offsets included; scale and zero of "
+                      "the data sheet belong here",
+                      size));
   }
 
   void guess_temperature() {
@@ -451,7 +453,7 @@ class Guesser {
   const ColumnSource& source_;
   const GuessKnowledge& known_;
   Values values_;
-  std::vector<bool> lost_;  // rows of the file that values_ is without
+  LeftOutRows lost_;  // rows of the file that values_ is without
   std::vector<NamedColumn> named_;
   Roles roles_;
   std::optional<PsinsHeader> psins_;
@@ -485,8 +487,8 @@ Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& know
   }
   const std::size_t rows = data->rows;
   constexpr double most_lost = 0.01;  // beyond it a column is no sensor's
-  std::vector<bool> lost = incomplete_rows(*data, most_lost);
-  leave_out(lost, *data);
+  LeftOutRows lost = rows_to_leave_out(*data, most_lost);
+  leave_out(lost.rows, *data);
   const bool left_out = data->left_out;
   Guess guess = Guesser(source, knowledge, std::move(data->values), std::move(lost)).guess();
   if (left_out) {

@@ -246,7 +246,7 @@ Role triad_role(const Words& w) {
     return Role::other;
   }
   const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});
-  if (holds(w, {"gyr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
+  if (holds(w, {"gyr", "pqr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
       is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "dth", "da"}) ||
       (inc && (holds(w, {"theta", "angle"}) || is_one_of(w, {"ang"}))) ||
       (holds(w, {"ang"}) && holds(w, {"rate", "vel"}))) {

@@ -12,6 +12,7 @@
 #include "protocol/import/guess_axes.hpp"
 #include "protocol/import/guess_time.hpp"
 #include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::import {
@@ -70,6 +71,7 @@ class Assigner {
       Expected<ColumnData> data = source_.read(request);
       if (data) {
         leave_out(lost_, *data);
+        roles_.clock_words = continue_full_clocks(data->stamps);
       }
       if (data && rises_evenly(data->stamps)) {
         roles_.time = column;
@@ -233,6 +235,9 @@ class Assigner {
       found.turns = found.turns || block.accel.normalized().cross(first).norm() > far;
     }
     found.scatter = std::sqrt(squares);
+    if (found.scatter < 1e-9) {
+      return std::nullopt;  // flags and constants: no sensor is without noise
+    }
     return sum > 0.0 ? std::optional<SizeOfTriad>(found) : std::nullopt;
   }
 

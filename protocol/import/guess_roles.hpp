@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "protocol/import/column_source.hpp"
@@ -18,6 +19,7 @@ struct Roles {
   std::optional<std::size_t> time;
   bool time_is_date = false;
   std::vector<long double> stamps;
+  std::string clock_words;  // that the clock begins again where it is full, and where; empty: it does not
   std::optional<std::array<std::size_t, 3>> gyro;
   std::optional<std::array<std::size_t, 3>> accelerometer;
   std::optional<std::array<std::size_t, 2>> gimbal;  // outer, inner where `gimbal_named`; else as they stand

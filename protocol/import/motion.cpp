@@ -200,4 +200,19 @@ std::vector<Turn> turns_of(const Motion& motion, const std::vector<Rest>& rests)
   return turns;
 }
 
+double usual_force(const TriadColumns& accel) {
+  const Motion motion =
+      find_motion(accel, accel, std::nullopt, std::clamp<std::size_t>(accel.column[0]->size() / 2000, 2, 25));
+  std::vector<double> size;
+  for (const Block& block : motion.blocks) {
+    size.push_back(block.accel.norm());
+  }
+  if (size.empty()) {
+    return 0.0;
+  }
+  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
+  std::nth_element(size.begin(), middle, size.end());
+  return *middle;
+}
+
 }  // namespace selfcal::import

@@ -54,4 +54,7 @@ std::vector<Rest> rests_of(const Motion& motion);
 std::optional<Vector3> centre_of_gravity_sphere(const TriadColumns& gyro, const TriadColumns& accel);
 std::vector<Turn> turns_of(const Motion& motion, const std::vector<Rest>& rests);
 
+// Size of the specific force over a few samples, the median of all: gravity's, of a sensor that mostly stands or is turned by hand.
+double usual_force(const TriadColumns& accel);
+
 }  // namespace selfcal::import

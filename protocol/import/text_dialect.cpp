@@ -148,7 +148,7 @@ struct Run {
 };
 
 // The longest run of lines with the same number of numeric fields.
-Run longest_run(const std::vector<std::string_view>& lines, char separator, char decimal) {
+Run longest_run(const std::vector<std::string_view>& lines, char separator, char decimal, std::size_t fewest = 2) {
   Run best;
   Run run;
   std::vector<std::string_view> fields;
@@ -161,7 +161,7 @@ Run longest_run(const std::vector<std::string_view>& lines, char separator, char
       run = {k, 0, count};
     }
     ++run.lines;
-    if (run.fields > 1 && run.lines > best.lines) {
+    if (run.fields >= fewest && run.lines > best.lines) {
       best = run;
     }
   }
@@ -322,7 +322,14 @@ std::optional<TextDialect> detect_dialect(const std::vector<std::string_view>& l
     dialect.separator = dialect.decimal = ',';
   }
   if (best.fields < 2) {
-    return std::nullopt;
+    // One column of numbers and little else.
+    constexpr std::size_t fewest_lines = 100;
+    best = longest_run(lines, ',', '.', 1);
+    dialect.separator = ',';
+    dialect.decimal = '.';
+    if (best.fields != 1 || best.lines < fewest_lines || 10 * best.lines < 9 * lines.size()) {
+      return std::nullopt;
+    }
   }
   dialect.first_line = best.first + 1;
   for (const std::string_view line : lines) {

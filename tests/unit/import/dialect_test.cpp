@@ -66,6 +66,19 @@ TEST(Dialect, NoNumbersNoDialect) {
   EXPECT_FALSE(dialect_of({"1", "2", "3"}));
 }
 
+TEST(Dialect, OneLongColumnOfNumbersIsOne) {
+  std::vector<std::string_view> lines(150, "0.0123");
+  const auto plain = dialect_of(lines);
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->header_line, 0U);
+  lines.insert(lines.begin(), "omega_dps");
+  const auto named = dialect_of(lines);
+  ASSERT_TRUE(named);
+  EXPECT_EQ(named->header_line, 1U);
+  lines.insert(lines.begin() + 20, 40, "a word");  // a text with numbers in it
+  EXPECT_FALSE(dialect_of(lines));
+}
+
 TEST(Numbers, OnlyWholeFields) {
   EXPECT_EQ(number_of("+1.5e3", '.'), 1500.0);
   EXPECT_EQ(number_of("1.5D-3", '.'), 1.5e-3);  // Fortran

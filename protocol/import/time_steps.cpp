@@ -1,0 +1,94 @@
+#include "protocol/import/time_steps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "protocol/import/incomplete_rows.hpp"
+
+namespace selfcal::import {
+namespace {
+
+constexpr std::array<long double, 7> full = {65536.0L,  16777216.0L, 4294967296.0L, 86400.0L,
+                                             604800.0L, 86400000.0L, 604800000.0L};
+
+long double usual_interval(const std::vector<long double>& stamps) {
+  std::vector<long double> steps;
+  steps.reserve(stamps.size());
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    steps.push_back(stamps[k] - stamps[k - 1]);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+// Whether a column rises from row to row but where rows repeat.
+bool has_a_clock(const ColumnData& data, const std::vector<bool>& repeated) {
+  constexpr std::size_t most_falls = 100;  // of a clock that begins again: one in as many rows
+  return std::any_of(data.values.begin(), data.values.end(), [&](const std::vector<double>& v) {
+    std::size_t falls = 0;
+    for (std::size_t row = 1; row < v.size(); ++row) {
+      falls += v[row] > v[row - 1] || repeated[row] ? 0 : 1;
+    }
+    return falls * most_falls <= v.size();
+  });
+}
+
+}  // namespace
+
+std::string continue_full_clocks(std::vector<long double>& stamps) {
+  if (stamps.size() < 3) {
+    return {};
+  }
+  const long double usual = usual_interval(stamps);
+  long double added = 0.0L, before = stamps.front();
+  std::size_t places = 0;
+  std::string words;
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    const long double stamp = stamps[k];
+    const auto* const end = std::find_if(full.begin(), full.end(), [&](long double size) {
+      const long double step = stamp + size - before;
+      return stamp < before && before < size + usual && step > 0.5L * usual && step < 1.5L * usual;
+    });
+    if (usual > 0.0L && end != full.end()) {
+      added += *end;
+      if (++places == 1) {
+        words = fmt::format("the clock begins again from {:.10g} to {:.10g}, full at {:.10g}: continued",
+                            static_cast<double>(before), static_cast<double>(stamp), static_cast<double>(*end));
+      }
+    }
+    before = stamp;
+    stamps[k] = stamp + added;
+  }
+  return places > 1 ? words + fmt::format(", so in {} places", places) : words;
+}
+
+std::vector<bool> repeated_rows(const ColumnData& data) {
+  std::vector<bool> repeated(data.rows, false);
+  std::size_t count = 0;
+  for (std::size_t row = 1; row < data.rows; ++row) {
+    const bool same = (data.stamps.empty() || data.stamps[row] == data.stamps[row - 1]) &&
+                      std::all_of(data.values.begin(), data.values.end(),
+                                  [row](const std::vector<double>& v) { return v[row] == v[row - 1]; });
+    repeated[row] = same;
+    count += same ? 1 : 0;
+  }
+  constexpr std::size_t most = 10;
+  return most * count > data.rows ? std::vector<bool>(data.rows, false) : repeated;
+}
+
+LeftOutRows rows_to_leave_out(const ColumnData& data, double most_incomplete) {
+  LeftOutRows lost{incomplete_rows(data, most_incomplete), 0, 0};
+  lost.incomplete = std::count(lost.rows.begin(), lost.rows.end(), true);
+  if (const std::vector<bool> repeated = repeated_rows(data); has_a_clock(data, repeated)) {
+    lost.repeated = std::count(repeated.begin(), repeated.end(), true);
+    std::transform(lost.rows.begin(), lost.rows.end(), repeated.begin(), lost.rows.begin(), std::logical_or<>());
+  }
+  return lost;
+}
+
+}  // namespace selfcal::import

@@ -1,0 +1,29 @@
+// What a time does that is no fault of the sensor: clocks that begin again at their end, rows that were written twice.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "protocol/import/column_source.hpp"
+
+namespace selfcal::import {
+
+// Clocks and counters that begin again where they are full: 2^16, 2^24, 2^32 ticks, a day or a GPS week in s or ms. Where a stamp falls by
+// so much that with one of these added it is the usual interval behind the one before, it goes on from there. Words on where; empty: nowhere.
+std::string continue_full_clocks(std::vector<long double>& stamps);
+
+// True for a row that is the one before in its stamp and in all values: written twice. None where more than a tenth of all rows are.
+std::vector<bool> repeated_rows(const ColumnData& data);
+
+// Rows of a file that nothing is judged by.
+struct LeftOutRows {
+  std::vector<bool> rows;
+  std::ptrdiff_t incomplete = 0,
+                 repeated = 0;  // that lack a number (incomplete_rows.hpp), that are the row before once more
+};
+// Of tolerantly read data without stamps. A row is taken for one written twice only where another column goes on from row to row: the
+// counts of a coarse sensor that rests are the same again as well.
+LeftOutRows rows_to_leave_out(const ColumnData& data, double most_incomplete);
+
+}  // namespace selfcal::import

@@ -1,0 +1,91 @@
+// Clocks that begin again where they are full, and rows that were written twice.
+#include "protocol/import/time_steps.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::import {
+namespace {
+
+// `count` stamps, `step` apart, of a clock that is full at `size` and begins at `first`.
+std::vector<long double> clock(long double first, long double step, long double size, std::size_t count) {
+  std::vector<long double> stamps;
+  for (std::size_t k = 0; k < count; ++k) {
+    stamps.push_back(std::fmod(first + step * static_cast<long double>(k), size));
+  }
+  return stamps;
+}
+
+TEST(TimeSteps, FullClocksGoOn) {
+  struct Case {
+    long double first, step, size;
+  };
+  // SampleTimeFine of Xsens, a packet counter, sensortime of a BMI270, a GPS week, a day in ms.
+  for (const Case& c : {Case{4294960000.0L, 100.0L, 4294967296.0L}, Case{65530.0L, 1.0L, 65536.0L},
+                        Case{16777000.0L, 256.0L, 16777216.0L}, Case{604799.5L, 0.01L, 604800.0L},
+                        Case{86399990.0L, 5.0L, 86400000.0L}}) {
+    std::vector<long double> stamps = clock(c.first, c.step, c.size, 1000);
+    EXPECT_NE(continue_full_clocks(stamps), "");
+    for (std::size_t k = 1; k < stamps.size(); ++k) {
+      ASSERT_NEAR(static_cast<double>(stamps[k] - stamps[k - 1]), static_cast<double>(c.step), 1e-6) << k;
+    }
+  }
+}
+
+TEST(TimeSteps, AClockThatIsSetBackStaysBack) {
+  for (const long double back : {0.5L, 94.0L, 3600.0L}) {
+    std::vector<long double> stamps = clock(5000.0L, 0.01L, 1e9L, 1000);
+    for (std::size_t k = 500; k < stamps.size(); ++k) {
+      stamps[k] -= back;
+    }
+    const std::vector<long double> before = stamps;
+    EXPECT_EQ(continue_full_clocks(stamps), "");
+    EXPECT_EQ(stamps, before);
+  }
+}
+
+ColumnData data(std::size_t rows) {
+  ColumnData d;
+  d.values.resize(2);
+  for (std::size_t k = 0; k < rows; ++k) {
+    d.values[0].push_back(static_cast<double>(k));
+    d.values[1].push_back(std::sin(static_cast<double>(k)));
+    d.stamps.push_back(static_cast<long double>(k));
+  }
+  d.rows = rows;
+  return d;
+}
+
+void repeat(std::size_t row, ColumnData& d) {
+  for (std::vector<double>& v : d.values) {
+    v.insert(v.begin() + static_cast<std::ptrdiff_t>(row), v[row]);
+  }
+  d.stamps.insert(d.stamps.begin() + static_cast<std::ptrdiff_t>(row), d.stamps[row]);
+  ++d.rows;
+}
+
+TEST(TimeSteps, RowsThatStandTwice) {
+  ColumnData d = data(200);
+  repeat(20, d);
+  repeat(90, d);
+  const LeftOutRows lost = rows_to_leave_out(d, 0.01);
+  EXPECT_EQ(lost.repeated, 2);
+  EXPECT_TRUE(lost.rows[21] && lost.rows[91]);
+  d.values[1][91] += 0.1;  // another reading at the same time is no row written twice
+  EXPECT_FALSE(repeated_rows(d)[91]);
+}
+
+TEST(TimeSteps, ACoarseSensorAtRestIsNoRowWrittenTwice) {
+  ColumnData d = data(200);
+  d.stamps.clear();
+  for (std::size_t k = 0; k < d.rows; ++k) {
+    d.values[0][k] = k % 23 == 0 ? 1.0 : 0.0;  // counts, and no column that goes on
+    d.values[1][k] = k % 29 == 0 ? 1.0 : 0.0;
+  }
+  EXPECT_EQ(rows_to_leave_out(d, 0.01).repeated, 0);
+}
+
+}  // namespace
+}  // namespace selfcal::import
