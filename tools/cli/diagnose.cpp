@@ -300,7 +300,7 @@ Expected<int> diagnose_by_poses(const DiagnoseArguments& arguments, const Opened
   if (arguments.json) {
     fmt::print("{}\n", document::with_head(document::poses, poses_json(d), opened.file).dump());
   } else {
-    fmt::print("{}", poses_text(d, true));
+    fmt::print("{}more: selfcal poses {} --details\n", poses_summary(d, true), arguments.recording);
   }
   return poses_mismatch(d) ? 1 : 0;
 }

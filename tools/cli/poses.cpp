@@ -2,6 +2,7 @@
 // of a recording that supports no more, and of raw counts.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -18,80 +19,104 @@ namespace {
 constexpr WholeRange known_columns{1, 1000};
 
 struct PosesArguments {
-  std::string file;
+  std::vector<std::string> files;
+  std::string gyros;
+  std::optional<double> latitude_deg, height_m, rate_hz;
   double gyro_unit = 1.0;
   double false_alarm_rate = 0.01;
-  bool json = false;
+  bool json = false, details = false;
   std::string only;
   std::optional<std::uint64_t> angle_column, temperature_column;
 };
 
 RawColumns raw_columns(const PosesArguments& arguments) {
   RawColumns columns;
-  columns.sensors = arguments.only == "gyros"            ? diagnosis::Sensors::gyros
-                    : arguments.only == "accelerometers" ? diagnosis::Sensors::accelerometers
-                                                         : diagnosis::Sensors::both;
+  if (!arguments.only.empty()) {
+    columns.sensors = arguments.only == "gyros" ? diagnosis::Sensors::gyros : diagnosis::Sensors::accelerometers;
+  }
+  columns.rate_hz = arguments.rate_hz;
   columns.raw_gyros = arguments.gyro_unit != 1.0;
   columns.angle = static_cast<std::size_t>(arguments.angle_column.value_or(0));
   columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
 }
 
-// What says how a CSV's columns stand says nothing of a recording, whose datasets have names.
-Expected<void> check_columns(const PosesArguments& arguments, bool is_recording) {
-  if (is_recording && (!arguments.only.empty() || arguments.angle_column || arguments.temperature_column)) {
-    return fail(
-        ErrorKind::usage,
-        fmt::format("{}: --only, --angle-column and --temperature-column are of CSV of raw values", arguments.file));
+// What says how a log's columns stand says nothing of a recording, whose datasets have names.
+Expected<void> check_arguments(const PosesArguments& arguments, bool is_recording) {
+  if (arguments.files.empty()) {
+    return fail(ErrorKind::usage, "FILE: a log or a recording is needed");
+  }
+  const bool of_columns = !arguments.only.empty() || arguments.angle_column || arguments.temperature_column ||
+                          !arguments.gyros.empty() || arguments.rate_hz || arguments.latitude_deg || arguments.height_m;
+  if (is_recording && (of_columns || arguments.files.size() > 1)) {
+    return fail(ErrorKind::usage,
+                fmt::format("{}: a recording is given alone: --only, --gyros, --rate, --latitude, --height and columns "
+                            "are of logs",
+                            arguments.files.front()));
+  }
+  if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty() || arguments.rate_hz)) {
+    return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers, each with its times");
+  }
+  if (arguments.height_m && !arguments.latitude_deg) {
+    return fail(ErrorKind::usage, "--height: without --latitude it says nothing of gravity");
   }
   return {};
 }
 
 Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
-  const bool is_recording = arguments.file.ends_with(".h5") || arguments.file.ends_with(".hdf5");
-  if (const auto columns = check_columns(arguments, is_recording); !columns) {
-    return tl::unexpected(columns.error());
+  const auto is_hdf5 = [](const std::string& f) { return f.ends_with(".h5") || f.ends_with(".hdf5"); };
+  const bool is_recording = std::any_of(arguments.files.begin(), arguments.files.end(), is_hdf5);
+  if (const auto good = check_arguments(arguments, is_recording); !good) {
+    return tl::unexpected(good.error());
   }
-  Expected<RawLog> log = is_recording ? read_hdf5(arguments.file, lenient).map([](const auto& loaded) {
-    return RawLog{pose_input_of(loaded.recording), true, {}};
-  })
-                                      : read_raw_poses(arguments.file, raw_columns(arguments));
+  const std::string& name = arguments.files.front();
+  Expected<RawLog> log =
+      is_recording ? read_hdf5(name, lenient).map([](const auto& loaded) {
+        return RawLog{pose_input_of(loaded.recording), true, {}};
+      })
+                   : read_raw_poses({arguments.files, arguments.gyros, arguments.latitude_deg, arguments.height_m},
+                                    raw_columns(arguments));
   if (!log) {
     return tl::unexpected(log.error());
   }
   if (!log->notes.empty()) {
-    fmt::print(stderr, "selfcal poses: {}: {}\n", arguments.file, log->notes);
+    fmt::print(stderr, "selfcal poses: {}: {}\n", name, log->notes);
   }
   log->input.gyro_unit = arguments.gyro_unit;
   const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
   if (!d.failure.empty()) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.file, d.failure));
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, d.failure));
   }
   if (arguments.json) {
-    const Expected<document::InputFile> file = document::identify_file(arguments.file);
+    const Expected<document::InputFile> file = document::identify_file(name);
     if (!file) {
       return tl::unexpected(file.error());
     }
     fmt::print("{}\n", document::with_head(document::poses, poses_json(d), *file).dump());
   } else {
-    fmt::print("{}", poses_text(d, log->si));
+    fmt::print("{}", arguments.details ? poses_details(d, log->si) : poses_summary(d, log->si) + "more: --details\n");
   }
   return poses_mismatch(d) ? 1 : 0;
 }
 
 CommandRun configure(Options& options) {
   auto arguments = std::make_shared<PosesArguments>();
-  options.text("FILE", arguments->file,
-               "a log: columns by their names, else time in s, gyros x y z, accelerometers x y z; or a recording (.h5)",
-               Needed::yes);
+  options.texts("FILE", arguments->files,
+                "a log: columns by their names, else time in s, gyros x y z, accelerometers x y z; or a recording "
+                "(.h5); several logs: one after the other, as of positions");
   options.choice("--only", arguments->only, {"gyros", "accelerometers"},
-                 "gyros or accelerometers: the CSV holds these alone, time in s and then x y z");
+                 "gyros or accelerometers: the log holds these alone, time in s and then x y z; or one gyro");
+  options.text("--gyros", arguments->gyros, "the gyros' own file, of a logger that writes one file a sensor");
+  options.number("--rate", arguments->rate_hz, range::sample_rate, "rows a second, of a log without a time");
+  options.number("--latitude", arguments->latitude_deg, range::latitude, "of the place, deg: gravity, Earth's rate");
+  options.number("--height", arguments->height_m, range::height, "of the place, m");
   options.whole("--angle-column", arguments->angle_column, known_columns,
                 "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
   options.whole("--temperature-column", arguments->temperature_column, known_columns,
                 "the CSV's column, from 1, that holds a temperature, degC");
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
+  options.flag("--details", arguments->details, "every test and every parameter");
   options.flag("--json", arguments->json, "one JSON document on standard output");
   return [arguments] { return diagnose_by_poses(*arguments); };
 }

@@ -12,7 +12,10 @@
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/column_source.hpp"
 #include "protocol/import/guess_names.hpp"
+#include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
+#include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::cli {
@@ -39,6 +42,7 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
   input.gyro = rates(recording.delta_theta_rad);
   input.accel = rates(recording.delta_v_mps);
   input.accel_unit = 1.0;
+  input.gyros_si = true;
   input.gravity = earth::normal_gravity(recording.latitude_deg * units::degree, recording.height_m);
   input.latitude = recording.latitude_deg * units::degree;
   for (std::size_t i = 0; i < recording.temperature_c.size(); i += recording.temperature_channels) {
@@ -53,64 +57,130 @@ diagnosis::PoseInput pose_input_of(const Recording& recording) {
 
 namespace {
 
-using Triad = std::array<std::size_t, 3>;
+using diagnosis::PoseInput;
+using diagnosis::Sensors;
 
-// The only x, y and z of a role.
-std::optional<Triad> triad_of(const std::vector<import::NamedColumn>& named, import::Role role) {
-  Triad triad{};
-  std::array<int, 3> found{};
-  for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k].role == role && named[k].axis >= 0) {
-      triad.at(static_cast<std::size_t>(named[k].axis)) = k;
-      ++found.at(static_cast<std::size_t>(named[k].axis));
-    }
+// SI per unit where the names of all say one of this quantity; 0: they do not. "gyro_rad" of PX4 is a rate.
+double unit_of(const std::vector<import::NamedColumn>& named, const std::vector<std::size_t>& columns,
+               import::Quantity quantity) {
+  if (columns.empty()) {
+    return 0.0;
   }
-  return found == std::array{1, 1, 1} ? std::optional(triad) : std::nullopt;
+  std::string said;  // some say it once: "gx (dps), gy, gz"
+  for (const std::size_t column : columns) {
+    const std::string& unit = named[column].unit;
+    if (!unit.empty() && !said.empty() && unit != said) {
+      return 0.0;
+    }
+    said = unit.empty() ? said : unit;
+  }
+  auto unit = import::find_unit(said);
+  if (unit && quantity == import::Quantity::angular_rate && unit->quantity == import::Quantity::angle &&
+      !named[columns.front()].increment) {
+    unit = import::find_unit(said + "/s");
+  }
+  return unit && unit->quantity == quantity ? unit->si : 0.0;
 }
 
-struct Layout {
+std::string and_also(const std::string& a, const std::string& b) {
+  return a + (a.empty() || b.empty() ? "" : "; ") + b;
+}
+
+// Of the columns that may be the time the first that is one: a date of the day stands beside the time of the day.
+struct ReadRows {
+  import::ColumnData data;
   std::size_t time = 0;
-  Triad gyro{}, accel{};
+  std::string notes;
 };
 
-// Where no name says it.
-Layout plain_layout(diagnosis::Sensors sensors) {
-  return {0, {1, 2, 3}, sensors == diagnosis::Sensors::both ? Triad{4, 5, 6} : Triad{1, 2, 3}};
-}
-
-Layout layout_of(const std::vector<import::NamedColumn>& named, diagnosis::Sensors sensors) {
-  const auto one = [&](import::Role role) {
-    const auto by_role = triad_of(named, role);
-    return by_role || sensors == diagnosis::Sensors::both ? by_role : triad_of(named, import::Role::unknown);
-  };
-  const auto gyro = one(import::Role::gyro), accel = one(import::Role::accelerometer);
-  const bool enough =
-      (gyro || sensors == diagnosis::Sensors::accelerometers) && (accel || sensors == diagnosis::Sensors::gyros);
-  if (!enough) {
-    return plain_layout(sensors);
+void take_once(ReadRows& rows) {
+  const std::vector<bool> repeated = import::repeated_rows(rows.data);
+  if (const auto count = std::count(repeated.begin(), repeated.end(), true); count > 0) {
+    rows.notes = fmt::format("{} rows are the row before once more and are taken once", count);
+    import::leave_out(repeated, rows.data);
   }
-  const auto time =
-      std::find_if(named.begin(), named.end(), [](const auto& c) { return c.role == import::Role::time; });
-  return {time == named.end() ? 0 : static_cast<std::size_t>(time - named.begin()), gyro.value_or(Triad{}),
-          accel.value_or(Triad{})};
 }
 
-// SI per unit where the names of all three say one of this quantity; 0: they do not.
-double unit_of(const std::vector<import::NamedColumn>& named, const Triad& triad, import::Quantity quantity) {
-  const auto unit = import::find_unit(named[triad[0]].unit);
-  const bool all = unit && unit->quantity == quantity && named[triad[1]].unit == named[triad[0]].unit &&
-                   named[triad[2]].unit == named[triad[0]].unit;
-  return all ? unit->si : 0.0;
+bool rises(const std::vector<long double>& stamps) {
+  return std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
 }
 
-// A time that no name gives a unit is seconds, unless these make less than a sample a second and another unit makes a usual rate.
-std::string time_unit(const std::string& named, double interval) {
-  if (const auto unit = import::find_unit(named); unit && unit->quantity == import::Quantity::time) {
-    return named;
+Expected<ReadRows> read_with_time(const import::ColumnSource& source, const PoseLayout& layout,
+                                  import::ColumnRequest request) {
+  if (layout.times.empty()) {
+    return source.read(request).map([](import::ColumnData data) { return ReadRows{std::move(data), 0, {}}; });
   }
-  const std::vector<std::string> units = import::time_units(interval);
-  const bool seconds = units.empty() || std::find(units.begin(), units.end(), "s") != units.end();
-  return seconds ? "s" : units.front();
+  std::optional<Expected<ReadRows>> first;
+  for (const std::size_t candidate : layout.times) {
+    for (const bool date : {false, true}) {
+      request.stamp = candidate;
+      request.stamp_is_date = date;
+      Expected<ReadRows> rows = source.read(request).map([&](import::ColumnData data) {
+        return ReadRows{std::move(data), candidate, {}};
+      });
+      if (rows) {
+        take_once(*rows);
+        rows->notes = and_also(rows->notes, import::continue_full_clocks(rows->data.stamps));
+        if (rises(rows->data.stamps)) {
+          return rows;
+        }
+      }
+      first = first ? std::move(first) : std::move(rows);
+    }
+  }
+  return std::move(*first);
+}
+
+// A column that nobody calls a time and that is none: values that rise by chance, or a counter, whose unit is an interval.
+Expected<void> check_time(const ReadRows& rows, const import::ColumnSource& source,
+                          const std::vector<import::NamedColumn>& named, const std::string& file) {
+  const std::vector<long double>& stamps = rows.data.stamps;
+  for (std::size_t k = 1; k < rows.data.rows; ++k) {
+    if (stamps[k] <= stamps[k - 1]) {
+      return fail(
+          ErrorKind::bad_input,
+          fmt::format("{}: {}: time {:.10g} is not after {:.10g}: cut the file there and give both parts, or "
+                      "let --rate say how many rows a second it holds",
+                      file, rows.data.place(k), static_cast<double>(stamps[k]), static_cast<double>(stamps[k - 1])));
+    }
+  }
+  if (named[rows.time].role == import::Role::time) {
+    return {};
+  }
+  const bool counts = std::all_of(stamps.begin(), stamps.end(), [](long double s) { return s == std::floor(s); }) &&
+                      stamps.size() > 1 && stamps[1] - stamps[0] == 1.0L;
+  if (counts || !import::rises_evenly(stamps)) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {} {}: --rate says how many rows a second it holds", file, source.title(rows.time),
+                            counts ? "rises by 1, as a counter does, and no name calls it a time"
+                                   : "does not increase evenly, as a time does"));
+  }
+  return {};
+}
+
+// A time that no name gives a unit is seconds, unless these make less than a sample a second and one other unit makes a usual rate.
+Expected<std::string> time_unit(const ReadRows& rows, const import::ColumnSource& source,
+                                const std::vector<import::NamedColumn>& named, const std::string& file) {
+  const std::vector<long double>& stamps = rows.data.stamps;
+  const double interval =
+      stamps.size() < 2
+          ? 1.0
+          : static_cast<double>((stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1));
+  const std::string& said = named[rows.time].unit;
+  if (const auto unit = import::find_unit(said); unit && unit->quantity == import::Quantity::time) {
+    return said;
+  }
+  const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
+  const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);
+  if (units.empty() || std::find(units.begin(), units.end(), "s") != units.end()) {
+    return std::string("s");
+  }
+  if (units.size() > 1) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: intervals of {:.6g} are {} or {}: --rate says how many rows "
+                                                  "a second it holds",
+                                                  file, source.title(rows.time), interval, units[0], units[1]));
+  }
+  return units.front();
 }
 
 // The only column that is called a temperature, from 1; 0: none.
@@ -120,122 +190,94 @@ std::size_t named_temperature(const std::vector<import::NamedColumn>& named) {
   return std::count_if(named.begin(), named.end(), is) == 1 ? static_cast<std::size_t>(found - named.begin()) + 1 : 0;
 }
 
-// Of the columns that are called a time the first that is one: a date of the day stands beside the time of the day. `time` becomes it.
-Expected<import::ColumnData> read_with_time(const import::ColumnSource& source,
-                                            const std::vector<import::NamedColumn>& named,
-                                            import::ColumnRequest request, std::size_t& time) {
-  std::vector<std::size_t> candidates = {time};
-  for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k].role == import::Role::time && k != time) {
-      candidates.push_back(k);
+// A log as its file has it: SI where its names say units.
+struct OneLog {
+  PoseInput input;
+  double gyro_si = 0.0, accel_si = 0.0;  // 0: raw, or none
+  long double begin_s = 0.0L;            // of a time of the calendar: what was taken off
+  std::string notes;
+};
+
+// Time in s. A time of the calendar in seconds leaves no digits of an interval: from the first one on.
+void add_time(const ReadRows& rows, const std::string& unit, std::optional<double> rate_hz, OneLog& log) {
+  if (rate_hz) {
+    for (std::size_t i = 0; i < rows.data.rows; ++i) {
+      log.input.time_s.push_back(static_cast<double>(i + 1) / *rate_hz);
     }
+    return;
   }
-  std::optional<Expected<import::ColumnData>> first;
-  const auto rises = [](const Expected<import::ColumnData>& data) {
-    return data &&
-           std::adjacent_find(data->stamps.begin(), data->stamps.end(), std::greater_equal<>()) == data->stamps.end();
-  };
-  for (const std::size_t candidate : candidates) {
-    for (const bool date : {false, true}) {
-      request.stamp = candidate;
-      request.stamp_is_date = date;
-      Expected<import::ColumnData> data = source.read(request);
-      if (rises(data)) {
-        time = candidate;
-        return data;
-      }
-      first = first ? std::move(first) : std::move(data);
-    }
+  const auto si = static_cast<long double>(import::find_unit(unit)->si);
+  constexpr long double calendar_s = 1e7L;
+  if (rows.data.rows > 0 && std::abs(rows.data.stamps.front() * si) > calendar_s) {
+    log.begin_s = rows.data.stamps.front() * si;
   }
-  return std::move(*first);
+  for (const long double stamp : rows.data.stamps) {
+    log.input.time_s.push_back(static_cast<double>(stamp * si - log.begin_s));
+  }
 }
 
-std::string numbers(const Triad& triad) { return fmt::format("{}, {}, {}", triad[0] + 1, triad[1] + 1, triad[2] + 1); }
-
-std::string notes_of(const Layout& layout, const RawColumns& columns, const std::string& unit_of_time) {
-  const bool gyros = columns.sensors != diagnosis::Sensors::accelerometers;
-  const bool accels = columns.sensors != diagnosis::Sensors::gyros;
-  const Layout plain = plain_layout(columns.sensors);
-  const bool as_told = layout.time == plain.time && (!gyros || layout.gyro == plain.gyro) &&
-                       (!accels || layout.accel == plain.accel) && unit_of_time == "s";
-  if (as_told) {
-    return {};
-  }
-  return fmt::format("by the names time is column {} in {}{}{}", layout.time + 1, unit_of_time,
-                     gyros ? ", gyros are " + numbers(layout.gyro) : std::string(),
-                     accels ? ", accelerometers " + numbers(layout.accel) : std::string());
-}
-
-}  // namespace
-
-Expected<RawLog> read_raw_poses(const std::string& path, const RawColumns& columns) {
+Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const auto source = import::open_columns(path);
   if (!source) {
     return tl::unexpected(source.error());
   }
   const std::vector<import::NamedColumn> named = import::read_names((*source)->names(), (*source)->units());
-  const bool both = columns.sensors == diagnosis::Sensors::both;
-  const std::size_t wanted = std::max({std::size_t{both ? 7U : 4U}, columns.angle, columns.temperature});
-  if (named.size() < wanted) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: {}: {} columns, {} are needed", path, (*source)->form(), named.size(), wanted));
+  const Expected<PoseLayout> layout = pose_layout(**source, named, columns, path);
+  if (!layout) {
+    return tl::unexpected(layout.error());
   }
-  Layout layout = layout_of(named, columns.sensors);
-  const bool gyros = columns.sensors != diagnosis::Sensors::accelerometers;
-  const bool accels = columns.sensors != diagnosis::Sensors::gyros;
   import::ColumnRequest request;
+  request.columns = layout->gyro;
+  request.columns.insert(request.columns.end(), layout->accel.begin(), layout->accel.end());
   const auto ask = [&request](std::size_t column) {
-    request.columns.push_back(column);
+    request.columns.push_back(column - 1);
     return request.columns.size() - 1;
   };
-  Triad gyro{}, accel{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    gyro[k] = gyros ? ask(layout.gyro[k]) : 0;
-    accel[k] = accels ? ask(layout.accel[k]) : 0;
-  }
-  const std::size_t angle = columns.angle > 0 ? ask(columns.angle - 1) : 0;
+  const std::size_t angle = columns.angle > 0 ? ask(columns.angle) : 0;
   const std::size_t thermal = columns.temperature > 0 ? columns.temperature : named_temperature(named);
-  const std::size_t temperature = thermal > 0 ? ask(thermal - 1) : 0;
-  const Expected<import::ColumnData> data = read_with_time(**source, named, request, layout.time);
-  if (!data) {
-    return tl::unexpected(data.error());
+  const std::size_t temperature = thermal > 0 ? ask(thermal) : 0;
+  const Expected<ReadRows> rows = read_with_time(**source, *layout, request);
+  if (!rows) {
+    return tl::unexpected(rows.error());
   }
-  for (std::size_t k = 1; k < data->rows; ++k) {
-    if (data->stamps[k] <= data->stamps[k - 1]) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: {}: time {} does not increase", path, data->place(k),
-                                                    static_cast<double>(data->stamps[k])));
+  std::string unit = "s";
+  if (!layout->times.empty()) {
+    if (const auto good = check_time(*rows, **source, named, path); !good) {
+      return tl::unexpected(good.error());
     }
+    Expected<std::string> found = time_unit(*rows, **source, named, path);
+    if (!found) {
+      return tl::unexpected(found.error());
+    }
+    unit = std::move(*found);
   }
-  RawLog log;
-  diagnosis::PoseInput& input = log.input;
-  input.sensors = columns.sensors;
-  const double interval = data->rows < 2 ? 1.0
-                                         : static_cast<double>((data->stamps.back() - data->stamps.front()) /
-                                                               static_cast<long double>(data->rows - 1));
-  const std::string unit = time_unit(named[layout.time].unit, interval);
-  const double gyro_si = columns.raw_gyros ? 0.0 : unit_of(named, layout.gyro, import::Quantity::angular_rate);
-  const double accel_si = unit_of(named, layout.accel, import::Quantity::acceleration);
-  log.si = (!gyros || gyro_si > 0.0) && (!accels || accel_si > 0.0);
-  input.accel_unit = accels && accel_si > 0.0 ? 1.0 : 0.0;
-  log.notes = notes_of(layout, columns, unit);
-  const auto long_si = static_cast<long double>(import::find_unit(unit)->si);
-  // A time of the calendar in seconds leaves no digits of an interval: from the first one on.
-  const bool calendar = data->rows > 0 && std::abs(static_cast<double>(data->stamps.front() * long_si)) > 1e7;
-  const long double begin = calendar ? data->stamps.front() : 0.0L;
-  for (std::size_t i = 0; i < data->rows; ++i) {
-    input.time_s.push_back(static_cast<double>((data->stamps[i] - begin) * long_si));
+  OneLog log;
+  PoseInput& input = log.input;
+  input.sensors = layout->sensors;
+  add_time(*rows, unit, columns.rate_hz, log);
+  log.gyro_si = columns.raw_gyros ? 0.0 : unit_of(named, layout->gyro, import::Quantity::angular_rate);
+  log.accel_si = unit_of(named, layout->accel, import::Quantity::acceleration);
+  log.notes = and_also(rows->notes, layout_words(*layout, rows->time, unit, columns));
+  const std::vector<std::vector<double>>& values = rows->data.values;
+  if (layout->only_axis >= 0) {
+    input.gyro_axes = {layout->only_axis == 0, layout->only_axis == 1, layout->only_axis == 2};
+  }
+  for (std::size_t i = 0; i < rows->data.rows; ++i) {
     std::array<double, 3> rate{}, force{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      rate[k] = gyros ? data->values[gyro[k]][i] * (gyro_si > 0.0 ? gyro_si : 1.0) : 0.0;
-      force[k] = accels ? data->values[accel[k]][i] * (accel_si > 0.0 ? accel_si : 1.0) : 0.0;
+    for (std::size_t k = 0; k < layout->gyro.size(); ++k) {
+      const std::size_t axis = layout->only_axis >= 0 ? static_cast<std::size_t>(layout->only_axis) : k;
+      rate[axis] = values[k][i] * (log.gyro_si > 0.0 ? log.gyro_si : 1.0);
+    }
+    for (std::size_t k = 0; k < layout->accel.size(); ++k) {
+      force[k] = values[layout->gyro.size() + k][i] * (log.accel_si > 0.0 ? log.accel_si : 1.0);
     }
     input.gyro.push_back(rate);
     input.accel.push_back(force);
     if (thermal > 0) {
-      input.temperature_c.push_back(data->values[temperature][i]);
+      input.temperature_c.push_back(values[temperature][i]);
     }
     if (columns.angle > 0) {
-      input.outer.push_back(data->values[angle][i] * units::degree);
+      input.outer.push_back(values[angle][i] * units::degree);
       input.inner.push_back(0.0);
     }
   }
@@ -244,6 +286,118 @@ Expected<RawLog> read_raw_poses(const std::string& path, const RawColumns& colum
   if (columns.temperature == 0 && std::any_of(input.temperature_c.begin(), input.temperature_c.end(),
                                               [](double t) { return t < coldest || t > hottest; })) {
     input.temperature_c.clear();
+  }
+  return log;
+}
+
+// On one clock: accelerometers between two of their rows linearly, at the times of the gyros, which are added up through turns.
+Expected<OneLog> joined(const OneLog& accel, OneLog gyro, const RawFiles& files) {
+  OneLog all = std::move(gyro);
+  const std::vector<double>& from = accel.input.time_s;
+  const double ahead = static_cast<double>(all.begin_s - accel.begin_s);
+  PoseInput input;
+  input.sensors = Sensors::both;
+  std::size_t k = 1;
+  for (std::size_t i = 0; i < all.input.time_s.size(); ++i) {
+    const double t = all.input.time_s[i] + ahead;
+    if (t < from.front() || t > from.back()) {
+      continue;
+    }
+    while (k + 1 < from.size() && from[k] < t) {
+      ++k;
+    }
+    const double share = (t - from[k - 1]) / (from[k] - from[k - 1]);
+    std::array<double, 3> force{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      force[axis] = (1.0 - share) * accel.input.accel[k - 1][axis] + share * accel.input.accel[k][axis];
+    }
+    input.time_s.push_back(all.input.time_s[i]);
+    input.gyro.push_back(all.input.gyro[i]);
+    input.accel.push_back(force);
+  }
+  constexpr double enough = 0.5;
+  if (static_cast<double>(input.time_s.size()) < enough * static_cast<double>(all.input.time_s.size())) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{} and {}: their times do not overlap: {:.10g} to {:.10g} s and {:.10g} to {:.10g} s",
+                            files.poses.front(), files.gyros, from.front() + static_cast<double>(accel.begin_s),
+                            from.back() + static_cast<double>(accel.begin_s),
+                            all.input.time_s.front() + static_cast<double>(all.begin_s),
+                            all.input.time_s.back() + static_cast<double>(all.begin_s)));
+  }
+  all.input = std::move(input);
+  all.accel_si = accel.accel_si;
+  all.notes = and_also(and_also(accel.notes, all.notes), "both files are taken to have one clock");
+  return all;
+}
+
+// Behind the other, a minute later: what is between them nobody knows.
+void append(const OneLog& next, OneLog& all) {
+  constexpr double apart_s = 60.0;
+  const double shift = all.input.time_s.back() + apart_s - next.input.time_s.front();
+  for (const double t : next.input.time_s) {
+    all.input.time_s.push_back(t + shift);
+  }
+  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  add(all.input.gyro, next.input.gyro);
+  add(all.input.accel, next.input.accel);
+  add(all.input.temperature_c, next.input.temperature_c);
+  add(all.input.outer, next.input.outer);
+  add(all.input.inner, next.input.inner);
+}
+
+Expected<OneLog> read_all(const RawFiles& files, const RawColumns& columns) {
+  RawColumns first = columns;
+  if (!files.gyros.empty()) {
+    first.sensors = Sensors::accelerometers;
+  }
+  Expected<OneLog> log = read_log(files.poses.front(), first);
+  if (!log || log->input.time_s.empty()) {
+    return log ? fail(ErrorKind::bad_input, fmt::format("{}: no rows", files.poses.front())) : std::move(log);
+  }
+  if (!files.gyros.empty()) {
+    RawColumns own = columns;
+    own.sensors = Sensors::gyros;
+    own.angle = own.temperature = 0;
+    Expected<OneLog> gyro = read_log(files.gyros, own);
+    return gyro && gyro->input.time_s.size() > 1 && log->input.time_s.size() > 1 ? joined(*log, std::move(*gyro), files)
+                                                                                 : std::move(gyro);
+  }
+  for (std::size_t k = 1; k < files.poses.size(); ++k) {
+    const Expected<OneLog> next = read_log(files.poses[k], columns);
+    if (!next) {
+      return tl::unexpected(next.error());
+    }
+    if (next->input.sensors != log->input.sensors || next->gyro_si != log->gyro_si || next->accel_si != log->accel_si ||
+        next->input.temperature_c.empty() != log->input.temperature_c.empty() || next->input.time_s.empty()) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: its columns are others than those of {}", files.poses[k], files.poses.front()));
+    }
+    append(*next, *log);
+  }
+  if (files.poses.size() > 1) {
+    log->notes = and_also(fmt::format("{} files, a minute between them", files.poses.size()), log->notes);
+  }
+  return log;
+}
+
+}  // namespace
+
+Expected<RawLog> read_raw_poses(const RawFiles& files, const RawColumns& columns) {
+  Expected<OneLog> read = read_all(files, columns);
+  if (!read) {
+    return tl::unexpected(read.error());
+  }
+  RawLog log{std::move(read->input), false, std::move(read->notes)};
+  const bool gyros = log.input.sensors != Sensors::accelerometers, accels = log.input.sensors != Sensors::gyros;
+  log.si = (!gyros || read->gyro_si > 0.0) && (!accels || read->accel_si > 0.0);
+  log.input.gyros_si = read->gyro_si > 0.0;
+  log.input.accel_unit = accels && read->accel_si > 0.0 ? 1.0 : 0.0;
+  if (files.latitude_deg) {
+    log.input.latitude = *files.latitude_deg * units::degree;
+    log.input.gravity = earth::normal_gravity(*log.input.latitude, files.height_m.value_or(0.0));
+  } else {
+    constexpr double over_the_earth = 0.015;  // m/s^2: 9.780 to 9.832 at sea level, as likely anywhere
+    log.input.gravity_sigma = over_the_earth;
   }
   return log;
 }

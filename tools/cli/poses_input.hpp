@@ -1,11 +1,14 @@
 // What the diagnosis by poses reads.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "estimator/diagnosis/poses/poses.hpp"
 #include "protocol/error.hpp"
 #include "protocol/recording/recording.hpp"
+#include "tools/cli/poses_layout.hpp"
 
 namespace selfcal::cli {
 
@@ -13,20 +16,20 @@ namespace selfcal::cli {
 bool has_read_outs(const Recording& recording);
 // Increments to rates, rad/s and m/s^2; read-outs where it has any; the first temperature channel.
 diagnosis::PoseInput pose_input_of(const Recording& recording);
-// A log as columns, whatever its form (protocol/import/column_source.hpp): those that their names call gyros and accelerometers, else time, three
-// gyros, three accelerometers, or one triad of them alone, in this order. What units the names say is taken to SI; everything else is raw.
-struct RawColumns {
-  diagnosis::Sensors sensors = diagnosis::Sensors::both;
-  std::size_t angle = 0;        // its column, from 1, in deg; 0: none
-  std::size_t temperature = 0;  // its column, from 1, in degC; 0: none
-  bool raw_gyros = false;       // the caller knows their unit: as they are
+// What `selfcal poses` is asked of logs.
+struct RawFiles {
+  std::vector<std::string> poses;  // one log; or one after the other, between which nothing is known
+  std::string gyros;               // of the first one's gyros, where they have a file of their own; empty: in it
+  std::optional<double> latitude_deg, height_m;
 };
 struct RawLog {
   diagnosis::PoseInput input;
   bool si = false;    // rad/s and m/s^2
-  std::string notes;  // what was taken for what, where it is not the order above; empty: nothing to say
+  std::string notes;  // what was taken for what, where no order of the handbook says it; empty: nothing to say
 };
-// Errors (bad_input): no such columns; a line without a number, a time that does not increase, by line or row.
-Expected<RawLog> read_raw_poses(const std::string& path, const RawColumns& columns);
+// Logs as columns, whatever their form (protocol/import/column_source.hpp), by their names or in the order of the handbook (poses_layout.hpp). What
+// units the names say is taken to SI; everything else is raw. Errors (bad_input): no such columns; a line without a number, a time that does not
+// increase, by line or row.
+Expected<RawLog> read_raw_poses(const RawFiles& files, const RawColumns& columns);
 
 }  // namespace selfcal::cli

@@ -9,9 +9,11 @@
 
 namespace selfcal::cli {
 
-// `si`: readings are rad/s and m/s^2, told in deg/s and mg; else in raw units.
 nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d);
-std::string poses_text(const diagnosis::PoseDiagnosis& d, bool si);
+// `si`: readings are rad/s and m/s^2, told in deg/s and mg; else in raw units. The summary has what is found first, then bias and scale
+// factors, in some ten lines of 80 columns; the details have every test and every parameter.
+std::string poses_summary(const diagnosis::PoseDiagnosis& d, bool si);
+std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si);
 // Whether something is there that bias, scale and misalignment do not hold.
 bool poses_mismatch(const diagnosis::PoseDiagnosis& d);
 

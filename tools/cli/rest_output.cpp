@@ -244,9 +244,8 @@ Json rest_json(const Rest& rest) {
           {"axes", axes}};
 }
 
-std::string rest_text(const Rest& rest) {
-  std::string text = fmt::format("means over {} blocks of {:.3g} s", rest.blocks, rest.block_s);
-  text += rest.coldest ? fmt::format("; {:.1f} to {:.1f} degC\n", *rest.coldest, *rest.warmest) : "\n";
+std::string rest_table(const Rest& rest) {
+  std::string text;
   for (const bool gyro : {true, false}) {
     bool first = true;
     for (const RestAxis& a : rest.axes) {
@@ -256,12 +255,19 @@ std::string rest_text(const Rest& rest) {
       }
     }
   }
-  if (!rest.drift_tested) {
-    return text + "drift: not asked about, the rest is too short\n";
-  }
-  text +=
-      drifts(rest) ? "beside slow noise, named:\n" : "nothing drifts by more than slow noise makes: nothing named\n";
-  return text + drift_text(rest);
+  return text;
+}
+
+std::string rest_findings(const Rest& rest) {
+  return !rest.drift_tested ? "drift: not asked about, the rest is too short\n"
+         : drifts(rest)     ? "beside slow noise, named:\n" + drift_text(rest)
+                            : "nothing drifts by more than slow noise makes: nothing named\n";
+}
+
+std::string rest_text(const Rest& rest) {
+  std::string text = fmt::format("means over {} blocks of {:.3g} s", rest.blocks, rest.block_s);
+  text += rest.coldest ? fmt::format("; {:.1f} to {:.1f} degC\n", *rest.coldest, *rest.warmest) : "\n";
+  return text + rest_table(rest) + rest_findings(rest);
 }
 
 }  // namespace selfcal::cli

@@ -20,6 +20,8 @@ AccelModel assumed(const PoseInput& input, const std::vector<Pose>& poses) {
     high = high.cwiseMax(p.accel);
   }
   const bool nominal = input.accel_unit > 0.0;
+  m.nominal = nominal;
+  m.gravity_sigma = nominal ? input.gravity_sigma / input.gravity : 0.0;
   m.raw_per_g = nominal ? input.gravity / input.accel_unit : 0.5 * (high - low).maxCoeff();
   m.T = Matrix3::Identity() / m.raw_per_g;
   m.bias = nominal ? Vector3(Vector3::Zero()) : Vector3(0.5 * (low + high));
@@ -162,9 +164,16 @@ std::vector<PoseParameter> parameters_of(const AccelModel& m) {
     p.name = names[static_cast<std::size_t>(k)];
     p.determined = !m.held(k) && m.sigma(k) < 0.5 * m.before(k);
     // Errors of the sensor as it is: u = T (a - b), so a = T^-1 u + b.
-    p.unit = k < 3 ? "raw" : "1";
-    p.value = k < 3 ? x(k) : k < 6 ? 1.0 / (x(k) * m.raw_per_g) - 1.0 : -x(k) * m.raw_per_g;
+    const bool scale = k >= 3 && k < 6;
+    p.unit = k < 3 ? "raw" : scale && !m.nominal ? "raw/g" : "1";
+    p.value = k < 3 ? x(k) : scale ? 1.0 / (x(k) * m.raw_per_g) - 1.0 : -x(k) * m.raw_per_g;
     p.sigma = k < 3 ? m.sigma(k) : m.sigma(k) * m.raw_per_g;
+    if (scale && m.nominal) {
+      p.sigma = std::hypot(p.sigma, m.gravity_sigma);
+    } else if (scale) {
+      p.value = 1.0 / x(k);
+      p.sigma = m.sigma(k) / (x(k) * x(k));
+    }
     all.push_back(p);
   }
   return all;

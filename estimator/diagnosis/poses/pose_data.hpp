@@ -11,6 +11,7 @@ namespace selfcal::diagnosis {
 
 struct Pose {
   std::size_t first = 0, last = 0;                         // samples
+  std::ptrdiff_t part = 0;                                 // gaps of the log before it
   std::vector<std::pair<std::size_t, std::size_t>> quiet;  // of them those without a disturbance
   double middle_s = 0.0, length_s = 0.0;
   double temperature = 0.0;         // mean, less that of all poses, degC; zero: no channel that moves
@@ -29,7 +30,9 @@ std::vector<LeftOut> find_left_out(const PoseInput& input);
 // the gyros show a turn between them, and without those in which the sensor turns steadily.
 struct FoundPoses {
   std::vector<Pose> poses;
-  int steady_turns = 0;  // stretches as quiet as a pose that turn
+  int steady_turns = 0;              // stretches as quiet as a pose that turn
+  int moving = 0;                    // that move
+  std::vector<double> other_forces;  // that read another force than gravity, g
 };
 FoundPoses find_poses(const PoseInput& input);
 
@@ -50,7 +53,9 @@ struct AccelModel {
   Eigen::Array<bool, 9, 1> held =
       Eigen::Array<bool, 9, 1>::Constant(false);  // left as assumed: gravity does not reach them
   double raw_per_g = 1.0;
-  double free = 0.0;  // degrees of freedom that the residuals have left
+  bool nominal = false;        // whether the unit is known: else raw_per_g is a guess, and scale is raw units per g
+  double gravity_sigma = 0.0;  // of gravity at the place, in parts of it: that of all three scale factors together
+  double free = 0.0;           // degrees of freedom that the residuals have left
   double noise_of_means =
       0.0;  // of |u|, by the halves of the poses: slow noise included, and nothing that differs from pose to pose
   Vector3 direction(const Vector3& raw) const { return T * (raw - bias); }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
+#include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -82,9 +83,9 @@ Pose pose_of(const PoseInput& input, std::size_t first, std::size_t last) {
 }
 
 // What counts as quiet: three times the usual scatter of what scatters no more than twelve times as much as the quietest
-// twentieth. A table's drive shakes the sensor in one pose ten times as much as in another; a turn scatters more by far.
-double quiet_limit(const std::vector<double>& scatters) {
-  constexpr double factor = 3.0, reach = 12.0, share = 0.05;
+// `share`. A table's drive shakes the sensor in one pose ten times as much as in another; a turn scatters more by far.
+double quiet_limit(const std::vector<double>& scatters, double share) {
+  constexpr double factor = 3.0, reach = 12.0;
   const double most = reach * quantile(scatters, share);
   std::vector<double> still;
   std::copy_if(scatters.begin(), scatters.end(), std::back_inserter(still), [most](double s) { return s <= most; });
@@ -103,11 +104,12 @@ void spoil(const PoseInput& input, std::size_t window, std::vector<double>& scat
   }
 }
 
-std::vector<Pose> quiet_stretches(const PoseInput& input, std::size_t window) {
+std::vector<Pose> quiet_stretches(const PoseInput& input, std::size_t window, double share) {
   std::vector<double> gyro = scatter(input.gyro, window), accel = scatter(input.accel, window);
   spoil(input, window, gyro);
   spoil(input, window, accel);
-  const double gyro_limit = quiet_limit(gyro), accel_limit = quiet_limit(accel);
+  const double gyro_limit = quiet_limit(gyro, share), accel_limit = quiet_limit(accel, share);
+  const std::vector<std::size_t> gaps = find_gaps(input);
   std::vector<Pose> found;
   std::size_t begin = 0;
   bool inside = false;
@@ -117,6 +119,7 @@ std::vector<Pose> quiet_stretches(const PoseInput& input, std::size_t window) {
       begin = k;
     } else if (!quiet && inside && k - begin >= window) {
       found.push_back(pose_of(input, begin + window / 2, k + window / 2));  // middles of the windows
+      found.back().part = std::upper_bound(gaps.begin(), gaps.end(), found.back().first) - gaps.begin();
     }
     inside = quiet;
   }
@@ -145,6 +148,9 @@ bool same_pose(const PoseInput& input, const Pose& a, const Pose& b, double raw_
   constexpr double steady = units::degree;  // a second: no bias changes by that much, and one of them turns
   if ((b.gyro - a.gyro).norm() * input.gyro_unit > steady && input.accel_unit > 0.0) {
     return false;
+  }
+  if (a.part != b.part) {
+    return false;  // nobody knows what it did between them, nor whether it was switched off
   }
   const Vector3 bias = 0.5 * (a.gyro + b.gyro);
   Vector3 turned = Vector3::Zero();
@@ -234,7 +240,7 @@ void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
     }
     spread(axis) = quantile(off, 0.5);
   }
-  const bool si = input.accel_unit > 0.0 && input.sensors == Sensors::both;
+  const bool si = input.gyros_si && input.accel_unit > 0.0 && input.sensors == Sensors::both;
   if (si && (spread.array() > least.array()).any()) {
     middle = rate_at_rest(poses, least);
     spread.setZero();
@@ -282,7 +288,17 @@ FoundPoses find_poses(const PoseInput& input) {
   if (input.time_s.size() < 20 * window) {
     return {};
   }
-  FoundPoses found{put_together(input, quiet_stretches(input, window)), 0};
+  FoundPoses found;
+  // Where the quietest twentieth of a log moves, as that of a vehicle which stood for a while, less than it rests.
+  const auto is_moving = [&input](const Pose& p) { return moves(input, p); };
+  for (const double share : {0.05, 0.02, 0.005}) {
+    found.poses = put_together(input, quiet_stretches(input, window, share));
+    if (std::none_of(found.poses.begin(), found.poses.end(), is_moving)) {
+      break;
+    }
+  }
+  found.moving = static_cast<int>(std::erase_if(found.poses, is_moving));
+  found.other_forces = drop_other_forces(input, found.poses);
   if (!found.poses.empty()) {
     const std::size_t before = found.poses.size();
     drop_steady_turns(input, found.poses);
@@ -315,6 +331,10 @@ std::vector<LeftOut> find_left_out(const PoseInput& input) {
       inside = now;
     }
   };
+  for (const std::size_t i : find_gaps(input)) {
+    all.push_back({input.time_s[i - 1] - input.time_s.front(), input.time_s[i] - input.time_s.front(), 0,
+                   "the log holds no sample"});
+  }
   if (input.sensors != Sensors::both) {  // three axes of a coarse sensor may well stand still in a pose
     return all;
   }

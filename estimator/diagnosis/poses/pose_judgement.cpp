@@ -32,6 +32,8 @@ class Gyros {
     }
   }
 
+  // A bias of its own for each part of the log, where the parts differ by more than chance: beside it a drift is asked.
+  void take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& d);
   // Every effect given what is known already, best first.
   std::vector<PoseEffect> try_all(const std::vector<PoseEffect>& named) const;
   void keep(const PoseEffect& chosen);
@@ -67,6 +69,50 @@ class Gyros {
   std::array<Eigen::VectorXd, 3> y_;
 };
 
+void Gyros::take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& d) {
+  const std::ptrdiff_t last = poses_.empty() ? 0 : poses_.back().part;
+  constexpr std::ptrdiff_t poses_a_part = 3;
+  if (last == poses_.front().part || static_cast<std::ptrdiff_t>(poses_.size()) < poses_a_part * (last + 1)) {
+    return;
+  }
+  std::vector<std::ptrdiff_t> parts;
+  for (const Pose& p : poses_) {
+    if (p.part != poses_.front().part && (parts.empty() || parts.back() != p.part)) {
+      parts.push_back(p.part);
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(poses_.size());
+  Eigen::MatrixXd of_parts = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(parts.size()));
+  for (Eigen::Index k = 0; k < n; ++k) {
+    for (std::size_t j = 0; j < parts.size(); ++j) {
+      of_parts(k, static_cast<Eigen::Index>(j)) = poses_[static_cast<std::size_t>(k)].part == parts[j] ? 1.0 : 0.0;
+    }
+  }
+  std::array<Comparison, 3> answers;
+  double log_p = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    answers[axis] = compare(known_[axis], of_parts, y_[axis], time_s_, true);
+    log_p = std::min(log_p, answers[axis].log_p);
+  }
+  if (log_corrected(log_p, 3.0) > log_limit) {
+    return;
+  }
+  for (std::size_t j = 0; j < parts.size(); ++j) {
+    BiasJump jump;
+    const auto first = std::find_if(poses_.begin(), poses_.end(), [&](const Pose& p) { return p.part == parts[j]; });
+    jump.time_s = input.time_s[first->first] - input.time_s.front();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Eigen::Index at = known_[axis].cols() + static_cast<Eigen::Index>(j);
+      jump.size(static_cast<Eigen::Index>(axis)) = answers[axis].with.value(at);
+      jump.sigma(static_cast<Eigen::Index>(axis)) = answers[axis].with.sigma(at);
+    }
+    d.gyro_jumps.push_back(jump);
+  }
+  for (Eigen::MatrixXd& known : known_) {
+    known = joined(known, of_parts);
+  }
+}
+
 PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   PoseEffect result;
   result.effect = &effect;
@@ -77,7 +123,7 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
     const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
     const double beside_flicker =
-        with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i]) : -HUGE_VAL;
+        with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i], 1.0) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;
     result.log_p = std::min(result.log_p, c.log_p);
     result.log_p_beside_flicker = std::min(result.log_p_beside_flicker, std::max(c.log_p, beside_flicker));
@@ -216,12 +262,13 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
   d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
 }
 
-void judge_gyros(const std::vector<Pose>& poses, double duration_s, bool has_temperature, double alpha,
-                 PoseDiagnosis& d) {
+void judge_gyros(const PoseInput& input, const std::vector<Pose>& poses, double duration_s, bool has_temperature,
+                 double alpha, PoseDiagnosis& d) {
   Gyros gyros(poses, duration_s, has_temperature);
   gyros.add_bias(d);
   d.gyro_held_out_rms = gyros.held_out_rms();
   const double limit = std::log(alpha);
+  gyros.take_jumps(input, limit, d);
   d.gyro_tried = gyros.try_all({});
   std::vector<PoseEffect> left = d.gyro_tried;
   while (!left.empty() && left.front().log_p < limit) {

@@ -11,8 +11,8 @@ namespace selfcal::diagnosis {
 void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s,
                           bool has_temperature, double alpha, PoseDiagnosis& d);
 // Names of the gyros' effects, one after the other, and what stands in for one another.
-void judge_gyros(const std::vector<Pose>& poses, double duration_s, bool has_temperature, double alpha,
-                 PoseDiagnosis& d);
+void judge_gyros(const PoseInput& input, const std::vector<Pose>& poses, double duration_s, bool has_temperature,
+                 double alpha, PoseDiagnosis& d);
 // What |f| does after each turn, less what `thermal` makes of the temperature meanwhile; nullopt: nothing beyond chance.
 std::optional<Settling> find_settling(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model,
                                       const std::vector<PoseEffect>& thermal, double alpha);

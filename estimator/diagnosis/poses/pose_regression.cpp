@@ -185,7 +185,8 @@ Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns,
 }
 
 double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
-                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
+                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                            double sure) {
   const auto n = static_cast<Eigen::Index>(poses.size());
   constexpr double median_of_square =
       0.4549;  // of a normal number of unit variance: a pose in which something else moved counts once
@@ -200,7 +201,10 @@ double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<do
   }
   std::nth_element(halves.begin(), halves.begin() + n / 2, halves.end());
   const double half = halves[static_cast<std::size_t>(n / 2)] / median_of_square;
-  const double level = (half - white.mean()) / std::log(2.0);
+  // Of a variance by the median of n squares: 1 / (2 f(m) m sqrt(n)) = 2.33 / sqrt(n), f and m density and median of chi squared of one.
+  constexpr double of_median = 2.33;
+  const double sigma = of_median * half / std::sqrt(static_cast<double>(n));
+  const double level = (half + sure * sigma - white.mean()) / std::log(2.0);
   const double times = (time_s.back() - time_s.front()) / length_s;
   if (!(level > 0.0) || !(times > 1.0)) {
     return -HUGE_VAL;

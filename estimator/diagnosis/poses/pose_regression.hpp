@@ -41,8 +41,10 @@ Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns,
 // The same of a gyro beside the white noise of its means and a 1/f noise as large as the halves of the poses differ by beyond that: a poor
 // gyro's bias wanders by it, and the lowest frequency of a few poses looks like any slow drift. Minus infinity where the halves show none.
 // S(f) = h/f has the Allan variance 2 ln 2 h; means over the time a of it that lie d apart differ by 2 h (ln(d/a) + 3/2) in the square.
+// With `sure` the 1/f noise is larger than that by so many of its own sigma: halves of a few poses tell its size poorly.
 double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
-                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y);
+                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                            double sure = 0.0);
 std::vector<double> middles(const std::vector<Pose>& poses);
 
 // Columns of one axis' readings (or of |f|, axis 3) for one effect: [poses x coefficients], those that vanish left out.

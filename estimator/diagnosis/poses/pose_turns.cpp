@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/geometry/units.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -173,6 +175,8 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const s
   if (turns.empty()) {
     return;
   }
+  // Turns that end this far from where gravity is are carried in another unit, or not by these gyros.
+  constexpr double most = 10.0 * units::degree;
   for (const bool with : {false, true}) {
     GyroModel all = static_model(poses, none, with && linear);
     const TurnFit fit = fit_turns(input, poses, turns, none, all);
@@ -190,6 +194,11 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const s
     if (with || !linear) {
       const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
       add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
+    }
+    if ((with ? d.direction_after : d.direction_before) > most) {
+      for (PoseParameter& p : d.gyro_parameters) {
+        p.determined = false;
+      }
     }
     if (!with && !linear) {
       d.direction_after = d.direction_before;

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_earth.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
+#include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
 #include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
@@ -15,6 +17,12 @@
 
 namespace selfcal::diagnosis {
 namespace {
+
+std::string with_numbers(const char* format, double a, double b) {
+  std::array<char, 240> text{};
+  std::snprintf(text.data(), text.size(), format, a, b);
+  return text.data();
+}
 
 double span_of(const std::vector<Pose>& poses) {
   double least = 1.0;
@@ -128,16 +136,45 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   return still;
 }
 
+// Forces of all sizes at rest: what the poses stand in is not gravity, and no parameter of the accelerometers follows from it.
+bool have_one_size(const std::vector<Pose>& poses, PoseDiagnosis& d) {
+  constexpr double most = 0.03;  // of the mean, rms, beside bias, scale factor and misalignment
+  double sum = 0.0, square = 0.0;
+  for (const Pose& p : poses) {
+    sum += p.u.norm();
+    square += p.u.squaredNorm();
+  }
+  const auto n = static_cast<double>(poses.size());
+  const double mean = sum / n, scatter = std::sqrt(std::max(0.0, square / n - mean * mean)) / mean;
+  if (scatter < most) {
+    return true;
+  }
+  d.failure = with_numbers(
+      "at rest the accelerometers read forces that differ by %.0f %% rms beside bias, scale factor and "
+      "misalignment: gravity is not what they read",
+      100.0 * scatter, 0.0);
+  return false;
+}
+
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
+  if (!have_one_size(poses, d)) {
+    return;
+  }
   const std::vector<std::size_t> turns = usable_turns(input, poses, d);
-  judge_gyros(without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(), d.has_temperature,
-              0.5 * alpha, d);
+  judge_gyros(input, without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(),
+              d.has_temperature, 0.5 * alpha, d);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
   judge_turns(input, poses, turns, accel, linear, d);
   add_invisible(d);
+  if (d.turns > 0 && std::none_of(d.gyro_parameters.begin(), d.gyro_parameters.end(),
+                                  [](const PoseParameter& p) { return p.determined; })) {
+    d.invisible.push_back(std::string("scale factors of the gyros: they carry gravity's direction wrong by ") +
+                          with_numbers("%.0f deg", d.direction_after / units::degree, 0.0) +
+                          (input.gyros_si ? "" : ", and nobody says their unit (--gyro-unit)"));
+  }
 }
 
 void add_read_outs(const PoseInput& input, PoseDiagnosis& d) {
@@ -195,6 +232,9 @@ void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<P
   }
   const auto n = static_cast<double>(poses.size());
   for (std::size_t axis = 0; axis < 3 && !poses.empty(); ++axis) {
+    if (!input.gyro_axes[axis]) {
+      continue;
+    }
     double mean = 0.0, square = 0.0;
     for (const Pose& p : poses) {
       mean += p.gyro(static_cast<Eigen::Index>(axis)) / n;
@@ -233,6 +273,9 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
   }
   if (d.by_poses) {
     calibrate(input, alpha, poses, d);
+    if (!have_one_size(poses, d)) {
+      return;
+    }
     d.supports.push_back("gravity in " + std::to_string(d.poses) + " poses: accelerometers");
     add_invisible_of_accelerometers(d);
   } else {
@@ -252,6 +295,36 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
   }
 }
 
+// Stretches as quiet as a pose of which gravity is no reference; empty: none.
+std::string other_forces_words(const PoseDiagnosis& d) {
+  const auto [least, most] = std::minmax_element(d.other_forces.begin(), d.other_forces.end());
+  return counted(static_cast<int>(d.other_forces.size()), "quiet part") +
+         with_numbers(" at %.2f to %.2f g", *least, *most);
+}
+
+// Why nothing is left to hold the log against; empty: something is, or it is judged by what else there is.
+std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d) {
+  constexpr double weightless = 0.3;  // g
+  const bool nothing_else = poses.empty() && input.outer.empty();
+  if (nothing_else && !d.other_forces.empty()) {
+    const bool free =
+        std::all_of(d.other_forces.begin(), d.other_forces.end(), [](double force) { return force < weightless; });
+    return free ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
+                  "acceleration"
+                : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
+  }
+  if (nothing_else && input.sensors != Sensors::gyros && d.steady_turns == 0) {
+    return "the sensor nowhere rests for a second: neither gravity nor rest is a reference";
+  }
+  return lacks_gravity(input, poses);
+}
+
+void add_other_forces(PoseDiagnosis& d) {
+  if (!d.other_forces.empty()) {
+    d.invisible.push_back("what " + other_forces_words(d) + " tell: steady acceleration, no pose");
+  }
+}
+
 // Whether it is that of an encoder which counts from 0 to 360 deg and begins again.
 bool wraps(const std::vector<double>& angle) {
   return std::adjacent_find(angle.begin(), angle.end(), [](double a, double b) { return std::abs(b - a) > M_PI; }) !=
@@ -266,11 +339,20 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     return d;
   }
   d.sensors = input.sensors;
+  d.duration_s = input.time_s.back() - input.time_s.front();
+  d.gyro_axes = input.gyro_axes;
   d.clipped = find_clipping(input);
   d.left_out = find_left_out(input);
   FoundPoses found = find_poses(input);
   std::vector<Pose>& poses = found.poses;
   d.steady_turns = found.steady_turns;
+  d.moving = found.moving;
+  d.other_forces = found.other_forces;
+  d.failure = why_no_poses(input, poses, d);
+  if (!d.failure.empty()) {
+    return d;
+  }
+  add_other_forces(d);
   if (!poses.empty()) {
     add_noise(input, poses, d);
     d.has_temperature = take_temperatures(input, poses);

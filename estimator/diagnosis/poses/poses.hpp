@@ -25,12 +25,15 @@ struct PoseInput {
   std::vector<std::array<double, 3>> gyro,
       accel;  // raw, any unit; zero throughout of a triad that the log does not hold
   Sensors sensors = Sensors::both;
-  double gyro_unit = 1.0;             // nominal rad/s per raw unit
-  double accel_unit = 0.0;            // nominal m/s^2 per raw unit; 0: not known
-  double gravity = 9.80665;           // m/s^2 where it was recorded
-  std::optional<double> latitude;     // rad where it was recorded; none: not known
-  std::vector<double> outer, inner;   // angle read-outs, rad, of any whole turns; empty: none
-  std::vector<double> temperature_c;  // empty: no channel
+  std::array<bool, 3> gyro_axes{true, true, true};  // of gyros alone: which axes the log holds; others are zero
+  bool gyros_si = true;                             // rad/s
+  double gyro_unit = 1.0;                           // nominal rad/s per raw unit
+  double accel_unit = 0.0;                          // nominal m/s^2 per raw unit; 0: not known
+  double gravity = 9.80665;                         // m/s^2 where it was recorded
+  double gravity_sigma = 0.0;                       // of it, where nobody says the place
+  std::optional<double> latitude;                   // rad where it was recorded; none: not known
+  std::vector<double> outer, inner;                 // angle read-outs, rad, of any whole turns; empty: none
+  std::vector<double> temperature_c;                // empty: no channel
 };
 
 struct PoseEffect {
@@ -62,7 +65,7 @@ struct Clipping {
   double first_s = 0.0, last_s = 0.0;  // since the start
 };
 
-// A stretch that no pose and no turn uses: the sensor did not answer in it.
+// A stretch that no pose and no turn uses: the sensor did not answer in it, or the log holds no sample.
 struct LeftOut {
   double first_s = 0.0, last_s = 0.0;  // since the start
   std::size_t samples = 0;
@@ -128,12 +131,20 @@ struct RestNoise {
   double freedom = 0.0;  // means that do not overlap
 };
 
+// By how much the gyros' bias differs between the poses behind a gap of the log and those before the first one: switched off meanwhile?
+struct BiasJump {
+  double time_s = 0.0;  // of the gap's end, since the start
+  Vector3 size, sigma;  // raw
+};
+
 struct PoseDiagnosis {
   Sensors sensors = Sensors::both;
+  std::array<bool, 3> gyro_axes{true, true, true};  // which axes of gyros the log holds
   int poses = 0;
   bool by_poses =
       false;  // whether they are enough for a reference: what follows of accelerometers and gyros is then filled
   double static_seconds = 0.0;
+  double duration_s = 0.0;  // of the log
   std::vector<Clipping> clipped;
   std::vector<LeftOut> left_out;
   // Accelerometers: bias, scale, misalignment fitted to |f| = g.
@@ -153,6 +164,7 @@ struct PoseDiagnosis {
   bool earth_taken_out = false;  // whether the Earth's rate was taken out of the gyros' means, heading included
   std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
   std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
+  std::vector<BiasJump> gyro_jumps;           // beside which the effects are asked; empty: no gap, or none that shows
   std::vector<PoseEffect> gyro_tried;         // each alone, best first
   std::vector<PoseEffect> gyro_named;         // forward selection
   std::vector<PoseEffect> gyro_open;          // what is left beside what is named: coefficients and sigma
@@ -162,7 +174,9 @@ struct PoseDiagnosis {
   std::vector<PoseParameter> gyro_parameters;
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
-  int steady_turns = 0;  // stretches that are quiet and turn: no poses
+  int steady_turns = 0;              // stretches that are quiet and turn: no poses
+  std::vector<double> other_forces;  // what quiet stretches read that are not at 1 g, g: no poses
+  int moving = 0;                    // stretches as quiet as the log's quietest that move: no poses
   std::optional<ReadOuts> read_outs;
   std::optional<Rest> rest;                        // of fewer poses than calibrate
   std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first

@@ -206,8 +206,9 @@ void axis_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rate
   }
 }
 
-// (R3)
-std::optional<ReadOutClock> clock_of(const std::vector<Delay>& delays, double duration_s) {
+// (R3). A gyro's sample is the mean over its interval or a reading at its end, which nothing in a log shows: half an interval lies
+// between the two, and the delay is known to no less.
+std::optional<ReadOutClock> clock_of(const std::vector<Delay>& delays, double duration_s, double interval_s) {
   constexpr std::size_t enough = 3;
   if (delays.size() < enough) {
     return std::nullopt;
@@ -224,7 +225,7 @@ std::optional<ReadOutClock> clock_of(const std::vector<Delay>& delays, double du
   }
   const Regression r = regress(X, y);
   clock.delay_s = r.value(0);
-  clock.delay_sigma_s = r.sigma(0);
+  clock.delay_sigma_s = std::hypot(r.sigma(0), 0.5 * interval_s);
   clock.growth_s = r.value(1);
   clock.growth_sigma_s = r.sigma(1);
   clock.least_s = y.minCoeff();
@@ -301,8 +302,8 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
   const bool by_rates =
       std::any_of(answer.axes.begin(), answer.axes.end(), [](const ReadOutAxis& a) { return a.steady; });
   const double duration_s = input.time_s.back() - input.time_s.front();
-  answer.clock =
-      clock_of(by_rates ? delays_of_steps(input, rates, answer) : delays_of_turns(input, rows, answer), duration_s);
+  answer.clock = clock_of(by_rates ? delays_of_steps(input, rates, answer) : delays_of_turns(input, rows, answer),
+                          duration_s, duration_s / static_cast<double>(input.time_s.size() - 1));
   if (!poses.empty() && input.sensors == Sensors::both) {
     double raw_per_g = 0.0;
     for (const Pose& p : poses) {

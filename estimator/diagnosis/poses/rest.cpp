@@ -111,7 +111,8 @@ std::optional<Rest> judge_rest(const PoseInput& input, const std::vector<Pose>& 
     return std::nullopt;
   }
   Rest rest;
-  rest.si = input.accel_unit > 0.0;
+  rest.si = (input.sensors == Sensors::gyros || input.accel_unit > 0.0) &&
+            (input.sensors == Sensors::accelerometers || input.gyros_si);
   rest.blocks = static_cast<int>(blocks.rows());
   rest.block_s = blocks.times.block_s;
   rest.has_channel = !input.temperature_c.empty();
@@ -122,6 +123,9 @@ std::optional<Rest> judge_rest(const PoseInput& input, const std::vector<Pose>& 
   }
   for (const bool gyro : {true, false}) {
     for (int axis = 0; axis < 3 && input.sensors != (gyro ? Sensors::accelerometers : Sensors::gyros); ++axis) {
+      if (gyro && !input.gyro_axes[static_cast<std::size_t>(axis)]) {
+        continue;
+      }
       RestAxis a;
       a.gyro = gyro;
       a.axis = axis;

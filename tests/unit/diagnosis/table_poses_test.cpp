@@ -90,6 +90,19 @@ TEST(TablePoses, GainAndClockFromStops) {
   EXPECT_FALSE(d.accel_tested);  // gravity moves in one plane
 }
 
+// A gyro that is read at the end of its interval gives no mean over it: half an interval more, which the log does not show.
+TEST(TablePoses, AClockIsKnownToHalfASample) {
+  Table t = stops();
+  for (std::size_t i = 0; i + 1 < t.input.gyro.size(); ++i) {
+    t.input.gyro[i][1] = 0.5 * (t.input.gyro[i][1] + t.input.gyro[i + 1][1]);
+  }
+  const PoseDiagnosis d = diagnose_poses(t.input, 0.01);
+  ASSERT_TRUE(d.read_outs && d.read_outs->clock) << d.failure;
+  EXPECT_GE(d.read_outs->clock->delay_sigma_s, 0.5 * dt);
+  EXPECT_NEAR(d.read_outs->clock->delay_s, 0.42, 2.0 * d.read_outs->clock->delay_sigma_s);
+  EXPECT_GT(std::abs(d.read_outs->clock->delay_s - 0.42), 0.3 * dt);  // what the sigma is for
+}
+
 // Rates of 20 to 160 deg/s for 12 s each, a step of 1 s between them, 6 s at rest before and after.
 Table rates(double quadratic) {
   Table t(2);

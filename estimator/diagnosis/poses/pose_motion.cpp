@@ -1,0 +1,126 @@
+#include "estimator/diagnosis/poses/pose_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+double sample_rate(const PoseInput& input) {
+  return static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+}
+
+// Largest variance of an axis among the means of blocks about that of all.
+double variance_of_means(const std::vector<Vector3>& means) {
+  Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
+  for (const Vector3& m : means) {
+    sum += m - means.front();
+    square += (m - means.front()).cwiseAbs2();
+  }
+  const auto n = static_cast<double>(means.size());
+  return (square / n - (sum / n).cwiseAbs2()).maxCoeff();
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+bool moves(const PoseInput& input, const Pose& stretch) {
+  constexpr double block_s = 0.25, most_rate = units::degree, most_force = 0.05;
+  const auto length = std::max<std::size_t>(2, static_cast<std::size_t>(block_s * sample_rate(input)));
+  std::vector<Vector3> gyro, accel;
+  for (const auto& [first, last] : stretch.quiet) {
+    for (std::size_t k = first; k + length <= last; k += length) {
+      Vector3 g = Vector3::Zero(), a = Vector3::Zero();
+      for (std::size_t i = k; i < k + length; ++i) {
+        g += at(input.gyro, i) / static_cast<double>(length);
+        a += at(input.accel, i) / static_cast<double>(length);
+      }
+      gyro.push_back(g);
+      accel.push_back(a);
+    }
+  }
+  if (gyro.size() < 2) {
+    return false;
+  }
+  const bool turns = input.gyros_si && input.sensors != Sensors::accelerometers &&
+                     variance_of_means(gyro) > most_rate * most_rate / (input.gyro_unit * input.gyro_unit);
+  // Counts about a middle make the size larger than gravity's, and the limit with it.
+  const double size = input.accel_unit > 0.0 ? input.gravity / input.accel_unit : stretch.accel.norm();
+  return turns || (input.sensors != Sensors::gyros && variance_of_means(accel) > std::pow(most_force * size, 2));
+}
+
+std::vector<double> drop_other_forces(const PoseInput& input, std::vector<Pose>& stretches) {
+  std::vector<double> read;
+  if (!(input.accel_unit > 0.0) || input.sensors == Sensors::gyros) {
+    return read;
+  }
+  constexpr double most = 0.3;  // g: 1.5 sigma of what a bias is before
+  std::erase_if(stretches, [&](const Pose& p) {
+    const double force = p.accel.norm() * input.accel_unit / input.gravity;
+    const bool other = std::abs(force - 1.0) > most;
+    if (other) {
+      read.push_back(force);
+    }
+    return other;
+  });
+  return read;
+}
+
+std::vector<std::size_t> find_gaps(const PoseInput& input) {
+  constexpr double least_s = 0.5, usual = 10.0;
+  const double limit = std::max(least_s, usual / sample_rate(input));
+  std::vector<std::size_t> gaps;
+  for (std::size_t i = 1; i < input.time_s.size(); ++i) {
+    if (input.time_s[i] - input.time_s[i - 1] > limit) {
+      gaps.push_back(i);
+    }
+  }
+  return gaps;
+}
+
+std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses) {
+  if (input.sensors == Sensors::gyros || input.accel_unit > 0.0 || poses.size() < 3) {
+    return {};
+  }
+  Vector3 low = poses.front().accel, high = low;
+  for (const Pose& p : poses) {
+    low = low.cwiseMin(p.accel);
+    high = high.cwiseMax(p.accel);
+  }
+  const double at_rest = std::max(poses.front().accel.norm(), 0.5 * (high - low).maxCoeff());
+  const Vector3 centre = 0.5 * (low + high);
+  std::vector<double> moving;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < input.time_s.size(); ++i) {
+    while (next < poses.size() && i >= poses[next].last) {
+      ++next;
+    }
+    if (next == poses.size() || i < poses[next].first) {
+      moving.push_back((at(input.accel, i) - centre).norm());
+    }
+  }
+  constexpr double share = 0.02, most = 6.0;  // a hand turns a sensor at 0.5 to 3 g
+  if (static_cast<double>(moving.size()) < share * static_cast<double>(input.time_s.size())) {
+    return {};
+  }
+  const double times = median(moving) / std::max(at_rest, 1e-300);
+  if (times < most) {
+    return {};
+  }
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "the accelerometers read %.0f times as much while the sensor moves as at rest: gravity is not in them, "
+                "as in a phone's linear acceleration",
+                times);
+  return text;
+}
+
+}  // namespace selfcal::diagnosis

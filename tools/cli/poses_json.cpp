@@ -1,0 +1,218 @@
+#include "tools/cli/poses_output.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "estimator/geometry/units.hpp"
+#include "tools/cli/poses_words.hpp"
+#include "tools/cli/rest_output.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ids(const std::vector<const diagnosis::Effect*>& effects) { return diagnosis::ids_of(effects); }
+
+Json to_json(const std::vector<diagnosis::PoseEffect>& effects) {
+  Json all = Json::array();
+  for (const diagnosis::PoseEffect& e : effects) {
+    Json j = {{"effect", e.effect->id}, {"log10_p", e.log_p / std::log(10.0)}, {"held_out_rms", e.held_out_rms}};
+    j["parameters"] = Json::array();
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      j["parameters"].push_back({{"name", e.parameters[k]}, {"value", e.value[k]}, {"sigma", e.sigma[k]}});
+    }
+    j["equivalent"] = ids(e.equivalent);
+    j["may_be_flicker"] = e.may_be_flicker;
+    if (!std::isnan(e.constant)) {
+      j["constant"] = e.constant;
+    }
+    all.push_back(std::move(j));
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::PoseParameter>& parameters) {
+  Json all = Json::array();
+  for (const diagnosis::PoseParameter& p : parameters) {
+    all.push_back(
+        {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"sigma", p.sigma}, {"determined", p.determined}});
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::Clipping>& clipped) {
+  Json all = Json::array();
+  for (const diagnosis::Clipping& c : clipped) {
+    all.push_back({{"sensor", c.gyro ? "gyro" : "accelerometer"},
+                   {"axis", std::string(1, "xyz"[c.axis])},
+                   {"limit", c.limit},
+                   {"samples", c.samples},
+                   {"first_s", c.first_s},
+                   {"last_s", c.last_s}});
+  }
+  return all;
+}
+
+Json to_json(const std::vector<diagnosis::LeftOut>& stretches) {
+  Json all = Json::array();
+  for (const diagnosis::LeftOut& out : stretches) {
+    all.push_back({{"first_s", out.first_s}, {"last_s", out.last_s}, {"samples", out.samples}, {"words", out.words}});
+  }
+  return all;
+}
+
+// null for an axis that the log does not hold.
+Json held(const std::array<double, 3>& values, const std::array<bool, 3>& axes) {
+  Json all = Json::array();
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    all.push_back(axes[k] ? Json(values[k]) : Json());
+  }
+  return all;
+}
+
+Json array(const Vector3& v) { return Json{v.x(), v.y(), v.z()}; }
+
+Json to_json(const std::vector<diagnosis::BiasJump>& jumps) {
+  Json all = Json::array();
+  for (const diagnosis::BiasJump& j : jumps) {
+    all.push_back({{"time_s", j.time_s}, {"size", array(j.size)}, {"sigma", array(j.sigma)}});
+  }
+  return all;
+}
+
+Json axis_json(const diagnosis::ReadOutAxis& a) {
+  const Eigen::Index k = main_axis(a);
+  Json j = {{"axis", a.name},
+            {"by", a.steady ? "steady rates" : "turns from stop to stop"},
+            {"rows", a.rows},
+            {"turned_deg", a.turned_deg},
+            {"response", array(a.response)},
+            {"response_sigma", array(a.sigma)},
+            {"along", std::string(1, "xyz"[k])},
+            {"reversed", a.response(k) < 0.0},
+            {"of_a_positive_turn", array(across(a))},
+            {"gain", std::abs(a.response(k))},
+            {"gain_sigma", a.sigma(k)}};
+  if (a.nonlinearity) {
+    j["nonlinearity"] = {{"value", a.nonlinearity->value},
+                         {"sigma", a.nonlinearity->sigma},
+                         {"named", a.nonlinearity->determined},
+                         {"log10_p", a.log_p_nonlinear / std::log(10.0)}};
+  }
+  return j;
+}
+
+Json read_outs_json(const diagnosis::ReadOuts& r) {
+  Json axes = Json::array();
+  for (const diagnosis::ReadOutAxis& a : r.axes) {
+    axes.push_back(axis_json(a));
+  }
+  Json j = {{"axes", axes},
+            {"disagreeing", r.disagreeing},
+            {"gyro_bias", array(r.gyro_bias)},
+            {"gyro_bias_sigma", array(r.gyro_bias_sigma)}};
+  if (r.clock) {
+    j["clock"] = {{"turns", r.clock->turns},
+                  {"delay_s", r.clock->delay_s},
+                  {"delay_sigma_s", r.clock->delay_sigma_s},
+                  {"growth_s", r.clock->growth_s},
+                  {"growth_sigma_s", r.clock->growth_sigma_s},
+                  {"least_s", r.clock->least_s},
+                  {"most_s", r.clock->most_s},
+                  {"scatter_s", r.clock->scatter_s}};
+  }
+  if (r.tilt) {
+    j["tilt"] = {{"axis", r.tilt->axis},
+                 {"near_vertical", r.tilt->near_vertical},
+                 {"tilt_deg", r.tilt->tilt_deg},
+                 {"sigma_deg", r.tilt->sigma_deg},
+                 {"log10_p_shape", r.tilt->log_p_shape / std::log(10.0)}};
+  }
+  return j;
+}
+
+Json noise_json(const std::vector<diagnosis::RestNoise>& all) {
+  Json points = Json::array();
+  for (const diagnosis::RestNoise& n : all) {
+    points.push_back({{"tau_s", n.tau_s}, {"deviation", n.deviation}, {"freedom", n.freedom}});
+  }
+  return points;
+}
+
+}  // namespace
+
+nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
+  Json settling;
+  if (d.settling) {
+    settling = {{"effect", "accel_relaxation"},           {"tau_s", d.settling->tau_s},
+                {"with_change", d.settling->with_change}, {"size_g", array(d.settling->size_g)},
+                {"sigma_g", array(d.settling->sigma_g)},  {"log10_p", d.settling->log_p / std::log(10.0)}};
+  }
+  Json confounded = Json::array();
+  for (const diagnosis::Confounded& c : d.confounded) {
+    confounded.push_back({{"effect", c.effect->id}, {"with", c.with->id}, {"shared", c.shared}});
+  }
+  const char* sensors = d.sensors == diagnosis::Sensors::gyros            ? "gyros"
+                        : d.sensors == diagnosis::Sensors::accelerometers ? "accelerometers"
+                                                                          : "both";
+  return {{"mismatch", poses_mismatch(d)},
+          {"sensors", sensors},
+          {"poses", d.poses},
+          {"static_s", d.static_seconds},
+          {"duration_s", d.duration_s},
+          {"moving", d.moving},
+          {"other_forces_g", d.other_forces},
+          {"by_poses", d.by_poses},
+          {"supports", d.supports},
+          {"not_by_position", d.not_by_position},
+          {"read_outs", d.read_outs ? read_outs_json(*d.read_outs) : Json()},
+          {"rest", d.rest ? rest_json(*d.rest) : Json()},
+          {"clipped", to_json(d.clipped)},
+          {"left_out", to_json(d.left_out)},
+          {"accelerometers",
+           {{"adequate", d.accel_adequate},
+            {"tested", d.accel_tested},
+            {"noise_at_rest", noise_json(d.accel_noise)},
+            {"rms_g", d.accel_rms_g},
+            {"held_out_rms_g", d.accel_held_out_rms_g},
+            {"force_at_rest_g", d.force_at_rest_g},
+            {"gravity_span_deg", d.gravity_span_deg},
+            {"parameters", to_json(d.accel_parameters)},
+            {"settling", settling},
+            {"findings", to_json(d.accel_named)},
+            {"tried", to_json(d.accel_tried)}}},
+          {"gyros",
+           {{"bias", held(d.gyro_bias, d.gyro_axes)},
+            {"bias_sigma", held(d.gyro_bias_sigma, d.gyro_axes)},
+            {"jumps", to_json(d.gyro_jumps)},
+            {"earth_taken_out", d.earth_taken_out},
+            {"accelerometers_reversed", d.accel_reversed},
+            {"held_out_rms", d.gyro_held_out_rms},
+            {"white_rms", d.gyro_white_rms},
+            {"noise_at_rest", noise_json(d.gyro_noise)},
+            {"parameters", to_json(d.gyro_parameters)},
+            {"tried", to_json(d.gyro_tried)},
+            {"findings", to_json(d.gyro_named)},
+            {"open", to_json(d.gyro_open)},
+            {"confounded", confounded}}},
+          {"gravity_direction_deg",
+           {{"turns", d.turns},
+            {"turns_clipped", d.turns_clipped},
+            {"before", d.direction_before / units::degree},
+            {"after", d.direction_after / units::degree},
+            {"held_out_before", d.direction_before_held_out / units::degree},
+            {"held_out_after", d.direction_after_held_out / units::degree}}},
+          {"invisible", d.invisible}};
+}
+
+bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
+  const bool nonlinear =
+      d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
+                                 [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
+  return !d.accel_adequate || !d.accel_named.empty() || !d.gyro_named.empty() || d.settling.has_value() || nonlinear ||
+         (d.rest && drifts(*d.rest));
+}
+
+}  // namespace selfcal::cli

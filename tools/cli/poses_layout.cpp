@@ -1,0 +1,188 @@
+#include "tools/cli/poses_layout.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace selfcal::cli {
+namespace {
+
+using diagnosis::Sensors;
+using import::NamedColumn;
+using import::Role;
+
+struct Triads {
+  std::vector<std::size_t> first;  // x, y, z; empty: none is complete
+  std::size_t several = 0;         // of the axis that has most columns
+};
+
+Triads triads_of(const std::vector<NamedColumn>& named, Role role) {
+  std::array<std::vector<std::size_t>, 3> found;
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == role && named[k].axis >= 0) {
+      found.at(static_cast<std::size_t>(named[k].axis)).push_back(k);
+    }
+  }
+  Triads triads;
+  triads.several = std::max({found[0].size(), found[1].size(), found[2].size()});
+  if (!found[0].empty() && !found[1].empty() && !found[2].empty()) {
+    triads.first = {found[0].front(), found[1].front(), found[2].front()};
+  }
+  return triads;
+}
+
+bool all_nameless(const import::ColumnSource& source) {
+  return std::all_of(source.names().begin(), source.names().end(), [](const std::string& n) { return n.empty(); });
+}
+
+std::vector<std::size_t> columns_from(std::size_t first, std::size_t count) {
+  std::vector<std::size_t> columns(count);
+  std::iota(columns.begin(), columns.end(), first);
+  return columns;
+}
+
+// Where no name says it: time, three gyros, three accelerometers, or one triad, or one gyro. With a rate the time may lack.
+Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_t count, Sensors sensors,
+                                  const RawColumns& columns, const std::string& file) {
+  const bool both = sensors == Sensors::both;
+  const std::size_t wanted = both ? 6 : 3;
+  PoseLayout layout;
+  layout.sensors = sensors;
+  const std::size_t time = columns.rate_hz && (count == wanted || count == 1) ? 0 : 1;
+  if (!columns.rate_hz) {
+    layout.times = {0};
+  }
+  if (sensors == Sensors::gyros && (count == time + 1 || count == columns.angle) && count < time + wanted) {
+    layout.gyro = {time};
+    layout.only_axis = 0;
+    return layout;
+  }
+  if (count < time + wanted) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {}: {} columns, {} are needed{}", file, source.form(), count, time + wanted,
+                            both ? "; of a log of one sensor --only gyros or --only accelerometers says which" : ""));
+  }
+  const std::size_t told = (columns.angle > 0 ? 1 : 0) + (columns.temperature > 0 ? 1 : 0) + 1;  // and a counter, say
+  if (count > time + wanted + told) {
+    return fail(
+        ErrorKind::bad_input,
+        fmt::format("{}: {}: {} columns without names: `selfcal import --guess` looks for the sensors among them", file,
+                    source.form(), count));
+  }
+  if (sensors != Sensors::accelerometers) {
+    layout.gyro = columns_from(time, 3);
+  }
+  if (sensors != Sensors::gyros) {
+    layout.accel = columns_from(time + (both ? 3 : 0), 3);
+  }
+  return layout;
+}
+
+// Columns that are called a time; else the first one, where it is nothing else.
+void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == Role::time) {
+      layout.times.push_back(k);
+    }
+  }
+  if (layout.times.empty() && named.front().role == Role::unknown && named.front().axis < 0) {
+    layout.times = {0};
+  }
+}
+
+Expected<PoseLayout> layout_by_names(const std::vector<NamedColumn>& named, Triads gyro, Triads accel,
+                                     const RawColumns& columns, const std::string& file) {
+  PoseLayout layout;
+  layout.by_names = true;
+  // Of one sensor alone, if nothing else in the file may be the other one.
+  const auto unknown =
+      std::count_if(named.begin(), named.end(), [](const NamedColumn& c) { return c.role == Role::unknown; });
+  const bool one_of_them = gyro.first.empty() != accel.first.empty() && unknown < 3;
+  layout.sensors = columns.sensors.value_or(!one_of_them         ? Sensors::both
+                                            : gyro.first.empty() ? Sensors::accelerometers
+                                                                 : Sensors::gyros);
+  const bool gyros = layout.sensors != Sensors::accelerometers, accels = layout.sensors != Sensors::gyros;
+  for (const auto& [wanted, triads, what] :
+       {std::tuple{gyros, &gyro, "gyros"}, std::tuple{accels, &accel, "accelerometers"}}) {
+    if (wanted && triads->first.empty()) {
+      return fail(
+          ErrorKind::bad_input,
+          fmt::format("{}: by the names of its columns it holds no three {}: `selfcal import --guess` looks for "
+                      "them by what they do, --only answers for the others alone",
+                      file, what));
+    }
+    if (wanted && triads->several > 1) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: by the names of its columns it holds {} sets of {}: poses that stand side by side, "
+                              "or several sensors; one set under another is read (cut and cat make such a file)",
+                              file, triads->several, what));
+    }
+  }
+  layout.gyro = gyros ? std::move(gyro.first) : std::vector<std::size_t>{};
+  layout.accel = accels ? std::move(accel.first) : std::vector<std::size_t>{};
+  if (!columns.rate_hz) {
+    add_times(named, layout);
+    if (layout.times.empty()) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: no column is called a time: --rate says how many rows a second it holds", file));
+    }
+  }
+  return layout;
+}
+
+}  // namespace
+
+Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
+                                 const RawColumns& columns, const std::string& file) {
+  const std::size_t told = std::max(columns.angle, columns.temperature);
+  if (named.size() < told) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {}: {} columns, {} are needed", file, source.form(), named.size(), told));
+  }
+  Triads gyro = triads_of(named, Role::gyro), accel = triads_of(named, Role::accelerometer);
+  const Sensors sensors = columns.sensors.value_or(Sensors::both);
+  // "x", "y", "z" of a phone's file of one sensor.
+  if (columns.sensors && gyro.several + accel.several == 0) {
+    (sensors == Sensors::gyros ? gyro : accel) = triads_of(named, Role::unknown);
+  }
+  if (!gyro.first.empty() || !accel.first.empty()) {
+    return layout_by_names(named, std::move(gyro), std::move(accel), columns, file);
+  }
+  Expected<PoseLayout> layout = plain_layout(source, named.size(), sensors, columns, file);
+  if (layout && layout->only_axis >= 0) {
+    layout->only_axis = std::max(0, named[layout->gyro.front()].axis);
+  }
+  if (layout && !all_nameless(source) && gyro.several + accel.several > 0 && layout->only_axis < 0) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: some columns are called gyros or accelerometers, but no x, y and z of either", file));
+  }
+  return layout;
+}
+
+std::string layout_words(const PoseLayout& layout, std::size_t time, const std::string& unit_of_time,
+                         const RawColumns& columns) {
+  const auto numbers = [](std::vector<std::size_t> all) {
+    for (std::size_t& column : all) {
+      ++column;
+    }
+    return fmt::format("{}", fmt::join(all, ", "));
+  };
+  const bool plain = (layout.gyro.empty() || layout.gyro == columns_from(1, layout.gyro.size())) &&
+                     (layout.accel.empty() || layout.accel == columns_from(layout.gyro.empty() ? 1 : 4, 3));
+  if (plain && time == 0 && unit_of_time == "s" && !columns.rate_hz) {
+    return {};
+  }
+  std::string words = layout.by_names ? "by the names " : "no names: ";
+  words += columns.rate_hz ? fmt::format("rows follow one another at {} Hz", *columns.rate_hz)
+                           : fmt::format("time is column {} in {}", time + 1, unit_of_time);
+  words += layout.gyro.empty()     ? std::string()
+           : layout.only_axis >= 0 ? fmt::format(", the one gyro is column {}, taken for {}", layout.gyro.front() + 1,
+                                                 "xyz"[layout.only_axis])
+                                   : ", gyros are " + numbers(layout.gyro);
+  words += layout.accel.empty() ? std::string() : ", accelerometers " + numbers(layout.accel);
+  return words;
+}
+
+}  // namespace selfcal::cli

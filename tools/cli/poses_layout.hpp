@@ -1,0 +1,40 @@
+// Which columns of a log hold what `selfcal poses` reads, by their names or by where they stand.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/diagnosis/poses/poses.hpp"
+#include "protocol/error.hpp"
+#include "protocol/import/column_source.hpp"
+#include "protocol/import/guess_names.hpp"
+
+namespace selfcal::cli {
+
+// What the caller says of a log.
+struct RawColumns {
+  std::optional<diagnosis::Sensors> sensors;  // none: both, or the triad that alone has a name
+  std::optional<double> rate_hz;              // of its rows; no column is a time then
+  std::size_t angle = 0;                      // its column, from 1, in deg; 0: none
+  std::size_t temperature = 0;                // its column, from 1, in degC; 0: none
+  bool raw_gyros = false;                     // the caller knows their unit: as they are
+};
+
+struct PoseLayout {
+  diagnosis::Sensors sensors = diagnosis::Sensors::both;
+  std::vector<std::size_t> times;        // columns that may be the time, best first; none: the rate is given
+  std::vector<std::size_t> gyro, accel;  // x, y, z; gyros alone may be one axis; empty: not read
+  int only_axis = -1;                    // of one axis alone: which it is, x where no name says it
+  bool by_names = false;
+};
+
+// Errors (bad_input): names that say another thing than three gyros and three accelerometers, too few columns.
+Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::vector<import::NamedColumn>& named,
+                                 const RawColumns& columns, const std::string& file);
+
+// "by the names time is column 1 in ms, gyros are 2, 3, 4"; empty: all stands in the order that the handbook states.
+std::string layout_words(const PoseLayout& layout, std::size_t time, const std::string& unit_of_time,
+                         const RawColumns& columns);
+
+}  // namespace selfcal::cli

@@ -1,0 +1,323 @@
+// The answer by poses in some ten lines: what was found first, then the numbers of each axis, then what is open.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/estimate/quantity_text.hpp"
+#include "tools/cli/poses_output.hpp"
+#include "tools/cli/poses_words.hpp"
+#include "tools/cli/rest_output.hpp"
+
+namespace selfcal::cli {
+namespace {
+
+using diagnosis::PoseDiagnosis;
+using diagnosis::PoseEffect;
+using diagnosis::PoseParameter;
+using diagnosis::Sensors;
+
+constexpr std::size_t columns = 80;
+
+// Parts with a separator behind each but the last, broken at 80 columns; all lines but the first are indented.
+std::string wrapped(const std::string& start, const std::vector<std::string>& parts, const std::string& separator) {
+  constexpr std::size_t indent = 2;
+  std::string text = start;
+  std::size_t used = start.size();
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const std::string part = parts[k] + (k + 1 < parts.size() ? separator : "");
+    if (used > start.size() && used + 1 + part.size() > columns) {
+      text += fmt::format("\n{:{}}", "", indent - 1);
+      used = indent - 1;
+    }
+    text += " " + part;
+    used += 1 + part.size();
+  }
+  return text + "\n";
+}
+
+std::vector<std::string> words_of(const std::string& sentence) {
+  std::vector<std::string> words;
+  std::size_t from = 0;
+  while (from < sentence.size()) {
+    const std::size_t to = std::min(sentence.find(' ', from), sentence.size());
+    words.push_back(sentence.substr(from, to - from));
+    from = to + 1;
+  }
+  return words;
+}
+
+// A sentence, broken at blanks.
+std::string lines_of(const std::string& start, const std::string& sentence) {
+  return wrapped(start, words_of(sentence), "");
+}
+
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+std::string heading(const PoseDiagnosis& d) {
+  const bool stands = d.sensors == Sensors::gyros;  // nothing says which way up
+  std::string text =
+      fmt::format("{}, {:.0f} of {:.0f} s", counted(static_cast<std::size_t>(d.poses), stands ? "stand" : "pose"),
+                  d.static_seconds, d.duration_s);
+  if (d.by_poses && d.sensors == Sensors::both) {
+    text += fmt::format(", {} between them", counted(static_cast<std::size_t>(d.turns), "usable turn"));
+  }
+  if (d.force_at_rest_g > 0.0) {
+    text += fmt::format("; |f| {:.4f} g", d.force_at_rest_g);
+  }
+  return text + "\n";
+}
+
+double log10_of(double log_p) { return log_p / std::log(10.0); }
+
+// One line an effect: its id, how sure, and its largest coefficient.
+std::string effect_line(const PoseEffect& e, double unit, const std::string& unit_name) {
+  std::size_t largest = 0;
+  for (std::size_t k = 0; k < e.value.size(); ++k) {
+    largest = std::abs(e.value[k]) > std::abs(e.value[largest]) ? k : largest;
+  }
+  std::string words = fmt::format("{} (log10 p {:.1f})", e.effect->id, log10_of(e.log_p));
+  if (!e.value.empty()) {
+    words += fmt::format(", most in {}: {}", e.parameters[largest],
+                         with_sigma(e.value[largest] / unit, e.sigma[largest] / unit, unit_name));
+  }
+  std::vector<std::string> rivals = diagnosis::ids_of(e.equivalent);
+  if (e.may_be_flicker) {
+    rivals.emplace_back("a bias that wanders by itself");
+  }
+  if (!rivals.empty()) {
+    words += fmt::format("; or as well {}", fmt::join(rivals, ", "));
+  }
+  return lines_of("named:", words);
+}
+
+std::string findings(const PoseDiagnosis& d, const Units& shown) {
+  std::string text;
+  for (const PoseEffect& e : d.gyro_named) {
+    text += effect_line(e, shown.gyro, shown.gyro_name);
+  }
+  for (const PoseEffect& e : d.accel_named) {
+    text += effect_line(e, e.effect->parameters.front().si_per_unit, e.effect->parameters.front().unit);
+  }
+  if (d.settling) {
+    text += lines_of("named:", fmt::format("accel_relaxation (log10 p {:.1f}): settling after each turn with {:.0f} s",
+                                           log10_of(d.settling->log_p), d.settling->tau_s));
+  }
+  if (d.by_poses && !d.accel_adequate) {
+    const std::string near = d.accel_tried.empty()
+                                 ? std::string()
+                                 : fmt::format(", nearest {} (log10 p {:.1f})", d.accel_tried.front().effect->id,
+                                               log10_of(d.accel_tried.front().log_p));
+    text += lines_of("misfit:", fmt::format("bias, scale and misalignment of the accelerometers leave {:.2f} mg rms{}",
+                                            1e3 * d.accel_rms_g, near));
+  }
+  for (const diagnosis::BiasJump& j : d.gyro_jumps) {
+    text +=
+        lines_of("jump:", fmt::format("behind the gap at {:.0f} s the gyros' bias is another by {:.3g}/{:.3g}/{:.3g} "
+                                      "{}: give both parts by themselves",
+                                      j.time_s, j.size.x() / shown.gyro, j.size.y() / shown.gyro,
+                                      j.size.z() / shown.gyro, shown.gyro_name));
+  }
+  if (d.accel_reversed) {
+    text += "reversed: all accelerometers, as the Earth's rate shows: they read acceleration\n";
+  }
+  if (text.empty() && d.by_poses) {
+    text = d.accel_tested || d.sensors == Sensors::accelerometers
+               ? "nothing named beyond bias, scale factor and misalignment\n"
+               : "nothing named; fewer than 12 poses: nonlinearity not tested\n";
+  }
+  return text;
+}
+
+// What is not used of the log.
+std::string left_out(const PoseDiagnosis& d) {
+  std::string text;
+  if (!d.left_out.empty()) {
+    double seconds = 0.0;
+    for (const diagnosis::LeftOut& out : d.left_out) {
+      seconds += out.last_s - out.first_s;
+    }
+    const diagnosis::LeftOut& first = d.left_out.front();
+    text += lines_of("left out:", fmt::format("{} of {:.1f} s in all, the first at {:.1f} s: {}",
+                                              counted(d.left_out.size(), "part"), seconds, first.first_s, first.words));
+  }
+  std::vector<std::string> axes;
+  for (const diagnosis::Clipping& c : d.clipped) {
+    axes.push_back(
+        fmt::format("{} {} in {}", c.gyro ? "gyro" : "accelerometer", "xyz"[c.axis], counted(c.samples, "sample")));
+  }
+  return axes.empty() ? text : text + wrapped("clipped:", axes, ",");
+}
+
+const PoseParameter* find(const std::vector<PoseParameter>& all, const std::string& name) {
+  const auto it = std::find_if(all.begin(), all.end(), [&](const PoseParameter& p) { return p.name == name; });
+  return it == all.end() || !it->determined ? nullptr : &*it;
+}
+
+std::string cell(double value, double sigma) {
+  const QuantityText t = quantity_text(value, sigma);
+  return fmt::format("{} +- {}", t.value, t.sigma);
+}
+
+struct Row {
+  std::string label;
+  std::array<std::string, 3> cells;
+};
+
+std::string text_of(const std::vector<Row>& rows) {
+  std::size_t label = 0, cell = 0;
+  for (const Row& r : rows) {
+    label = std::max(label, r.label.size());
+    for (const std::string& c : r.cells) {
+      cell = std::max(cell, c.size());
+    }
+  }
+  std::string text;
+  for (const Row& r : rows) {
+    text += fmt::format("  {:<{}}", r.label, label);
+    for (const std::string& c : r.cells) {
+      text += fmt::format("  {:>{}}", c, cell);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+// Of three parameters; nothing where none of them is determined.
+void add_row(const std::vector<PoseParameter>& all, const std::string& label, const std::array<std::string, 3>& names,
+             double unit, std::vector<Row>& rows) {
+  Row row{label, {}};
+  bool any = false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const PoseParameter* p = find(all, names[k]);
+    row.cells[k] = p ? cell(p->value / unit, p->sigma / unit) : "open";
+    any |= p != nullptr;
+  }
+  if (any) {
+    rows.push_back(row);
+  }
+}
+
+std::array<std::string, 3> of_axes(const std::string& stem) { return {stem + "_x", stem + "_y", stem + "_z"}; }
+
+Row gyro_row(const std::string& label, const std::array<double, 3>& value, const std::array<double, 3>& sigma,
+             double unit, const std::array<bool, 3>& axes) {
+  Row row{label, {}};
+  for (std::size_t k = 0; k < 3; ++k) {
+    row.cells[k] = axes[k] ? cell(value[k] / unit, sigma[k] / unit) : "none";
+  }
+  return row;
+}
+
+std::string table(const PoseDiagnosis& d, const Units& shown) {
+  std::vector<Row> rows = {{"", {"x", "y", "z"}}};
+  const bool raw_scale = std::any_of(d.accel_parameters.begin(), d.accel_parameters.end(),
+                                     [](const PoseParameter& p) { return p.unit == "raw/g"; });
+  constexpr double percent = 0.01;
+  add_row(d.accel_parameters, fmt::format("accel. bias, {}", shown.accel_short), of_axes("bias"), shown.accel, rows);
+  add_row(d.accel_parameters, raw_scale ? "accel. raw/g" : "accel. scale, %", of_axes("scale"),
+          raw_scale ? 1.0 : percent, rows);
+  add_row(d.accel_parameters, "accel. xy xz yz, %", {"misalignment_xy", "misalignment_xz", "misalignment_yz"}, percent,
+          rows);
+  if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0) {
+    rows.push_back(gyro_row(fmt::format("gyro {}, {}", d.earth_taken_out ? "bias" : "mean", shown.gyro_short),
+                            d.gyro_bias, d.gyro_bias_sigma, shown.gyro, d.gyro_axes));
+  }
+  add_row(d.gyro_parameters, "gyro scale, %", of_axes("scale"), percent, rows);
+  return rows.size() > 1 ? text_of(rows) : std::string();
+}
+
+// Parameters that stay open, by triad.
+std::string open_parameters(const PoseDiagnosis& d) {
+  std::vector<std::string> all;
+  for (const auto& [triad, parameters] :
+       {std::pair{"accel. ", &d.accel_parameters}, std::pair{"gyro ", &d.gyro_parameters}}) {
+    for (const PoseParameter& p : *parameters) {
+      if (!p.determined) {
+        all.push_back(triad + p.name);
+      }
+    }
+  }
+  return all.empty() ? std::string() : wrapped("not determined by these poses:", all, ",");
+}
+
+std::string turns_line(const PoseDiagnosis& d) {
+  return d.turns == 0
+             ? std::string()
+             : fmt::format("turns carry gravity's direction to {:.2f} deg rms\n", d.direction_after / units::degree);
+}
+
+std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
+  std::string text;
+  for (const diagnosis::ReadOutAxis& a : r.axes) {
+    const Eigen::Index k = main_axis(a);
+    const double gain = std::abs(a.response(k));
+    const char* sign = a.response(k) < 0.0 ? "-" : "";
+    constexpr double any_gain = 2.0;  // beyond it the gyros' unit is not that which was told
+    const std::string way =
+        a.steady ? fmt::format("steady rates up to {:.0f} deg/s", a.fastest_deg_per_s) : std::string("turns");
+    std::string words = fmt::format("{} {}: gyro {}{} ", a.rows, way, sign, "xyz"[k]);
+    words += gain > any_gain || gain < 1.0 / any_gain
+                 ? with_sigma(gain, a.sigma(k), "raw units per rad/s")
+                 : "scale " + with_sigma(100.0 * (gain - 1.0), 100.0 * a.sigma(k), "%");
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      if (i != k) {
+        words += fmt::format(", {} {}", "xyz"[i], with_sigma(100.0 * across(a)(i), 100.0 * a.sigma(i), "%"));
+      }
+    }
+    if (a.nonlinearity) {
+      words += fmt::format("; nonlinearity {}", a.nonlinearity->determined ? "named" : "not seen");
+    }
+    text += lines_of(a.name + " axis,", words);
+  }
+  if (r.clock) {
+    text += lines_of(
+        "read-outs'",
+        fmt::format("clock: {} s {}, {} s more over the log", cell(std::abs(r.clock->delay_s), r.clock->delay_sigma_s),
+                    r.clock->delay_s < 0.0 ? "early" : "late", cell(r.clock->growth_s, r.clock->growth_sigma_s)));
+  }
+  if (r.tilt && r.tilt->near_vertical) {
+    text += fmt::format("{} axis: {} deg off the vertical\n", r.tilt->axis, cell(r.tilt->tilt_deg, r.tilt->sigma_deg));
+  }
+  const bool steady = std::any_of(r.axes.begin(), r.axes.end(), [](const auto& a) { return a.steady; });
+  if (steady) {
+    const auto of = [](const Vector3& v) { return std::array{v.x(), v.y(), v.z()}; };
+    text += text_of({{"", {"x", "y", "z"}},
+                     gyro_row(fmt::format("gyro bias, {}", shown.gyro_short), of(r.gyro_bias), of(r.gyro_bias_sigma),
+                              shown.gyro, {true, true, true})});
+  }
+  return text;
+}
+
+// What such a log cannot show: each before its colon.
+std::string unseen(const PoseDiagnosis& d) {
+  std::vector<std::string> parts;
+  for (const std::string& words : d.invisible) {
+    parts.push_back(words.substr(0, words.find(':')));
+  }
+  return parts.empty() ? std::string() : lines_of("not shown:", fmt::format("{}", fmt::join(parts, "; ")));
+}
+
+}  // namespace
+
+std::string poses_summary(const PoseDiagnosis& d, bool si) {
+  const Units shown = units_of(si);
+  std::string text = heading(d) + findings(d, shown);
+  if (d.read_outs) {
+    text += read_outs(*d.read_outs, shown);
+  }
+  if (d.rest) {
+    text += rest_findings(*d.rest) + left_out(d) + rest_table(*d.rest);
+  } else {
+    text += left_out(d) + table(d, shown) + turns_line(d) + open_parameters(d);
+  }
+  if (!d.not_by_position.empty()) {
+    text += lines_of("no reference:", fmt::format("position at rest: {}", d.not_by_position));
+  }
+  return text + unseen(d);
+}
+
+}  // namespace selfcal::cli
