@@ -118,12 +118,13 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   result.effect = &effect;
   result.constant = constant;
   const bool with_time = of_time(effect);
+  constexpr double two_sigma = 2.0;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
     const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
     const double beside_flicker =
-        with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i], 1.0) : -HUGE_VAL;
+        with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i], two_sigma) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;
     result.log_p = std::min(result.log_p, c.log_p);
     result.log_p_beside_flicker = std::min(result.log_p_beside_flicker, std::max(c.log_p, beside_flicker));

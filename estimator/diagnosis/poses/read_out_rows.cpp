@@ -55,6 +55,20 @@ const ReadOutAxis* axis_called(const ReadOuts& found, bool outer) {
   return it == found.axes.end() ? nullptr : &*it;
 }
 
+// Of the mounts on an axis that whose response a step of rate shows.
+const ReadOutAxis* axis_of_step(const PoseInput& input, const ReadOuts& found, const SteadyRate& a,
+                                const SteadyRate& b) {
+  const Vector3 response = (b.gyro - a.gyro) * (input.gyro_unit / (b.rate - a.rate));
+  const ReadOutAxis* nearest = nullptr;
+  for (const ReadOutAxis& axis : found.axes) {
+    const bool named = axis.name == (a.outer ? "outer" : "inner");
+    if (named && (!nearest || (axis.response - response).norm() < (nearest->response - response).norm())) {
+      nearest = &axis;
+    }
+  }
+  return nearest;
+}
+
 // A stretch of one steady rate to a row; false where the gyros do not turn steadily in it.
 bool complete(const PoseInput& input, const std::vector<double>& angle, SteadyRate& s) {
   constexpr double margin_s = 1.2, least_s = 2.0, even = 0.02;
@@ -153,6 +167,39 @@ std::vector<SteadyRate> find_steady_rates(const PoseInput& input) {
   return all;
 }
 
+std::vector<std::vector<SteadyRate>> mounts_of(const PoseInput& input, const std::vector<SteadyRate>& rates,
+                                               const std::vector<Pose>& poses, bool outer) {
+  Vector3 at_rest = Vector3::Zero();
+  for (const Pose& p : poses) {
+    at_rest += p.gyro / static_cast<double>(poses.size());
+  }
+  struct Mount {
+    Vector3 response;
+    std::vector<SteadyRate> rates;
+  };
+  constexpr double apart = 0.3;  // rad: more than any misalignment
+  std::vector<Mount> mounts;
+  for (const SteadyRate& s : rates) {
+    if (s.outer != outer) {
+      continue;
+    }
+    const Vector3 response = (s.gyro - at_rest) * (input.gyro_unit / s.rate);
+    const auto same = std::find_if(mounts.begin(), mounts.end(), [&](const Mount& m) {
+      return poses.empty() || (m.response.normalized() - response.normalized()).norm() < apart;
+    });
+    if (same == mounts.end()) {
+      mounts.push_back({response, {s}});
+    } else {
+      same->rates.push_back(s);
+    }
+  }
+  std::vector<std::vector<SteadyRate>> all;
+  for (Mount& m : mounts) {
+    all.push_back(std::move(m.rates));
+  }
+  return all;
+}
+
 std::vector<Delay> delays_of_turns(const PoseInput& input, const std::vector<TurnRow>& rows, const ReadOuts& found) {
   std::vector<Delay> delays;
   for (const TurnRow& row : rows) {
@@ -181,10 +228,14 @@ std::vector<Delay> delays_of_steps(const PoseInput& input, const std::vector<Ste
   std::vector<Delay> delays;
   for (std::size_t k = 1; k < rates.size(); ++k) {
     const SteadyRate &a = rates[k - 1], &b = rates[k];
-    const ReadOutAxis* axis = axis_called(found, a.outer);
     constexpr double least = 0.05;  // of a rate
-    if (axis == nullptr || a.outer != b.outer || b.first < a.last ||
-        std::abs(b.rate - a.rate) < least * std::abs(a.rate)) {
+    if (a.outer != b.outer || b.first < a.last || std::abs(b.rate - a.rate) < least * std::abs(a.rate)) {
+      continue;
+    }
+    const ReadOutAxis* axis = axis_of_step(input, found, a, b);
+    constexpr double other_mount = 0.2;
+    if (axis == nullptr || ((b.gyro - a.gyro) * (input.gyro_unit / (b.rate - a.rate)) - axis->response).norm() >
+                               other_mount * axis->response.norm()) {
       continue;
     }
     const std::vector<double>& angle = a.outer ? input.outer : input.inner;

@@ -36,6 +36,11 @@ struct SteadyRate {
 };
 std::vector<SteadyRate> find_steady_rates(const PoseInput& input);
 
+// Those about one axis of the table, apart by how the sensor was mounted on it: rates that turn the sensor about another of its axes than
+// the ones before. What the gyros read at rest is that of the poses; without poses all are one.
+std::vector<std::vector<SteadyRate>> mounts_of(const PoseInput& input, const std::vector<SteadyRate>& rates,
+                                               const std::vector<Pose>& poses, bool outer);
+
 struct Delay {
   double time_s = 0.0, delay_s = 0.0;
 };

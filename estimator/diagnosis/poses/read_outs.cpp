@@ -154,21 +154,19 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> weighted(const std::vector<RateRow>&
 }
 
 // (R2), poses as rates of zero.
-void axis_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rates, const std::vector<Pose>& poses,
-                     bool outer, double alpha, ReadOuts& answer) {
+std::optional<ReadOutAxis> axis_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rates,
+                                           const std::vector<Pose>& poses, bool outer, double alpha, ReadOuts& answer) {
   ReadOutAxis axis;
   axis.name = outer ? "outer" : "inner";
   axis.steady = true;
   axis.slowest_deg_per_s = HUGE_VAL;
   std::vector<RateRow> rows;
   for (const SteadyRate& s : rates) {
-    if (s.outer == outer) {
-      rows.push_back({s.rate, s.uneven, s.gyro});
-      const double rate = std::abs(s.rate) / units::degree;
-      axis.slowest_deg_per_s = std::min(axis.slowest_deg_per_s, rate);
-      axis.fastest_deg_per_s = std::max(axis.fastest_deg_per_s, rate);
-      axis.turned_deg += rate * s.length_s;
-    }
+    rows.push_back({s.rate, s.uneven, s.gyro});
+    const double rate = std::abs(s.rate) / units::degree;
+    axis.slowest_deg_per_s = std::min(axis.slowest_deg_per_s, rate);
+    axis.fastest_deg_per_s = std::max(axis.fastest_deg_per_s, rate);
+    axis.turned_deg += rate * s.length_s;
   }
   axis.rows = static_cast<int>(rows.size());
   for (const Pose& p : poses) {
@@ -176,7 +174,7 @@ void axis_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rate
   }
   constexpr std::size_t enough = 4;
   if (axis.rows < 2 || rows.size() < enough) {
-    return;
+    return std::nullopt;
   }
   const auto [X, y] = weighted(rows);
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -196,14 +194,30 @@ void axis_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rate
         PoseParameter{"nonlinearity", "s/rad", with.value(2) * input.gyro_unit / axis.response.norm(),
                       with.sigma(2) * input.gyro_unit / axis.response.norm(), axis.log_p_nonlinear < std::log(alpha)};
   }
-  // Of turns from stop to stop and steady rates the better one.
-  const auto known =
-      std::find_if(answer.axes.begin(), answer.axes.end(), [&](const ReadOutAxis& a) { return a.name == axis.name; });
-  if (known == answer.axes.end()) {
-    answer.axes.push_back(axis);
-  } else if (axis.sigma.norm() < known->sigma.norm()) {
-    *known = axis;
+  return axis;
+}
+
+// (R2) for each way in which the sensor was mounted. Of turns from stop to stop and steady rates the better one; turns of a sensor that
+// was mounted anew tell nothing together.
+void axes_from_rates(const PoseInput& input, const std::vector<SteadyRate>& rates, const std::vector<Pose>& poses,
+                     bool outer, double alpha, ReadOuts& answer) {
+  std::vector<ReadOutAxis> found;
+  for (const std::vector<SteadyRate>& of_mount : mounts_of(input, rates, poses, outer)) {
+    if (auto axis = axis_from_rates(input, of_mount, poses, outer, alpha, answer)) {
+      found.push_back(std::move(*axis));
+    }
   }
+  const auto known = std::find_if(answer.axes.begin(), answer.axes.end(),
+                                  [&](const ReadOutAxis& a) { return a.name == (outer ? "outer" : "inner"); });
+  const bool better = known == answer.axes.end() || found.size() > 1 ||
+                      (!found.empty() && found.front().sigma.norm() < known->sigma.norm());
+  if (found.empty() || !better) {
+    return;
+  }
+  if (known != answer.axes.end()) {
+    answer.axes.erase(known);
+  }
+  answer.axes.insert(answer.axes.end(), found.begin(), found.end());
 }
 
 // (R3). A gyro's sample is the mean over its interval or a reading at its end, which nothing in a log shows: half an interval lies
@@ -294,7 +308,7 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
   const std::vector<SteadyRate> rates = find_steady_rates(input);
   axes_from_turns(input, rows, answer);
   for (const bool outer : {true, false}) {
-    axis_from_rates(input, rates, poses, outer, alpha, answer);
+    axes_from_rates(input, rates, poses, outer, alpha, answer);
   }
   if (answer.axes.empty()) {
     return std::nullopt;
