@@ -23,8 +23,7 @@ std::vector<Step> steps_between_rests(const Motion& motion) {
 }
 
 // About their mean, which holds the gyros' bias.
-std::vector<Step> steps_of_time(const Motion& motion) {
-  constexpr std::size_t blocks = 4;  // a second or so
+std::vector<Step> steps_of_time(const Motion& motion, std::size_t blocks) {
   std::vector<Step> steps;
   Step mean;
   for (std::size_t k = 0; k + blocks <= motion.blocks.size(); k += blocks) {
@@ -44,6 +43,14 @@ std::vector<Step> steps_of_time(const Motion& motion) {
   return steps;
 }
 
+double mean_square(const std::vector<Step>& steps) {
+  double sum = 0.0;
+  for (const Step& step : steps) {
+    sum += step.by * step.by / static_cast<double>(steps.size());
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::optional<TableAxis> table_axis(const TriadColumns& gyro, const TriadColumns& accel,
@@ -57,7 +64,13 @@ std::optional<TableAxis> table_axis(const TriadColumns& gyro, const TriadColumns
   std::vector<Step> steps = steps_between_rests(motion);
   const bool stops = steps.size() >= fewest;
   if (!stops) {
-    steps = steps_of_time(motion);
+    // Over a second or so, or over a quarter of one where a table goes forth and back meanwhile: where it turns more.
+    constexpr std::size_t second = 4;
+    steps = steps_of_time(motion, second);
+    std::vector<Step> shorter = steps_of_time(motion, 1);
+    if (mean_square(shorter) > mean_square(steps)) {
+      steps = std::move(shorter);
+    }
   }
   Vector3 product = Vector3::Zero();
   double of_angle = 0.0, of_gyro = 0.0;

@@ -178,11 +178,17 @@ std::string axis_text(const diagnosis::ReadOutAxis& a) {
   if (gain > any_gain || gain < 1.0 / any_gain) {
     return fmt::format(
         "  {} axis, {} {}: gyro {}{} {:.6g} +- {:.2g} raw units per rad/s ({:.6g} per deg/s; --gyro-unit says it)\n",
-        a.name, a.rows, a.steady ? "steady rates" : "turns", a.response(k) < 0.0 ? "-" : "", "xyz"[k], gain, a.sigma(k),
-        gain * units::degree);
+        a.name, a.rows,
+        a.steady       ? "steady rates"
+        : a.oscillates ? "reversals"
+                       : "turns",
+        a.response(k) < 0.0 ? "-" : "", "xyz"[k], gain, a.sigma(k), gain * units::degree);
   }
   std::string text = fmt::format(
-      "  {} axis, {} {}{}: gyro {}{} {:+.2f} +- {:.2f} %", a.name, a.rows, a.steady ? "steady rates" : "turns",
+      "  {} axis, {} {}{}: gyro {}{} {:+.2f} +- {:.2f} %", a.name, a.rows,
+      a.steady       ? "steady rates"
+      : a.oscillates ? "reversals"
+                     : "turns",
       a.steady ? fmt::format(" of {:.0f} to {:.0f} deg/s", a.slowest_deg_per_s, a.fastest_deg_per_s)
                : fmt::format(", {:.0f} deg in all", a.turned_deg),
       a.response(k) < 0.0 ? "-" : "", "xyz"[k], 100.0 * (std::abs(a.response(k)) - 1.0), 100.0 * a.sigma(k));
@@ -206,10 +212,11 @@ std::string read_outs_text(const diagnosis::ReadOuts& r, const Units& shown) {
   for (const diagnosis::ReadOutAxis& a : r.axes) {
     text += axis_text(a);
   }
-  if (std::any_of(r.axes.begin(), r.axes.end(), [](const diagnosis::ReadOutAxis& a) { return a.steady; })) {
+  if (std::any_of(r.axes.begin(), r.axes.end(),
+                  [](const diagnosis::ReadOutAxis& a) { return a.steady || a.oscillates; })) {
     const Vector3 bias = r.gyro_bias / shown.gyro, sigma = r.gyro_bias_sigma / shown.gyro;
-    text += fmt::format("  bias beside the steady rates {:.3g}/{:.3g}/{:.3g} +- {:.2g}/{:.2g}/{:.2g} {}\n", bias.x(),
-                        bias.y(), bias.z(), sigma.x(), sigma.y(), sigma.z(), shown.gyro_name);
+    text += fmt::format("  bias beside the rates {:.3g}/{:.3g}/{:.3g} +- {:.2g}/{:.2g}/{:.2g} {}\n", bias.x(), bias.y(),
+                        bias.z(), sigma.x(), sigma.y(), sigma.z(), shown.gyro_name);
   }
   if (r.clock) {
     text += fmt::format(

@@ -85,7 +85,9 @@ Json to_json(const std::vector<diagnosis::BiasJump>& jumps) {
 Json axis_json(const diagnosis::ReadOutAxis& a) {
   const Eigen::Index k = main_axis(a);
   Json j = {{"axis", a.name},
-            {"by", a.steady ? "steady rates" : "turns from stop to stop"},
+            {"by", a.steady       ? "steady rates"
+                   : a.oscillates ? "oscillation"
+                                  : "turns from stop to stop"},
             {"rows", a.rows},
             {"turned_deg", a.turned_deg},
             {"response", array(a.response)},

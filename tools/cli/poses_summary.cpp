@@ -257,8 +257,8 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
     const double gain = std::abs(a.response(k));
     const char* sign = a.response(k) < 0.0 ? "-" : "";
     constexpr double any_gain = 2.0;  // beyond it the gyros' unit is not that which was told
-    const std::string way =
-        a.steady ? fmt::format("steady rates up to {:.0f} deg/s", a.fastest_deg_per_s) : std::string("turns");
+    const std::string way = a.steady ? fmt::format("steady rates up to {:.0f} deg/s", a.fastest_deg_per_s)
+                                     : std::string(a.oscillates ? "reversals" : "turns");
     std::string words = fmt::format("{} {}: gyro {}{} ", a.rows, way, sign, "xyz"[k]);
     words += gain > any_gain || gain < 1.0 / any_gain
                  ? with_sigma(gain, a.sigma(k), "raw units per rad/s")
@@ -274,15 +274,17 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
     text += lines_of(a.name + " axis,", words);
   }
   if (r.clock) {
-    text += lines_of(
-        "read-outs'",
-        fmt::format("clock: {} s {}, {} s more over the log", cell(std::abs(r.clock->delay_s), r.clock->delay_sigma_s),
-                    r.clock->delay_s < 0.0 ? "early" : "late", cell(r.clock->growth_s, r.clock->growth_sigma_s)));
+    std::string words = fmt::format("clock: {} s {}", cell(std::abs(r.clock->delay_s), r.clock->delay_sigma_s),
+                                    r.clock->delay_s < 0.0 ? "early" : "late");
+    if (r.clock->growth_sigma_s > 0.0) {
+      words += fmt::format(", {} s more over the log", cell(r.clock->growth_s, r.clock->growth_sigma_s));
+    }
+    text += lines_of("read-outs'", words);
   }
   if (r.tilt && r.tilt->near_vertical) {
     text += fmt::format("{} axis: {} deg off the vertical\n", r.tilt->axis, cell(r.tilt->tilt_deg, r.tilt->sigma_deg));
   }
-  const bool steady = std::any_of(r.axes.begin(), r.axes.end(), [](const auto& a) { return a.steady; });
+  const bool steady = std::any_of(r.axes.begin(), r.axes.end(), [](const auto& a) { return a.steady || a.oscillates; });
   if (steady) {
     const auto of = [](const Vector3& v) { return std::array{v.x(), v.y(), v.z()}; };
     text += text_of({{"", {"x", "y", "z"}},

@@ -93,6 +93,7 @@ struct ReadOutAxis {
   std::string name;  // outer, inner
   int rows = 0;      // turns from stop to stop, or steady rates
   bool steady = false;
+  bool oscillates = false;                                  // rows are reversals then
   double turned_deg = 0.0;                                  // all turns together
   double slowest_deg_per_s = 0.0, fastest_deg_per_s = 0.0;  // of steady rates
   Vector3 response, sigma;                                  // of the gyros in nominal rad/s per rad/s of the read-out

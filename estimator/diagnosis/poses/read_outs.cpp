@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/poses/pose_regression.hpp"
+#include "estimator/diagnosis/poses/read_out_oscillation.hpp"
 #include "estimator/diagnosis/poses/read_out_rows.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/statistics/distributions.hpp"
@@ -296,6 +297,24 @@ std::optional<TableTilt> tilt_of(const std::vector<Stop>& stops, const std::vect
   return tilt;
 }
 
+// (R5), where there is neither a stop nor a steady rate.
+void add_oscillation(const PoseInput& input, double interval_s, ReadOuts& answer) {
+  for (const bool outer : {true, false}) {
+    const std::optional<Oscillation> o = judge_oscillation(input, outer);
+    if (!o) {
+      continue;
+    }
+    answer.axes.push_back(o->axis);
+    answer.gyro_bias = o->bias;
+    answer.gyro_bias_sigma = o->bias_sigma;
+    ReadOutClock clock;
+    clock.turns = o->axis.rows;
+    clock.delay_s = clock.least_s = clock.most_s = o->delay_s;
+    clock.delay_sigma_s = std::hypot(o->delay_sigma_s, 0.5 * interval_s);
+    answer.clock = clock;
+  }
+}
+
 }  // namespace
 
 std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses, double alpha) {
@@ -310,14 +329,16 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
   for (const bool outer : {true, false}) {
     axes_from_rates(input, rates, poses, outer, alpha, answer);
   }
+  const double duration_s = input.time_s.back() - input.time_s.front();
+  const double interval_s = duration_s / static_cast<double>(input.time_s.size() - 1);
   if (answer.axes.empty()) {
-    return std::nullopt;
+    add_oscillation(input, interval_s, answer);
+    return answer.axes.empty() ? std::nullopt : std::optional(answer);
   }
   const bool by_rates =
       std::any_of(answer.axes.begin(), answer.axes.end(), [](const ReadOutAxis& a) { return a.steady; });
-  const double duration_s = input.time_s.back() - input.time_s.front();
   answer.clock = clock_of(by_rates ? delays_of_steps(input, rates, answer) : delays_of_turns(input, rows, answer),
-                          duration_s, duration_s / static_cast<double>(input.time_s.size() - 1));
+                          duration_s, interval_s);
   if (!poses.empty() && input.sensors == Sensors::both) {
     double raw_per_g = 0.0;
     for (const Pose& p : poses) {
