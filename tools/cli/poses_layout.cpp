@@ -59,6 +59,12 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_
     layout.only_axis = 0;
     return layout;
   }
+  if (count == 1) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: one column: --only gyros takes it for one gyro's, and --rate says "
+                            "how many rows a second it holds",
+                            file));
+  }
   if (count < time + wanted) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: {}: {} columns, {} are needed{}", file, source.form(), count, time + wanted,

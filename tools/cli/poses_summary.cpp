@@ -168,32 +168,61 @@ struct Row {
 };
 
 std::string text_of(const std::vector<Row>& rows) {
-  std::size_t label = 0, cell = 0;
+  std::size_t label = 0;
+  std::array<std::size_t, 3> cell{};
   for (const Row& r : rows) {
     label = std::max(label, r.label.size());
-    for (const std::string& c : r.cells) {
-      cell = std::max(cell, c.size());
+    for (std::size_t k = 0; k < cell.size(); ++k) {
+      cell[k] = std::max(cell[k], r.cells[k].size());
     }
   }
+  constexpr std::size_t indent = 2, wide = 2;
+  const std::size_t gap = indent + label + cell[0] + cell[1] + cell[2] + 3 * wide > columns ? 1 : wide;
   std::string text;
   for (const Row& r : rows) {
-    text += fmt::format("  {:<{}}", r.label, label);
-    for (const std::string& c : r.cells) {
-      text += fmt::format("  {:>{}}", c, cell);
+    text += fmt::format("{:{}}{:<{}}", "", indent, r.label, label);
+    for (std::size_t k = 0; k < cell.size(); ++k) {
+      text += fmt::format("{:{}}{:>{}}", "", gap, r.cells[k], cell[k]);
     }
     text += "\n";
   }
   return text;
 }
 
+// Raw units in thousands or thousandths, so that a row keeps to the page: 1 for all others.
+struct Scaled {
+  std::string name;
+  double unit = 1.0;
+};
+
+Scaled scaled(const std::string& name, double unit, const std::array<double, 3>& values) {
+  double largest = 0.0;
+  for (const double v : values) {
+    largest = std::max(largest, std::abs(v) / unit);
+  }
+  constexpr double thousand = 3.0;
+  const double power =
+      largest > 0.0 && std::isfinite(largest) ? thousand * std::floor(std::log10(largest) / thousand) : 0.0;
+  if (name != "raw" || power == 0.0 || power == thousand) {
+    return {name, unit};
+  }
+  return {fmt::format("1e{:.0f} raw", power), unit * std::pow(10.0, power)};
+}
+
 // Of three parameters; nothing where none of them is determined.
 void add_row(const std::vector<PoseParameter>& all, const std::string& label, const std::array<std::string, 3>& names,
-             double unit, std::vector<Row>& rows) {
-  Row row{label, {}};
+             const std::string& name, double unit, std::vector<Row>& rows) {
+  std::array<double, 3> values{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const PoseParameter* p = find(all, names[k]);
+    values[k] = p ? p->value : 0.0;
+  }
+  const Scaled shown = scaled(name, unit, values);
+  Row row{fmt::format("{}, {}", label, shown.name), {}};
   bool any = false;
   for (std::size_t k = 0; k < 3; ++k) {
     const PoseParameter* p = find(all, names[k]);
-    row.cells[k] = p ? cell(p->value / unit, p->sigma / unit) : "open";
+    row.cells[k] = p ? cell(p->value / shown.unit, p->sigma / shown.unit) : "open";
     any |= p != nullptr;
   }
   if (any) {
@@ -203,11 +232,12 @@ void add_row(const std::vector<PoseParameter>& all, const std::string& label, co
 
 std::array<std::string, 3> of_axes(const std::string& stem) { return {stem + "_x", stem + "_y", stem + "_z"}; }
 
-Row gyro_row(const std::string& label, const std::array<double, 3>& value, const std::array<double, 3>& sigma,
-             double unit, const std::array<bool, 3>& axes) {
-  Row row{label, {}};
+Row gyro_row(const char* what, const std::array<double, 3>& value, const std::array<double, 3>& sigma,
+             const Units& shown, const std::array<bool, 3>& axes) {
+  const Scaled in = scaled(shown.gyro_short, shown.gyro, value);
+  Row row{fmt::format("gyro {}, {}", what, in.name), {}};
   for (std::size_t k = 0; k < 3; ++k) {
-    row.cells[k] = axes[k] ? cell(value[k] / unit, sigma[k] / unit) : "none";
+    row.cells[k] = axes[k] ? cell(value[k] / in.unit, sigma[k] / in.unit) : "none";
   }
   return row;
 }
@@ -217,16 +247,18 @@ std::string table(const PoseDiagnosis& d, const Units& shown) {
   const bool raw_scale = std::any_of(d.accel_parameters.begin(), d.accel_parameters.end(),
                                      [](const PoseParameter& p) { return p.unit == "raw/g"; });
   constexpr double percent = 0.01;
-  add_row(d.accel_parameters, fmt::format("accel. bias, {}", shown.accel_short), of_axes("bias"), shown.accel, rows);
-  add_row(d.accel_parameters, raw_scale ? "accel. raw/g" : "accel. scale, %", of_axes("scale"),
-          raw_scale ? 1.0 : percent, rows);
-  add_row(d.accel_parameters, "accel. xy xz yz, %", {"misalignment_xy", "misalignment_xz", "misalignment_yz"}, percent,
-          rows);
-  if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0) {
-    rows.push_back(gyro_row(fmt::format("gyro {}, {}", d.earth_taken_out ? "bias" : "mean", shown.gyro_short),
-                            d.gyro_bias, d.gyro_bias_sigma, shown.gyro, d.gyro_axes));
+  add_row(d.accel_parameters, "accel. bias", of_axes("bias"), shown.accel_short, shown.accel, rows);
+  if (raw_scale) {
+    add_row(d.accel_parameters, "accel. 1 g", of_axes("scale"), "raw", 1.0, rows);
+  } else {
+    add_row(d.accel_parameters, "accel. scale", of_axes("scale"), "%", percent, rows);
   }
-  add_row(d.gyro_parameters, "gyro scale, %", of_axes("scale"), percent, rows);
+  add_row(d.accel_parameters, "accel. xy xz yz", {"misalignment_xy", "misalignment_xz", "misalignment_yz"}, "%",
+          percent, rows);
+  if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0) {
+    rows.push_back(gyro_row(d.earth_taken_out ? "bias" : "mean", d.gyro_bias, d.gyro_bias_sigma, shown, d.gyro_axes));
+  }
+  add_row(d.gyro_parameters, "gyro scale", of_axes("scale"), "%", percent, rows);
   return rows.size() > 1 ? text_of(rows) : std::string();
 }
 
@@ -287,9 +319,8 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
   const bool steady = std::any_of(r.axes.begin(), r.axes.end(), [](const auto& a) { return a.steady || a.oscillates; });
   if (steady) {
     const auto of = [](const Vector3& v) { return std::array{v.x(), v.y(), v.z()}; };
-    text += text_of({{"", {"x", "y", "z"}},
-                     gyro_row(fmt::format("gyro bias, {}", shown.gyro_short), of(r.gyro_bias), of(r.gyro_bias_sigma),
-                              shown.gyro, {true, true, true})});
+    text += text_of(
+        {{"", {"x", "y", "z"}}, gyro_row("bias", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {true, true, true})});
   }
   return text;
 }
