@@ -115,6 +115,7 @@ Expected<std::optional<std::string>> check_time(const Recording& recording, cons
   const double nominal = 1.0 / recording.sample_rate_hz;
   std::optional<std::string> gap;
   double lost_s = 0.0;  // in gaps: not the rate's fault
+  std::size_t gaps = 0;
   for (std::size_t row = 1; row < time.size(); ++row) {
     const double interval = time[row] - time[row - 1];
     if (!(interval > 0.0)) {
@@ -123,6 +124,7 @@ Expected<std::optional<std::string>> check_time(const Recording& recording, cons
     }
     if (interval > gap_intervals * nominal) {
       lost_s += interval - nominal;
+      ++gaps;
       if (!gap) {
         gap = fmt::format("time_s: row {}: gap of {:.6g} s before {} s, {:.6g} s expected", row, interval, time[row],
                           nominal);
@@ -131,10 +133,13 @@ Expected<std::optional<std::string>> check_time(const Recording& recording, cons
   }
   const double seconds = time.back() - time.front() - lost_s;
   const double rate = static_cast<double>(time.size() - 1) / seconds;
-  // A gap only counts as one if the rest keeps the rate: else every interval is a "gap" and the rate is wrong.
+  // A gap only counts as one if the rest keeps the rate: else every interval is a "gap" and the rate is wrong. Few long ones are a logger that
+  // was switched off.
+  constexpr std::size_t one_in = 100;
+  const bool few = gaps * one_in < time.size();
   const double span_rate = static_cast<double>(time.size() - 1) / (time.back() - time.front());
   const double lost_share = lost_s / (time.back() - time.front());
-  const double judged = lost_share > 0.25 ? span_rate : rate;
+  const double judged = lost_share > 0.25 && !few ? span_rate : rate;
   if (std::abs(judged / recording.sample_rate_hz - 1.0) > rate_tolerance) {
     return bad(fmt::format("sample_rate_hz = {} contradicts time_s, whose {} rows over {:.6g} s make {:.6g} Hz",
                            recording.sample_rate_hz, time.size(), time.back() - time.front(), judged));

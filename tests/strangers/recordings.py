@@ -63,6 +63,16 @@ def increments(path, rng):
     return g, a, {}
 
 
+def headings(path, rng):
+    """Four headings a quarter of a turn apart on a level plate, fibre gyros: 10 deg/h of the Earth in gyros that are good to 0.1."""
+    g, a = fibre(rng)
+    stops = [(turn([0, 0, 1], 0.4 + q * numpy.pi / 2), 90.0, 6.0) for q in range(4)]
+    t, f, w = moved(100.0, stops, rng)
+    write(path, ["t_s", "gx_dps", "gy_dps", "gz_dps", "ax_g", "ay_g", "az_g"],
+          [t, *of(g.read(w, 100.0, rng), DEG), *of(a.read(f, 100.0, rng), G0)], ["%.3f"] + ["%.8f"] * 3 + ["%.7f"] * 3)
+    return g, a, {}
+
+
 def staircase(path, rng, columns=("rate", "angle")):
     """A rate table from 10 to 400 deg/s both ways, its rate, its angle from 0 to 360 deg; the sensor's axis 0.3 deg off."""
     g, a = industrial(rng)

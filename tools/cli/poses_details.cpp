@@ -282,6 +282,10 @@ std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si) {
   if (d.rest) {
     text += d.force_at_rest_g > 0.0 ? fmt::format("|f| {:.5f} g; ", d.force_at_rest_g) : std::string();
     text += rest_text(*d.rest);
+    if (d.earth_taken_out) {
+      text += fmt::format("gyro bias by {} headings, the Earth's rate taken out, {}: {} +- {}\n", d.poses,
+                          shown.gyro_name, three(d.gyro_bias, shown.gyro), three(d.gyro_bias_sigma, shown.gyro));
+    }
   }
   if (d.sensors != diagnosis::Sensors::both) {
     text += one_triad_text(d, shown);

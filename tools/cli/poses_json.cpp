@@ -1,5 +1,8 @@
 #include "tools/cli/poses_output.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -143,6 +146,52 @@ Json noise_json(const std::vector<diagnosis::RestNoise>& all) {
   return points;
 }
 
+// What stands for it as well, over all that is named.
+std::string rivals_of(const diagnosis::PoseDiagnosis& d) {
+  std::vector<std::string> all;
+  for (const diagnosis::PoseEffect& e : d.gyro_named) {
+    const std::vector<std::string> ids = diagnosis::ids_of(e.equivalent);
+    all.insert(all.end(), ids.begin(), ids.end());
+    if (e.may_be_flicker) {
+      all.emplace_back("a bias that wanders by itself");
+    }
+  }
+  return all.empty() ? std::string() : fmt::format("Or as well {}.", fmt::join(all, ", "));
+}
+
+// The verdict in a sentence, and what tells more.
+Json verdict_of(const diagnosis::PoseDiagnosis& d) {
+  std::vector<std::string> named;
+  for (const auto* effects : {&d.gyro_named, &d.accel_named}) {
+    for (const diagnosis::PoseEffect& e : *effects) {
+      named.push_back(e.effect->id);
+    }
+  }
+  if (d.settling) {
+    named.emplace_back("accel_relaxation");
+  }
+  std::string verdict = d.by_poses ? "Nothing named beyond bias, scale factor and misalignment."
+                        : d.rest   ? "Nothing drifts by more than slow noise makes."
+                                   : "Nothing named.";
+  std::string next;
+  if (!named.empty()) {
+    verdict = fmt::format("Named: {}.", fmt::join(named, ", "));
+    next = rivals_of(d).empty() ? "" : "The same poses once more in another order, just switched on, tell them apart.";
+  } else if (!d.gyro_jumps.empty()) {
+    verdict = "The gyros' bias is another behind a gap of the log.";
+    next = "Give the parts of the log by themselves.";
+  } else if (d.by_poses && !d.accel_adequate) {
+    verdict = fmt::format("Bias, scale factor and misalignment leave {:.2g} mg rms of the accelerometers.",
+                          1e3 * d.accel_rms_g);
+  } else if (d.rest && drifts(*d.rest)) {
+    verdict = "Readings change with time or temperature by more than slow noise makes.";
+  }
+  return {{"standing", poses_mismatch(d) || !d.gyro_jumps.empty() ? "open" : "good"},
+          {"verdict", verdict},
+          {"cause", rivals_of(d)},
+          {"next", next}};
+}
+
 }  // namespace
 
 nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
@@ -159,7 +208,8 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
   const char* sensors = d.sensors == diagnosis::Sensors::gyros            ? "gyros"
                         : d.sensors == diagnosis::Sensors::accelerometers ? "accelerometers"
                                                                           : "both";
-  return {{"mismatch", poses_mismatch(d)},
+  return {{"summary", verdict_of(d)},
+          {"mismatch", poses_mismatch(d)},
           {"sensors", sensors},
           {"poses", d.poses},
           {"static_s", d.static_seconds},

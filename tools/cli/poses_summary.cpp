@@ -325,6 +325,16 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
   return text;
 }
 
+// Gyros that see the Earth are told in degrees an hour.
+Units of_headings(bool si) {
+  Units shown = units_of(si);
+  if (si) {
+    shown.gyro = units::degree_per_hour;
+    shown.gyro_name = shown.gyro_short = "deg/h";
+  }
+  return shown;
+}
+
 // What such a log cannot show: each before its colon.
 std::string unseen(const PoseDiagnosis& d) {
   std::vector<std::string> parts;
@@ -344,6 +354,11 @@ std::string poses_summary(const PoseDiagnosis& d, bool si) {
   }
   if (d.rest) {
     text += rest_findings(*d.rest) + left_out(d) + rest_table(*d.rest);
+    if (d.earth_taken_out) {
+      text += fmt::format("gyro bias by {} headings, the Earth's rate taken out\n", d.poses) +
+              text_of({{"", {"x", "y", "z"}},
+                       gyro_row("bias", d.gyro_bias, d.gyro_bias_sigma, of_headings(si), d.gyro_axes)});
+    }
   } else {
     text += left_out(d) + table(d, shown) + turns_line(d) + open_parameters(d);
   }

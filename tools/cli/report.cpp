@@ -261,7 +261,7 @@ Expected<Json> page_of_recording(const std::string& file, const ReportArguments&
   return with_past(std::move(*document), {}, utc, false, arguments);
 }
 
-// What `show RUN --json` or `investigate --json` said.
+// What `show RUN --json`, `investigate --json` or `poses --json` said.
 Expected<Json> page_of_document(const std::string& file, const ReportArguments& arguments) {
   const Expected<std::string> text = read_text_file(file, largest_document);
   if (!text) {
@@ -273,6 +273,10 @@ Expected<Json> page_of_document(const std::string& file, const ReportArguments& 
   }
   if (*story) {
     return std::move(**story);
+  }
+  Expected<std::optional<Json>> poses = report::read_poses(*text, file);
+  if (!poses || *poses) {
+    return poses ? Expected<Json>(std::move(**poses)) : tl::unexpected(poses.error());
   }
   return report::read_run(*text, file).and_then([&](const Json& run) { return page_of_run(run, false, arguments); });
 }

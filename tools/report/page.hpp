@@ -1,6 +1,6 @@
 // A document as one self-contained page: it holds the document, the program and the plotting library, and asks no
 // network. The document's "kind" says which page it is: calibration, plan, fleet,
-// investigation or overlay.
+// investigation, overlay or poses.
 #pragma once
 
 #include <filesystem>

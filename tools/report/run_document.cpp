@@ -84,6 +84,18 @@ Expected<std::optional<Json>> read_investigation(const std::string& text, const 
   });
 }
 
+Expected<std::optional<Json>> read_poses(const std::string& text, const std::string& source) {
+  const Json head = Json::parse(text, nullptr, false);
+  const auto schema = head.is_object() ? head.find("schema") : head.end();
+  if (schema == head.end() || !schema->is_object() || schema->value("name", std::string()) != document::poses.name) {
+    return std::nullopt;
+  }
+  return read(text, source, {"poses", "accelerometers", "gyros", "invisible"}).map([](Json poses) {
+    poses["kind"] = "poses";
+    return std::optional<Json>(std::move(poses));
+  });
+}
+
 Json run_page_document(const Json& run, const std::optional<Json>& recomputed) {
   Json document = recomputed.value_or(Json::object());
   const Json result = value_or_null(run, "result");

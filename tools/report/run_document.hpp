@@ -17,6 +17,8 @@ Expected<nlohmann::ordered_json> read_history(const std::string& text, const std
 // What `selfcal investigate --json` said, as the document of its page; nothing where the text is another document. bad_input names
 // the key that is missing.
 Expected<std::optional<nlohmann::ordered_json>> read_investigation(const std::string& text, const std::string& source);
+// The same of what `poses --json` said, or `diagnose --json` of a recording that is judged so.
+Expected<std::optional<nlohmann::ordered_json>> read_poses(const std::string& text, const std::string& source);
 
 // The document of the run's page. The run's own result counts; `recomputed` (calibration_document() of its recording,
 // nothing where the recording is gone) adds the curves to it.

@@ -204,10 +204,39 @@ std::string counted(int count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
+// Few headings, as of a sensor that is turned about the vertical by quarters: where the gyros carry the heading and see the Earth's rate, it
+// is taken out of their means, and what is left is their bias.
+void add_bias_by_headings(const PoseInput& input, std::vector<Pose> poses, PoseDiagnosis& d) {
+  for (Pose& p : poses) {
+    p.u = p.accel.normalized();  // a hundredth of g off is a hundredth of the Earth's rate
+  }
+  const EarthInPoses earth = earth_in_poses(input, poses, usable_turns(input, poses, d).size() + 1 == poses.size());
+  if (!earth.heading) {
+    return;
+  }
+  d.earth_taken_out = true;
+  d.accel_reversed = earth.reversed;
+  const auto n = static_cast<double>(poses.size());
+  Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vector3 bias = poses[k].gyro - earth.rate[k];
+    sum += bias;
+    square += bias.cwiseAbs2();
+  }
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double variance = std::max(0.0, square(axis) / n - std::pow(sum(axis) / n, 2)) * n / (n - 1.0);
+    d.gyro_bias.at(static_cast<std::size_t>(axis)) = sum(axis) / n;
+    d.gyro_bias_sigma.at(static_cast<std::size_t>(axis)) = std::sqrt(variance / n);
+  }
+}
+
 void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
   d.rest = judge_rest(input, poses, alpha, d);
   if (!d.rest) {
     return;
+  }
+  if (poses.size() > 1 && input.gyros_si) {
+    add_bias_by_headings(input, poses, d);
   }
   d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise, means, and what changes while nothing turns");
   for (const std::string& words : undetermined_at_rest(*d.rest, d)) {
@@ -312,6 +341,10 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
     return free ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
                   "acceleration"
                 : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
+  }
+  constexpr double shortest_s = 20.0;  // find_poses
+  if (nothing_else && d.duration_s < shortest_s) {
+    return "less than 20 s: too short to tell rest from motion";
   }
   if (nothing_else && input.sensors != Sensors::gyros && d.steady_turns == 0) {
     return "the sensor nowhere rests for a second: neither gravity nor rest is a reference";

@@ -152,7 +152,9 @@ std::vector<std::string> undetermined_at_rest(const Rest& rest, const PoseDiagno
   if (d.sensors == Sensors::both) {
     all.emplace_back("scale factors, misalignment: six poses and turns between them");
     all.emplace_back("bias of the accelerometers: where gravity points in them is not known");
-    all.push_back(of_gyros(rest));
+    if (!d.earth_taken_out) {
+      all.push_back(of_gyros(rest));
+    }
   }
   if (names(rest, false, true) || names(rest, false, false)) {
     all.emplace_back("drift of accelerometers or tilt of the base: 1 mg is 0.057 deg");

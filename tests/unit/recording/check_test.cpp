@@ -74,6 +74,18 @@ TEST(CheckRecording, GapIsNamedAndMayBeLetPass) {
   EXPECT_THAT(*lenient, ::testing::ElementsAre(HasSubstr("row 500")));
 }
 
+// Switched off for twice as long as it was on: its rate is what it was before and behind.
+TEST(CheckRecording, ALongGapDoesNotChangeTheRate) {
+  Recording r = sample_recording();
+  const double length_s = r.time_s.back();
+  for (std::size_t row = 500; row < r.size(); ++row) {
+    r.time_s[row] += 2.0 * length_s;
+  }
+  const auto lenient = check_recording(r, {.gaps_are_errors = false});
+  ASSERT_TRUE(lenient) << lenient.error().message;
+  EXPECT_THAT(*lenient, ::testing::ElementsAre(HasSubstr("row 500")));
+}
+
 TEST(CheckRecording, JitterOfATenthIsNoGap) {
   Recording r = sample_recording();
   for (std::size_t row = 0; row < r.size(); row += 2) {

@@ -33,7 +33,8 @@ function showCalibration(report) {
   // A part that the document does not allow says so, and the others stand.
   whenBroken = (error) => document.querySelector('main').append(
       element('p', {class: 'bad missing-part'}, `A part of this page is missing, for the document lacks what it needs: ${error.message}`));
-  later(() => ({calibration: showCalibration, plan: showPlan, fleet: showFleet, investigation: showInvestigation, overlay: showOverlay})[report.kind](report));
+  later(() => ({calibration: showCalibration, plan: showPlan, fleet: showFleet, investigation: showInvestigation, overlay: showOverlay,
+                poses: showPoses})[report.kind](report));
   setPaperMargins(report);
   workOn();
   document.getElementById('save-json').addEventListener(

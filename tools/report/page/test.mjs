@@ -2,7 +2,7 @@
 // KIND calibration: EXPECTED is what `selfcal estimate --json` said of the same recording; run: the saved run;
 // failed: a saved run without a result, whose recording is gone; replaced: a saved run whose set is no longer in force;
 // creep: `selfcal diagnose --json` of the same recording, in which an effect is named; law: the same where an equation was found that
-// no catalogue holds; unexplained: the same with nothing named (alter_page.py); plan: `selfcal plan --json`; fleet: an array of the saved histories; investigation: the saved
+// no catalogue holds; unexplained: the same with nothing named (alter_page.py); plan: `selfcal plan --json`; poses: `selfcal poses --json`; fleet: an array of the saved histories; investigation: the saved
 // story; hostile, thin: any JSON, the
 // page being alter_page.py's. With "not-" before it the page must fail, as it holds other numbers. One line for each failure; status 1.
 // SELFCAL_PICTURES: a folder for screenshots at 1400 and 800 px and the PDF of each page.
@@ -86,6 +86,7 @@ const wanted = {
   plan: ['timeline-0', 'timeline-1', 'sphere-0', 'sphere-1', 'forecast-accel_bias_x', 'forecast-gyro_misalignment_zy'],
   fleet: ['trend-accel_bias_x', 'trend-gyro_misalignment_zy'],
   investigation: ['rotation-1'],
+  poses: ['rest-gyros', 'rest-accelerometers'],
   overlay: ['overlay-spectrum-0', 'overlay-allan-5', 'overlay-correlation-north', 'overlay-sizes', 'overlay-histogram'],
 };
 
@@ -438,6 +439,20 @@ async function check_overlay(page) {
   }
 }
 
+// Every axis with its mean as the program said it, the verdict, and each line of what the log does not show.
+async function check_poses(page) {
+  const rows = await page.$$eval('#rest-axes tbody tr', (lines) => lines.map((line) => [...line.cells].map((cell) => cell.textContent)));
+  expect(rows.length === expected.rest.axes.length, `${rows.length} axes of ${expected.rest.axes.length}`);
+  for (const [k, axis] of expected.rest.axes.entries()) {
+    const [name, mean] = rows[k] ?? [];
+    const [value, sigma] = (mean ?? '').split(' ± ').map((part) => Number.parseFloat(part.replace('−', '-')));
+    expect(name === `${axis.sensor} ${axis.axis}` && Math.abs(value - axis.mean.value) <= axis.mean.sigma && Math.abs(sigma / axis.mean.sigma - 1) < 0.1,
+           `${name}: ${mean} on the page, ${axis.mean.value} +- ${axis.mean.sigma} said`);
+  }
+  expect((await page.textContent('#verdict')).includes(expected.summary.verdict), 'the verdict is not that of the document');
+  expect((await page.$$('#unseen-list li')).length === expected.invisible.length, 'not all that is not shown');
+}
+
 // At the foot of every sheet: program and version, hash of the recording, date, number of the sheet and of all.
 async function check_sheets(page, where) {
   const boxes = await page.evaluate(() => Object.fromEntries([...document.getElementById('paper-margins').sheet.cssRules]
@@ -491,7 +506,7 @@ async function check_page(browser, page_file) {
     if (width === 1400) {
       await {calibration: check_estimate, run: check_run, failed: check_failed, replaced: check_replaced, creep: check_creep, law: check_law,
              unexplained: check_unexplained, plan: check_plan, fleet: check_fleet, investigation: check_investigation,
-             overlay: check_overlay}[kind](page);
+             overlay: check_overlay, poses: check_poses}[kind](page);
       if (kind === 'calibration') {
         await check_keyboard(page);
         await check_saving(page, 'nis');
