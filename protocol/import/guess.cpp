@@ -485,15 +485,13 @@ Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& know
     return fail(ErrorKind::bad_input, fmt::format("{}: {} lines of numbers; at least {} are needed to judge by", file,
                                                   data->rows, fewest_rows));
   }
-  const std::size_t rows = data->rows;
   constexpr double most_lost = 0.01;  // beyond it a column is no sensor's
   LeftOutRows lost = rows_to_leave_out(*data, most_lost);
   leave_out(lost.rows, *data);
-  const bool left_out = data->left_out;
   Guess guess = Guesser(source, knowledge, std::move(data->values), std::move(lost)).guess();
-  if (left_out) {
-    guess.remarks.insert(guess.remarks.begin(),
-                         Remark{"columns", fmt::format("judged by the first {} rows", rows), false});
+  if (data->left_out) {
+    const std::string words = fmt::format("judged by the first {} rows", request.most_rows);
+    guess.remarks.insert(guess.remarks.begin(), Remark{"columns", words, false});
   }
   return guess;
 }

@@ -23,7 +23,9 @@ PoseInput headings(const Vector3& bias, int count) {
   input.latitude = latitude;
   std::mt19937 random(6);
   std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) -> Vector3 { return sigma * Vector3(normal(random), normal(random), normal(random)); };
+  const auto noise = [&](double sigma) -> Vector3 {
+    return sigma * Vector3(normal(random), normal(random), normal(random));
+  };
   double heading = 0.3;
   const auto sample = [&](double rate) {
     heading += rate * dt;
