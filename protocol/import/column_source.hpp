@@ -54,6 +54,12 @@ class ColumnSource {
   // Errors (bad_input) name file, line or row, column, value, and what was expected.
   virtual Expected<ColumnData> read(const ColumnRequest& request) const = 0;
 
+  // Of a text: the words that stand in a column instead of numbers, where two to eight of them take turns in the first rows: rows of several
+  // sensors, one under another. Empty: none.
+  virtual std::vector<std::string> labels(std::size_t /*column*/) const { return {}; }
+  // Words on the first column with such labels; empty: none.
+  std::string mixed_rows() const;
+
   // "column 3 (gx)"
   std::string title(std::size_t column) const;
 };

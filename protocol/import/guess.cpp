@@ -351,9 +351,7 @@ class Guesser {
       const char* why = !interval_s_ ? "the sample rate is not known" : "no turn that shows it";
       // "gyro_rad" of PX4 is a rate, other people's are increments.
       const bool angle = claimed && gyro.increments && !said.increments;
-      if (angle) {
-        why = "increments, or so much a second; no turn shows which";
-      }
+      why = angle ? "increments, or so much a second; no turn shows which" : why;
       return claimed && interval_s_ && !angle
                  ? say("gyro.unit", fmt::format("{} by its name; {}", gyro.unit, why))
                  : doubt("gyro.unit",
@@ -465,6 +463,9 @@ class Guesser {
 
 Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& knowledge, const std::string& file) {
   const std::size_t columns = source.names().size();
+  if (const std::string mixed = source.mixed_rows(); !mixed.empty()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, mixed));
+  }
   if (columns < fewest_columns) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: {}: {} columns; three gyros and three accelerometers are expected: a recording "
@@ -477,20 +478,19 @@ Expected<Guess> guess_map(const ColumnSource& source, const GuessKnowledge& know
   std::iota(request.columns.begin(), request.columns.end(), std::size_t{0});
   request.most_rows = most_numbers / columns;
   Expected<ColumnData> data = source.read(request);
+  constexpr std::size_t fewest_rows = 200;
   if (!data) {
     return tl::unexpected(data.error());
   }
-  constexpr std::size_t fewest_rows = 200;
   if (data->rows < fewest_rows) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {} lines of numbers; at least {} are needed to judge by", file,
-                                                  data->rows, fewest_rows));
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {} lines of numbers; {} are needed to judge by", file, data->rows, fewest_rows));
   }
-  constexpr double most_lost = 0.01;  // beyond it a column is no sensor's
-  LeftOutRows lost = rows_to_leave_out(*data, most_lost);
+  LeftOutRows lost = rows_to_leave_out(*data, 0.01);  // a column that lacks more is no sensor's
   leave_out(lost.rows, *data);
   Guess guess = Guesser(source, knowledge, std::move(data->values), std::move(lost)).guess();
   if (data->left_out) {
-    const std::string words = fmt::format("judged by the first {} rows", request.most_rows);
+    const std::string words = fmt::format("judged by {} rows", request.most_rows);
     guess.remarks.insert(guess.remarks.begin(), Remark{"columns", words, false});
   }
   return guess;

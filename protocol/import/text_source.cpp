@@ -1,6 +1,7 @@
 #include "protocol/import/text_source.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -71,6 +72,8 @@ class TextSource final : public ColumnSource {
                        dialect_.header_line > 0 ? fmt::format("names in line {}", dialect_.header_line) : "no names");
   }
   Expected<ColumnData> read(const ColumnRequest& request) const override;
+
+  std::vector<std::string> labels(std::size_t column) const override;
 
   // Names, units and the number of columns, from the head of the file.
   Expected<void> read_head();
@@ -198,6 +201,33 @@ Expected<ColumnData> TextSource::read(const ColumnRequest& request) const {
   return data;
 }
 
+std::vector<std::string> TextSource::labels(std::size_t column) const {
+  Expected<LineReader> reader = LineReader::open(file_);
+  std::vector<std::string> found;
+  std::string_view line;
+  std::vector<std::string_view> fields;
+  constexpr std::size_t most = 8;
+  for (std::size_t row = 0; reader && row < lines_to_judge && found.size() <= most;) {
+    const Expected<bool> more = reader->next(line);
+    if (!more || !*more) {
+      break;
+    }
+    if (reader->number() < dialect_.first_line || passed_over(trimmed(line))) {
+      continue;
+    }
+    ++row;
+    split_fields(line, dialect_.separator, fields);
+    if (column >= fields.size() || fields[column].empty() || number_of(fields[column], dialect_.decimal) ||
+        date_of(fields[column])) {
+      return {};
+    }
+    if (std::find(found.begin(), found.end(), fields[column]) == found.end()) {
+      found.emplace_back(fields[column]);
+    }
+  }
+  return found.size() < 2 || found.size() > most ? std::vector<std::string>{} : as_utf8(found);
+}
+
 // Dialect that the head of the file shows.
 Expected<TextDialect> judged_dialect(const std::filesystem::path& file) {
   Expected<LineReader> reader = LineReader::open(file);
@@ -246,6 +276,16 @@ std::string ColumnData::place(std::size_t row) const {
     ahead = first <= row ? by : ahead;
   }
   return fmt::format("line {}", row + ahead);
+}
+
+std::string ColumnSource::mixed_rows() const {
+  for (std::size_t column = 0; column < names().size(); ++column) {
+    if (const std::vector<std::string> words = labels(column); !words.empty()) {
+      return fmt::format("rows of several sensors, which {} tells apart: {}: a file for each is read (grep makes them)",
+                         title(column), fmt::join(words, ", "));
+    }
+  }
+  return {};
 }
 
 std::string ColumnSource::title(std::size_t column) const {

@@ -45,6 +45,8 @@ def phone_files(folder, rng):
         stamps = 1709164800123456789 + numpy.round((t + behind) * 1e9).astype(numpy.int64)
         write(folder / f"{name}.csv", ["time", "seconds_elapsed", "z", "y", "x"], [stamps, t + behind, values[:, 2], values[:, 1], values[:, 0]],
               ["%d", "%.9f"] + ["%.7f"] * 3)
+    rows = sorted([(x, "ACC", *v) for x, v in zip(t, force)] + [(x + 0.0041, "GYR", *v) for x, v in zip(t, rate)])
+    write(folder / "mixed.csv", ["time_s", "sensor", "x", "y", "z"], list(zip(*rows)), ["%.4f", "%s"] + ["%.7f"] * 3)
     return {"g": g, "a": a}
 
 

@@ -147,6 +147,9 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: {}: {} columns, {} are needed", file, source.form(), named.size(), told));
   }
+  if (const std::string mixed = source.mixed_rows(); !mixed.empty()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, mixed));
+  }
   Triads gyro = triads_of(named, Role::gyro), accel = triads_of(named, Role::accelerometer);
   const Sensors sensors = columns.sensors.value_or(Sensors::both);
   // "x", "y", "z" of a phone's file of one sensor.

@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -86,17 +87,18 @@ std::vector<std::size_t> find_gaps(const PoseInput& input) {
   return gaps;
 }
 
-std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses) {
-  if (input.sensors == Sensors::gyros || input.accel_unit > 0.0 || poses.size() < 3) {
+std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model) {
+  if (model.nominal) {
     return {};
   }
-  Vector3 low = poses.front().accel, high = low;
-  for (const Pose& p : poses) {
-    low = low.cwiseMin(p.accel);
-    high = high.cwiseMax(p.accel);
+  // What is left of gravity by a phone's own calibration lies on an ellipsoid, and counts of one sensor's axes are of one kind.
+  constexpr double most_unlike = 1.3;
+  const Vector3 per_g = model.T.diagonal().cwiseInverse().cwiseAbs();
+  if (per_g.maxCoeff() > most_unlike * per_g.minCoeff() && !model.held.any()) {
+    return "the three accelerometers read 1 g as numbers that differ by more than 30 %: gravity is not what they read, "
+           "as "
+           "in a phone's linear acceleration";
   }
-  const double at_rest = std::max(poses.front().accel.norm(), 0.5 * (high - low).maxCoeff());
-  const Vector3 centre = 0.5 * (low + high);
   std::vector<double> moving;
   std::size_t next = 0;
   for (std::size_t i = 0; i < input.time_s.size(); ++i) {
@@ -104,23 +106,24 @@ std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses
       ++next;
     }
     if (next == poses.size() || i < poses[next].first) {
-      moving.push_back((at(input.accel, i) - centre).norm());
+      moving.push_back(model.direction(at(input.accel, i)).norm());
     }
   }
-  constexpr double share = 0.02, most = 6.0;  // a hand turns a sensor at 0.5 to 3 g
+  constexpr double share = 0.02, most = 2.5;  // a hand turns a sensor at 0.5 to 1.5 g, most of the time
   if (static_cast<double>(moving.size()) < share * static_cast<double>(input.time_s.size())) {
     return {};
   }
-  const double times = median(moving) / std::max(at_rest, 1e-300);
+  const double times = median(moving);
   if (times < most) {
     return {};
   }
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "the accelerometers read %.0f times as much while the sensor moves as at rest: gravity is not in them, "
-                "as in a phone's linear acceleration",
-                times);
-  return text;
+  std::array<char, 200> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      "the accelerometers read %.0f times as much while the sensor moves as at rest: gravity is not what they "
+      "read, as in a phone's linear acceleration",
+      times);
+  return text.data();
 }
 
 }  // namespace selfcal::diagnosis

@@ -19,8 +19,8 @@ std::vector<double> drop_other_forces(const PoseInput& input, std::vector<Pose>&
 // Samples that lack: an interval of more than half a second, and of ten usual ones, ends at these.
 std::vector<std::size_t> find_gaps(const PoseInput& input);
 
-// Why gravity does not stand in these poses of accelerometers in a unit that nobody says, in words, where it does not: what the accelerometers read while the sensor moves is many times
-// what they read in poses, as of a phone's acceleration less gravity. Empty: it may.
-std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses);
+// Why gravity does not stand in these poses of accelerometers in a unit that nobody says, in words, where it does not: what they read
+// while the sensor moves is many times what the fitted model takes for gravity. Empty: it may.
+std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model);
 
 }  // namespace selfcal::diagnosis

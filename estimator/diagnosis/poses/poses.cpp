@@ -137,7 +137,7 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
 }
 
 // Forces of all sizes at rest: what the poses stand in is not gravity, and no parameter of the accelerometers follows from it.
-bool have_one_size(const std::vector<Pose>& poses, PoseDiagnosis& d) {
+bool read_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, PoseDiagnosis& d) {
   constexpr double most = 0.03;  // of the mean, rms, beside bias, scale factor and misalignment
   double sum = 0.0, square = 0.0;
   for (const Pose& p : poses) {
@@ -147,7 +147,8 @@ bool have_one_size(const std::vector<Pose>& poses, PoseDiagnosis& d) {
   const auto n = static_cast<double>(poses.size());
   const double mean = sum / n, scatter = std::sqrt(std::max(0.0, square / n - mean * mean)) / mean;
   if (scatter < most) {
-    return true;
+    d.failure = lacks_gravity(input, poses, accel);
+    return d.failure.empty();
   }
   d.failure = with_numbers(
       "at rest the accelerometers read forces that differ by %.0f %% rms beside bias, scale factor and "
@@ -159,7 +160,7 @@ bool have_one_size(const std::vector<Pose>& poses, PoseDiagnosis& d) {
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
-  if (!have_one_size(poses, d)) {
+  if (!read_gravity(input, poses, accel, d)) {
     return;
   }
   const std::vector<std::size_t> turns = usable_turns(input, poses, d);
@@ -301,8 +302,8 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
     return;
   }
   if (d.by_poses) {
-    calibrate(input, alpha, poses, d);
-    if (!have_one_size(poses, d)) {
+    const AccelModel accel = calibrate(input, alpha, poses, d);
+    if (!read_gravity(input, poses, accel, d)) {
       return;
     }
     d.supports.push_back("gravity in " + std::to_string(d.poses) + " poses: accelerometers");
@@ -349,7 +350,7 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
   if (nothing_else && input.sensors != Sensors::gyros && d.steady_turns == 0) {
     return "the sensor nowhere rests for a second: neither gravity nor rest is a reference";
   }
-  return lacks_gravity(input, poses);
+  return {};
 }
 
 void add_other_forces(PoseDiagnosis& d) {

