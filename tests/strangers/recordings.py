@@ -63,6 +63,16 @@ def increments(path, rng):
     return g, a, {}
 
 
+def faces_of_nowhere(path, rng):
+    """Nine faces by hand, fibre gyros, a log that says no place: the Earth's rate goes with the pose as a g-sensitivity would."""
+    g, a = fibre(rng)
+    faces = ("+z", "+x", "-z", "-x", "+y", "-y", "+z", "+y", "-x")
+    t, f, w = moved(100.0, [(tilted(UP[face], rng, 0.5 * DEG), 60.0, 6.0) for face in faces], rng, tremor=0.01)
+    write(path, ["t_s", "gx_dps", "gy_dps", "gz_dps", "ax_g", "ay_g", "az_g"],
+          [t, *of(g.read(w, 100.0, rng), DEG), *of(a.read(f, 100.0, rng), G0)], ["%.3f"] + ["%.8f"] * 3 + ["%.7f"] * 3)
+    return g, a, {}
+
+
 def headings(path, rng):
     """Four headings a quarter of a turn apart on a level plate, fibre gyros: 10 deg/h of the Earth in gyros that are good to 0.1."""
     g, a = fibre(rng)

@@ -139,6 +139,10 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
           "not seen;\n"
           "    the same poses once more, just switched on, would tell\n";
     }
+    if (e.may_be_earth) {
+      text +=
+          "    or the Earth's rate, which is not taken out: no latitude, no heading through all turns, or not seen\n";
+    }
     if (!e.equivalent.empty()) {
       text += "    these poses do not tell them apart; the same poses once more in another order do\n";
     }

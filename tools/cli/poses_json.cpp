@@ -28,6 +28,7 @@ Json to_json(const std::vector<diagnosis::PoseEffect>& effects) {
     }
     j["equivalent"] = ids(e.equivalent);
     j["may_be_flicker"] = e.may_be_flicker;
+    j["may_be_earth"] = e.may_be_earth;
     if (!std::isnan(e.constant)) {
       j["constant"] = e.constant;
     }
@@ -155,6 +156,9 @@ std::string rivals_of(const diagnosis::PoseDiagnosis& d) {
     if (e.may_be_flicker) {
       all.emplace_back("a bias that wanders by itself");
     }
+    if (e.may_be_earth) {
+      all.emplace_back("the Earth's rate");
+    }
   }
   return all.empty() ? std::string() : fmt::format("Or as well {}.", fmt::join(all, ", "));
 }
@@ -240,6 +244,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"bias_sigma", held(d.gyro_bias_sigma, d.gyro_axes)},
             {"jumps", to_json(d.gyro_jumps)},
             {"earth_taken_out", d.earth_taken_out},
+            {"latitude_seen_deg", d.latitude_seen ? Json(*d.latitude_seen / units::degree) : Json()},
             {"accelerometers_reversed", d.accel_reversed},
             {"held_out_rms", d.gyro_held_out_rms},
             {"white_rms", d.gyro_white_rms},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "daemon/estimate/quantity_text.hpp"
 #include "tools/cli/poses_output.hpp"
@@ -88,6 +89,9 @@ std::string effect_line(const PoseEffect& e, double unit, const std::string& uni
   if (e.may_be_flicker) {
     rivals.emplace_back("a bias that wanders by itself");
   }
+  if (e.may_be_earth) {
+    rivals.emplace_back("the Earth's rate, with --latitude and all turns it would show");
+  }
   if (!rivals.empty()) {
     words += fmt::format("; or as well {}", fmt::join(rivals, ", "));
   }
@@ -127,7 +131,7 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
   if (text.empty() && d.by_poses) {
     text = d.accel_tested || d.sensors == Sensors::accelerometers
                ? "nothing named beyond bias, scale factor and misalignment\n"
-               : "nothing named; fewer than 12 poses: nonlinearity not tested\n";
+               : "nothing named; nonlinearity of the accelerometers is not tested by these poses\n";
   }
   return text;
 }
@@ -242,6 +246,16 @@ Row gyro_row(const char* what, const std::array<double, 3>& value, const std::ar
   return row;
 }
 
+// Gyros that see the Earth are told in degrees an hour.
+Units of_headings(bool si) {
+  Units shown = units_of(si);
+  if (si) {
+    shown.gyro = units::degree_per_hour;
+    shown.gyro_name = shown.gyro_short = "deg/h";
+  }
+  return shown;
+}
+
 std::string table(const PoseDiagnosis& d, const Units& shown) {
   std::vector<Row> rows = {{"", {"x", "y", "z"}}};
   const bool raw_scale = std::any_of(d.accel_parameters.begin(), d.accel_parameters.end(),
@@ -256,7 +270,9 @@ std::string table(const PoseDiagnosis& d, const Units& shown) {
   add_row(d.accel_parameters, "accel. xy xz yz", {"misalignment_xy", "misalignment_xz", "misalignment_yz"}, "%",
           percent, rows);
   if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0) {
-    rows.push_back(gyro_row(d.earth_taken_out ? "bias" : "mean", d.gyro_bias, d.gyro_bias_sigma, shown, d.gyro_axes));
+    const bool si = std::string_view(shown.gyro_short) == "deg/s";
+    rows.push_back(gyro_row(d.earth_taken_out ? "bias" : "mean", d.gyro_bias, d.gyro_bias_sigma,
+                            d.earth_taken_out ? of_headings(si) : shown, d.gyro_axes));
   }
   add_row(d.gyro_parameters, "gyro scale", of_axes("scale"), "%", percent, rows);
   return rows.size() > 1 ? text_of(rows) : std::string();
@@ -276,10 +292,18 @@ std::string open_parameters(const PoseDiagnosis& d) {
   return all.empty() ? std::string() : wrapped("not determined by these poses:", all, ",");
 }
 
-std::string turns_line(const PoseDiagnosis& d) {
+std::string turns_words(const PoseDiagnosis& d) {
   return d.turns == 0
              ? std::string()
              : fmt::format("turns carry gravity's direction to {:.2f} deg rms\n", d.direction_after / units::degree);
+}
+
+std::string turns_line(const PoseDiagnosis& d) {
+  const std::string earth = d.latitude_seen
+                                ? fmt::format("the gyros see the Earth's rate: latitude {:.0f} deg by it, taken out\n",
+                                              *d.latitude_seen / units::degree)
+                                : std::string();
+  return earth + turns_words(d);
 }
 
 std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
@@ -323,16 +347,6 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
         {{"", {"x", "y", "z"}}, gyro_row("bias", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {true, true, true})});
   }
   return text;
-}
-
-// Gyros that see the Earth are told in degrees an hour.
-Units of_headings(bool si) {
-  Units shown = units_of(si);
-  if (si) {
-    shown.gyro = units::degree_per_hour;
-    shown.gyro_name = shown.gyro_short = "deg/h";
-  }
-  return shown;
 }
 
 // What such a log cannot show: each before its colon.

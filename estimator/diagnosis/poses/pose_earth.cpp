@@ -1,5 +1,7 @@
 #include "estimator/diagnosis/poses/pose_earth.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "estimator/geometry/earth.hpp"
@@ -46,11 +48,11 @@ struct Heading {
   double angle = 0.0, with = HUGE_VAL, without = 0.0;
 };
 Heading find_heading(const std::vector<Pose>& poses, const std::vector<Vector3>& reading,
-                     const std::vector<Vector3>& first, const std::vector<Vector3>& second, double rate) {
+                     const std::vector<Vector3>& first, const std::vector<Vector3>& second, double rate,
+                     int steps = 3600) {
   const Eigen::MatrixX3d y = projected(reading, poses), a = projected(first, poses), b = projected(second, poses);
   Heading best;
   best.without = y.squaredNorm();
-  constexpr int steps = 3600;
   for (int k = 0; k < steps; ++k) {
     const double angle = 2.0 * M_PI * k / steps;
     const double square = (y - rate * (std::cos(angle) * a + std::sin(angle) * b)).squaredNorm();
@@ -62,13 +64,72 @@ Heading find_heading(const std::vector<Pose>& poses, const std::vector<Vector3>&
   return best;
 }
 
+// Where nobody says the latitude the Earth still turns at 15.04 deg/h: the likeliest latitude and heading, where they are likelier than no Earth
+// by e^8 and than the other hemisphere by e^6. A vertical part that is the same in all poses stands with the bias.
+EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pose>& poses) {
+  EarthInPoses earth;
+  earth.rate.assign(poses.size(), Vector3::Zero());
+  const std::vector<Vector3> first = carried_direction(input, poses);
+  std::vector<Vector3> second, plain;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    second.emplace_back(poses[k].u.normalized().cross(first[k]));
+    plain.push_back(poses[k].gyro);
+  }
+  const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;
+  Heading best;
+  double latitude = 0.0;
+  std::array<double, 2> of_hemisphere = {HUGE_VAL, HUGE_VAL};
+  const auto try_at = [&](double angle) {
+    constexpr int headings = 360;
+    std::vector<Vector3> reading = plain;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      reading[i] -= omega * std::sin(angle) * poses[i].u.normalized();
+    }
+    const Heading found = find_heading(poses, reading, first, second, omega * std::cos(angle), headings);
+    double& hemisphere = of_hemisphere.at(angle < 0.0 ? 1 : 0);
+    hemisphere = std::min(hemisphere, found.with);
+    if (found.with < best.with) {
+      best = found;
+      latitude = angle;
+    }
+  };
+  constexpr int degrees = 90, apart = 2, tenths = 20;
+  for (int k = -degrees; k <= degrees; k += apart) {
+    try_at(k * units::degree);
+  }
+  const double coarse = latitude;
+  for (int k = -tenths; k <= tenths; ++k) {
+    try_at(coarse + 0.1 * k * units::degree);
+  }
+  const double free = 3.0 * static_cast<double>(poses.size() - 1);
+  const auto likelier = [free](double than, double with) {
+    return 0.5 * free * std::log(than / std::max(1e-300, with));
+  };
+  constexpr double than_none = 8.0, than_other = 6.0;
+  earth.heading = likelier(projected(plain, poses).squaredNorm(), best.with) > than_none &&
+                  likelier(std::max(of_hemisphere[0], of_hemisphere[1]), best.with) > than_other;
+  if (!earth.heading) {
+    return earth;
+  }
+  earth.latitude = latitude;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vector3 level = std::cos(best.angle) * first[k] + std::sin(best.angle) * second[k];
+    earth.rate[k] = omega * (std::sin(latitude) * poses[k].u.normalized() + std::cos(latitude) * level);
+  }
+  return earth;
+}
+
 }  // namespace
 
 EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
   EarthInPoses earth;
   earth.rate.assign(poses.size(), Vector3::Zero());
-  if (!input.latitude || input.sensors != Sensors::both) {
+  if (input.sensors != Sensors::both || (!input.latitude && !input.gyros_si)) {
     return earth;
+  }
+  constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
+  if (!input.latitude) {
+    return carried && poses.size() > enough ? earth_of_any_latitude(input, poses) : earth;
   }
   const Vector3 omega_n = earth::omega_ie_n(*input.latitude) / input.gyro_unit;  // north, up, east
   const auto less_vertical = [&](double up) {
@@ -84,7 +145,6 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
       earth.rate[k] = up * poses[k].u.normalized();
     }
   };
-  constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
   if (!carried || poses.size() < enough) {
     take(omega_n.y());
     return earth;

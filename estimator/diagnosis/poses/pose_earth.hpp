@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
@@ -12,6 +13,7 @@ struct EarthInPoses {
   std::vector<Vector3> rate;  // of each pose, sensor axes, raw units; zero where the latitude is not known
   bool reversed =
       false;  // whether it turns the other way about u: accelerometers that read acceleration, no specific force
+  std::optional<double> latitude;  // rad: as the readings show it where nobody says it
   bool heading = false;  // whether the readings show the heading: likelier by e^6 than without a horizontal part
 };
 

@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 #include "estimator/diagnosis/poses/read_outs.hpp"
 #include "estimator/geometry/angles.hpp"
+#include "estimator/geometry/earth.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -128,6 +129,7 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   const bool carried = usable.size() + 1 == poses.size();
   const EarthInPoses earth = earth_in_poses(input, poses, carried);
   d.earth_taken_out = earth.heading;
+  d.latitude_seen = earth.latitude;
   d.accel_reversed = earth.reversed;
   std::vector<Pose> still = poses;
   for (std::size_t k = 0; k < still.size(); ++k) {
@@ -157,6 +159,22 @@ bool read_gravity(const PoseInput& input, const std::vector<Pose>& poses, const 
   return false;
 }
 
+// The Earth's rate is fixed in the room, and a sensor that is turned by hand sees it go with the pose: within 15.04 deg/h and its sigma.
+void mark_earth(const PoseInput& input, PoseDiagnosis& d) {
+  if (d.earth_taken_out || !input.gyros_si) {
+    return;
+  }
+  const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;
+  constexpr double sure = 3.0;
+  for (PoseEffect& e : d.gyro_named) {
+    bool within = e.effect->linear_in_force;
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      within = within && std::abs(e.value[k]) - sure * e.sigma[k] < omega;
+    }
+    e.may_be_earth = within;
+  }
+}
+
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
@@ -166,6 +184,7 @@ void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses,
   const std::vector<std::size_t> turns = usable_turns(input, poses, d);
   judge_gyros(input, without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(),
               d.has_temperature, 0.5 * alpha, d);
+  mark_earth(input, d);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
   judge_turns(input, poses, turns, accel, linear, d);
@@ -236,7 +255,7 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
   if (!d.rest) {
     return;
   }
-  if (poses.size() > 1 && input.gyros_si) {
+  if (poses.size() > 1 && input.gyros_si && input.latitude) {
     add_bias_by_headings(input, poses, d);
   }
   d.supports.push_back("rest in " + counted(d.poses, "pose") + ": noise, means, and what changes while nothing turns");

@@ -46,6 +46,8 @@ struct PoseEffect {
   std::vector<const Effect*> equivalent;  // explain the poses as well: the order of the poses does not tell them apart
   // Of what changes with time: the same test beside a 1/f noise as large as the halves of the poses show, corrected likewise; else `log_p`.
   double log_p_beside_flicker = 0.0;
+  // Depends on the pose by no more than the Earth's rate does, which was not taken out: no heading, or no latitude.
+  bool may_be_earth = false;
   bool may_be_flicker = false;  // named, and not seen beside that noise
 };
 
@@ -162,7 +164,8 @@ struct PoseDiagnosis {
   // Gyros in the poses.
   std::array<double, 3> gyro_bias{}, gyro_bias_sigma{};  // raw units
   bool accel_reversed = false;  // whether the Earth's rate shows that all accelerometers are: it turns about their down
-  bool earth_taken_out = false;  // whether the Earth's rate was taken out of the gyros' means, heading included
+  std::optional<double> latitude_seen;  // rad, by the Earth's rate in the poses, where nobody says it
+  bool earth_taken_out = false;         // whether the Earth's rate was taken out of the gyros' means, heading included
   std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
   std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
   std::vector<BiasJump> gyro_jumps;           // beside which the effects are asked; empty: no gap, or none that shows

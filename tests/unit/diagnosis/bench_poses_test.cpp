@@ -91,10 +91,36 @@ TEST(BenchPoses, TheEarthsRateIsNoGSensitivity) {
               6.0 * d.gyro_bias_sigma[axis]);
     EXPECT_LT(d.gyro_bias_sigma[axis], 1.0 * units::degree_per_hour);
   }
-  b.input.latitude.reset();  // the negative control: 11 deg/h go with the pose
+  b.input.latitude.reset();  // its size is known everywhere
+  const PoseDiagnosis anywhere = diagnose_poses(b.input, 0.01);
+  EXPECT_TRUE(anywhere.gyro_named.empty());
+  EXPECT_TRUE(anywhere.earth_taken_out);
+  ASSERT_TRUE(anywhere.latitude_seen);
+  EXPECT_NEAR(*anywhere.latitude_seen, latitude, 3.0 * units::degree);  // 1 deg/h beside 15
+  b.input.gyros_si = false;  // the negative control: 11 deg/h go with the pose
   const PoseDiagnosis unknown = diagnose_poses(b.input, 0.01);
   EXPECT_FALSE(unknown.earth_taken_out);
   EXPECT_GT(unknown.gyro_bias_sigma[0], 10.0 * d.gyro_bias_sigma[0]);
+}
+
+// One turn was left out, so that no heading is known through it: what depends on the pose within 15 deg/h is told with the Earth's rate as its rival.
+TEST(BenchPoses, WithoutAHeadingTheEarthsRateIsARival) {
+  Bench b = navigation_grade(1);
+  b.G = 9.0 * units::degree_per_hour * Matrix3{{0.0, 1.0, 1.0}, {1.0, 0.0, -1.0}, {-1.0, 1.0, 0.0}};
+  for (int k = 0; k < 30; ++k) {
+    b.turn_to(b.anywhere());
+    b.rest(20.0);
+  }
+  for (std::size_t i = b.input.time_s.size() / 2; i < b.input.time_s.size(); ++i) {
+    b.input.time_s[i] += 100.0;
+  }
+  b.input.latitude.reset();
+  const PoseDiagnosis d = diagnose_poses(b.input, 0.01);
+  EXPECT_FALSE(d.earth_taken_out);
+  EXPECT_FALSE(d.gyro_named.empty());
+  for (const PoseEffect& e : d.gyro_named) {
+    EXPECT_TRUE(e.may_be_earth || !e.effect->linear_in_force) << e.effect->id;
+  }
 }
 
 // As of a log in which an axis that points up reads -g: the bias of the gyros is the same, and the reason is said.
