@@ -206,8 +206,10 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
   std::vector<std::string> found;
   std::string_view line;
   std::vector<std::string_view> fields;
-  constexpr std::size_t most = 8;
-  for (std::size_t row = 0; reader && row < lines_to_judge && found.size() <= most;) {
+  constexpr std::size_t most = 8, one_in = 4;  // a flag that changes now and then tells no rows apart
+  std::string before;
+  std::size_t changes = 0, row = 0;
+  while (reader && row < lines_to_judge && found.size() <= most) {
     const Expected<bool> more = reader->next(line);
     if (!more || !*more) {
       break;
@@ -221,11 +223,14 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
         date_of(fields[column])) {
       return {};
     }
+    changes += fields[column] != before ? 1 : 0;
+    before = fields[column];
     if (std::find(found.begin(), found.end(), fields[column]) == found.end()) {
       found.emplace_back(fields[column]);
     }
   }
-  return found.size() < 2 || found.size() > most ? std::vector<std::string>{} : as_utf8(found);
+  return found.size() < 2 || found.size() > most || one_in * changes < row ? std::vector<std::string>{}
+                                                                           : as_utf8(found);
 }
 
 // Dialect that the head of the file shows.

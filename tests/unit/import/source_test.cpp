@@ -50,6 +50,20 @@ class Source : public ::testing::Test {
   const test::TemporaryFolder folder_;
 };
 
+TEST_F(Source, RowsOfTwoSensorsAreToldFromAFlagThatChanges) {
+  std::string mixed = "time,sensor,x,y,z\n", flagged = mixed;
+  for (int k = 0; k < 200; ++k) {
+    mixed += fmt::format("{},{},1,2,3\n", 0.01 * k, k % 2 == 0 ? "ACC" : "GYR");
+    flagged += fmt::format("{},{},1,2,3\n", 0.01 * k, k < 150 ? "FIX" : "FLOAT");
+  }
+  const auto rows = open(mixed);
+  ASSERT_TRUE(rows);
+  EXPECT_THAT((*rows)->mixed_rows(), HasSubstr("column 2 (sensor) tells apart: ACC, GYR"));
+  const auto one = open(flagged);
+  ASSERT_TRUE(one);
+  EXPECT_EQ((*one)->mixed_rows(), "");
+}
+
 TEST_F(Source, NpyByRowsAndByColumns) {
   for (const bool fortran : {false, true}) {
     const auto source =
