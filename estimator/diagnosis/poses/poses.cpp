@@ -55,6 +55,12 @@ void add_noise(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagn
   d.poses = static_cast<int>(poses.size());
 }
 
+bool has_attitude(const PoseDiagnosis& d) { return d.by_attitude && d.by_attitude->failure.empty(); }
+
+std::string about_attitude(const PoseDiagnosis& d) {
+  return d.by_attitude && !d.by_attitude->failure.empty() ? "the attitude: " + d.by_attitude->failure + "; " : "";
+}
+
 constexpr double narrow_deg = 20.0;
 constexpr std::size_t least_poses = 6;  // biases and scale factors
 
@@ -198,6 +204,11 @@ void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses,
 }
 
 void add_read_outs(const PoseInput& input, PoseDiagnosis& d) {
+  if (has_attitude(d)) {
+    d.supports.emplace_back(d.by_attitude->gravity
+                                ? "an attitude: gyros that turn, accelerometers in poses, and its clock"
+                                : "an attitude: gyros that turn, and its clock");
+  }
   if (d.read_outs) {
     d.supports.emplace_back("angle read-outs: gyros that turn about the table's axes, and the table's clock");
   } else if (!input.outer.empty()) {
@@ -214,7 +225,7 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
     }
   }
   add_read_outs(input, d);
-  if (d.steady_turns > 0 && input.outer.empty()) {
+  if (d.steady_turns > 0 && input.outer.empty() && !has_attitude(d)) {
     d.invisible.push_back("scale factors by " + std::to_string(d.steady_turns) +
                           " stretches that turn steadily: the recording holds no angle of the table");
   }
@@ -264,7 +275,7 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
   }
   constexpr double most = 0.7;
   const double all = input.time_s.back() - input.time_s.front();
-  if (d.steady_turns == 0 && !d.read_outs && d.static_seconds < most * all) {
+  if (d.steady_turns == 0 && !d.read_outs && !has_attitude(d) && d.static_seconds < most * all) {
     d.invisible.push_back("what happens in " + std::to_string(std::lround(all - d.static_seconds)) + " of " +
                           std::to_string(std::lround(all)) +
                           " s: the sensor shakes or moves more than at rest there, and they are left out");
@@ -275,8 +286,9 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
 void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
   d.read_outs = judge_read_outs(input, poses, alpha);
   d.accel_adequate = true;
-  if (poses.empty() && !d.read_outs) {
-    d.failure = "gyros alone, that neither stand still nor turn with read-outs: nothing to hold them against";
+  if (poses.empty() && !d.read_outs && !has_attitude(d)) {
+    d.failure = about_attitude(d) +
+                "gyros alone, that neither stand still nor turn with read-outs: nothing to hold them against";
     return;
   }
   const auto n = static_cast<double>(poses.size());
@@ -307,7 +319,7 @@ void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<P
   d.invisible.emplace_back(
       "the Earth's rate apart from the bias, gyro_g_sensitivity, how the axes lie: no accelerometer says where down "
       "is");
-  if (!d.read_outs) {
+  if (!d.read_outs && !has_attitude(d)) {
     d.invisible.emplace_back(
         "scale factors and misalignment of the gyros: neither angle read-outs nor gravity say how far a turn went");
   }
@@ -354,7 +366,7 @@ std::string other_forces_words(const PoseDiagnosis& d) {
 // Why nothing is left to hold the log against; empty: something is, or it is judged by what else there is.
 std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d) {
   constexpr double weightless = 0.3;  // g
-  const bool nothing_else = poses.empty() && input.outer.empty();
+  const bool nothing_else = poses.empty() && input.outer.empty() && !input.attitude;
   if (nothing_else && !d.other_forces.empty()) {
     const bool free =
         std::all_of(d.other_forces.begin(), d.other_forces.end(), [](double force) { return force < weightless; });
@@ -375,6 +387,13 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
 void add_other_forces(PoseDiagnosis& d) {
   if (!d.other_forces.empty()) {
     d.invisible.push_back("what " + other_forces_words(d) + " tell: steady acceleration, no pose");
+  }
+}
+
+// What the attitude leaves open is told with the rest.
+void add_open(PoseDiagnosis& d) {
+  if (has_attitude(d)) {
+    d.invisible.insert(d.invisible.end(), d.by_attitude->invisible.begin(), d.by_attitude->invisible.end());
   }
 }
 
@@ -411,8 +430,12 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     d.has_temperature = take_temperatures(input, poses);
   }
   d.by_poses = poses.size() >= least_poses && input.sensors != Sensors::gyros;
+  if (input.attitude && input.sensors != Sensors::accelerometers) {
+    d.by_attitude = judge_attitude(input, *input.attitude, poses);
+  }
   if (input.sensors == Sensors::gyros) {
     judge_gyros_alone(input, alpha, poses, d);
+    add_open(d);
     return d;
   }
   if (input.sensors == Sensors::accelerometers) {
@@ -425,8 +448,9 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   if (!d.by_poses) {
     add_rest(input, left, poses, d);
   }
-  if (!d.by_poses && !d.read_outs && !d.rest) {
-    d.failure = "fewer than 6 static poses: " + std::to_string(poses.size()) + ", and too little rest in them";
+  if (!d.by_poses && !d.read_outs && !d.rest && !has_attitude(d)) {
+    d.failure = about_attitude(d) + "fewer than 6 static poses: " + std::to_string(poses.size()) +
+                ", and too little rest in them";
     return d;
   }
   if (d.by_poses) {
@@ -439,6 +463,7 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     }
   }
   add_supports(input, d);
+  add_open(d);
   return d;
 }
 

@@ -1,9 +1,10 @@
 // Diagnosis of sensors without a visible Earth rate, turned by hand or by a table between static poses.
 //
-// Two references. Gravity: specific force has its size in every pose; gyros in a pose read their bias and what the pose does
+// Three references. Gravity: specific force has its size in every pose; gyros in a pose read their bias and what the pose does
 // to it; gyros integrated from one pose to the next must carry its direction along. Angle read-outs, where there are any:
-// what the gyros make of a turn, and how gravity turns in the sensor. Noise is what the poses scatter by, so that tests are
-// F tests, and effects of the pose are tested beside a random walk of the reading. Effects are the catalogue's.
+// what the gyros make of a turn, and how gravity turns in the sensor. An attitude that something else measured (attitude.hpp).
+// Noise is what the poses scatter by, so that tests are F tests, and effects of the pose are tested beside a random walk of the
+// reading. Effects are the catalogue's.
 #pragma once
 
 #include <array>
@@ -12,6 +13,8 @@
 #include <vector>
 
 #include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/poses/attitude.hpp"
+#include "estimator/diagnosis/poses/pose_parameter.hpp"
 #include "estimator/diagnosis/poses/rest.hpp"
 #include "estimator/geometry/rotation.hpp"
 
@@ -34,6 +37,7 @@ struct PoseInput {
   std::optional<double> latitude;                   // rad where it was recorded; none: not known
   std::vector<double> outer, inner;                 // angle read-outs, rad, of any whole turns; empty: none
   std::vector<double> temperature_c;                // empty: no channel
+  std::optional<ReferenceAttitude> attitude;
 };
 
 struct PoseEffect {
@@ -72,13 +76,6 @@ struct LeftOut {
   double first_s = 0.0, last_s = 0.0;  // since the start
   std::size_t samples = 0;
   std::string words;
-};
-
-// A parameter of the accelerometers or of the gyros with what the poses leave open.
-struct PoseParameter {
-  std::string name, unit;
-  double value = 0.0, sigma = 0.0;
-  bool determined = false;  // sigma less than half of what was assumed before
 };
 
 // Bias and scale of the accelerometers that settle after each turn: r_i exp(-s/tau), or in proportion to the change of
@@ -182,6 +179,7 @@ struct PoseDiagnosis {
   std::vector<double> other_forces;  // what quiet stretches read that are not at 1 g, g: no poses
   int moving = 0;                    // stretches as quiet as the log's quietest that move: no poses
   std::optional<ReadOuts> read_outs;
+  std::optional<ByAttitude> by_attitude;
   std::optional<Rest> rest;                        // of fewer poses than calibrate
   std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first
   std::string not_by_position;                     // why position at rest is no reference, if somebody asked
