@@ -4,6 +4,7 @@
 #include <array>
 #include <initializer_list>
 
+#include "protocol/import/guess_attitude.hpp"
 #include "protocol/import/text_dialect.hpp"
 #include "protocol/import/units.hpp"
 
@@ -385,6 +386,12 @@ std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const
   std::vector<NamedColumn> all;
   for (std::size_t k = 0; k < names.size(); ++k) {
     all.push_back(read_name(names[k], k < units.size() ? std::string_view(units[k]) : std::string_view{}));
+  }
+  // "rotation.x" beside "rotation.w" is no rate.
+  for (const AttitudeColumns& attitude : attitudes_by_name(names, units)) {
+    for (const std::size_t column : attitude.columns) {
+      all[column].role = attitude.form == AttitudeForm::angles ? all[column].role : Role::other;
+    }
   }
   return all;
 }
