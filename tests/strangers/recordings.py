@@ -1,6 +1,7 @@
 """Recordings as laboratories publish them: each writes a file in its maker's form, and returns the truth about it."""
 import numpy
 
+import attitudes
 from sensors import DEG, EARTH, G0, GRAVITY, UP, consumer, fibre, industrial, moved, tactical, turn
 
 FACES = ["+z", "-z", "+x", "-x", "+y", "-y"]
@@ -142,3 +143,54 @@ def turned_on(path, rng):
           [numpy.round(t * 1000), *of(numpy.round(force * 16384 / G0)), numpy.round(-600 * cold[:, 0] - 1500), *of(numpy.round(rate * 131 / DEG))],
           ["%d"] * 8)
     return g, a, truth
+
+
+def optical(path, rng):
+    """A MEMS of a phone's kind at 200 Hz in a hand, marked; beside it a tracker's file: 120 Hz, y up, 3 ms late, its clock 20 ppm fast, markers lost."""
+    g, a = consumer(rng)
+    hand = attitudes.Hand(rng, 16, 3.0, 3.0)
+    t = (numpy.arange(int(hand.duration * 200)) + 1) / 200.0
+    rate, force = g.read(hand.rate(t), 200.0, rng), a.read(hand.force(t, rng, 0.5), 200.0, rng)
+    write(path, ["Time(s)", "accX(g)", "accY(g)", "accZ(g)", "gyrX(dps)", "gyrY(dps)", "gyrZ(dps)"], [t, *of(force, G0), *of(rate, DEG)],
+          ["%.4f"] + ["%.6f"] * 3 + ["%.4f"] * 3)
+    truth = {"delay_s": 0.003, "drift_ppm": 20.0, "noise_rad": 3e-4}
+    middle = (t[0] + t[-1]) / 2
+    stamps = numpy.arange(0.7 / 120, hand.duration, 1 / 120)
+    c_ym = turn([1, 0, 0], -numpy.pi / 2) @ hand.c_rb(stamps - truth["delay_s"] - 20e-6 * (stamps - middle)) @ turn(rng.normal(size=3), rng.uniform(0.5, 3))
+    q = attitudes.times(attitudes.small(rng.normal(0, truth["noise_rad"], (len(stamps), 3))), attitudes.quaternions(c_ym))
+    q *= rng.choice([-1, 1], (len(q), 1))   # the same attitudes
+    text = [["%.7f" % v for v in row] for row in q]
+    for k in rng.integers(200, len(text) - 200, 5):
+        text[k:k + 40] = [["", "", "", ""]] * 40
+    write(path.with_name("mocap.csv"), ["Time (Seconds)", "Rotation X", "Rotation Y", "Rotation Z", "Rotation W"],
+          [stamps, *[[row[k] for row in text] for k in (1, 2, 3, 0)]], ["%.6f"] + ["%s"] * 4)
+    return g, a, truth
+
+
+def robot_arm(path, rng):
+    """An ADIS on a robot's flange at 100 Hz; its controller's attitude every 20 ms in the same rows, x y z w, room to flange, 12 ms late."""
+    g, a = industrial(rng)
+    hand = attitudes.Hand(rng, 14, 3.0, 3.0)
+    t = (numpy.arange(int(hand.duration * 100)) + 1) / 100.0
+    rate, force = g.read(hand.rate(t), 100.0, rng), a.read(hand.force(t, rng, 0.05), 100.0, rng)
+    begin, delay = rng.uniform(0, 0.02), 0.012
+    taken = numpy.maximum(0.0, begin + 0.02 * numpy.floor((t - delay - begin) / 0.02))
+    first, of_row = numpy.unique(taken, return_inverse=True)
+    q = attitudes.quaternions(hand.c_rb(first) @ turn(rng.normal(size=3), rng.uniform(0.5, 3)))
+    q = attitudes.times(q, attitudes.small(rng.normal(0, 5e-5, (len(q), 3)))) * [1, -1, -1, -1]
+    wait = numpy.mean(t[numpy.searchsorted(of_row, numpy.arange(len(first)))][5:] - first[5:])   # to the row that shows it
+    write(path, ["time_s", "gyr_x_dps", "gyr_y_dps", "gyr_z_dps", "acc_x_g", "acc_y_g", "acc_z_g", "robot_qx", "robot_qy", "robot_qz", "robot_qw"],
+          [t, *of(rate, DEG), *of(force, G0), *q[of_row][:, [1, 2, 3, 0]].T], ["%.3f"] + ["%.5f"] * 3 + ["%.6f"] * 3 + ["%.8f"] * 4)
+    return g, a, {"delay_s": wait}
+
+
+def fused(path, rng):
+    """A MEMS with a filter of its own: q0 to q3 stand beside the sensors that they were computed from."""
+    g, a = consumer(rng)
+    hand = attitudes.Hand(rng, 12, 4.0, 2.0)
+    t = (numpy.arange(int(hand.duration * 100)) + 1) / 100.0
+    rate, force = g.read(hand.rate(t), 100.0, rng), a.read(hand.force(t, rng, 0.3), 100.0, rng)
+    q = attitudes.filtered(t, rate - g.bias, force, attitudes.quaternions(hand.c_rb(t[:1]))[0], 0.2)
+    write(path, ["time_s", "gx_dps", "gy_dps", "gz_dps", "ax_g", "ay_g", "az_g", "q0", "q1", "q2", "q3"],
+          [t, *of(rate, DEG), *of(force, G0), *q.T], ["%.3f"] + ["%.5f"] * 3 + ["%.6f"] * 3 + ["%.6f"] * 4)
+    return g, a, {}

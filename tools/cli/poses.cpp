@@ -10,6 +10,7 @@
 #include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/convert.hpp"
+#include "tools/cli/poses_attitude.hpp"
 #include "tools/cli/poses_input.hpp"
 #include "tools/cli/poses_output.hpp"
 
@@ -27,6 +28,7 @@ struct PosesArguments {
   bool json = false, details = false;
   std::string only;
   std::optional<std::uint64_t> angle_column, temperature_column;
+  AttitudeChoice attitude;
 };
 
 RawColumns raw_columns(const PosesArguments& arguments) {
@@ -57,9 +59,38 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
   if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty() || arguments.rate_hz)) {
     return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers, each with its times");
   }
+  const bool attitude_asked = !arguments.attitude.file.empty() || !arguments.attitude.columns.empty();
+  if (attitude_asked && (arguments.files.size() > 1 || arguments.rate_hz)) {
+    return fail(ErrorKind::usage, "--attitude: with one FILE that holds its times");
+  }
   if (arguments.height_m && !arguments.latitude_deg) {
     return fail(ErrorKind::usage, "--height: without --latitude it says nothing of gravity");
   }
+  return {};
+}
+
+// A recording holds none itself.
+Expected<void> add_attitude(const PosesArguments& arguments, bool is_recording, RawLog& log) {
+  const std::string& name = arguments.files.front();
+  if (is_recording && arguments.attitude.file.empty()) {
+    return arguments.attitude.columns.empty()
+               ? Expected<void>()
+               : fail(ErrorKind::usage,
+                      fmt::format("{}: --attitude-columns are of a log or of --attitude's file; a recording "
+                                  "holds no attitude",
+                                  name));
+  }
+  if (arguments.files.size() > 1 || arguments.rate_hz) {
+    return {};  // times that the attitude does not have
+  }
+  auto chosen = choose_attitude(name, log, arguments.attitude);
+  if (!chosen) {
+    return tl::unexpected(chosen.error());
+  }
+  if (!chosen->notes.empty()) {
+    fmt::print(stderr, "selfcal poses: {}\n", chosen->notes);
+  }
+  log.input.attitude = std::move(chosen->attitude);
   return {};
 }
 
@@ -72,7 +103,7 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   const std::string& name = arguments.files.front();
   Expected<RawLog> log =
       is_recording ? read_hdf5(name, lenient).map([](const auto& loaded) {
-        return RawLog{pose_input_of(loaded.recording), true, {}};
+        return RawLog{pose_input_of(loaded.recording), true, 0.0L, {}};
       })
                    : read_raw_poses({arguments.files, arguments.gyros, arguments.latitude_deg, arguments.height_m},
                                     raw_columns(arguments));
@@ -81,6 +112,9 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   }
   if (!log->notes.empty()) {
     fmt::print(stderr, "selfcal poses: {}: {}\n", name, log->notes);
+  }
+  if (const auto added = add_attitude(arguments, is_recording, *log); !added) {
+    return tl::unexpected(added.error());
   }
   log->input.gyro_unit = arguments.gyro_unit;
   const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
@@ -114,6 +148,12 @@ CommandRun configure(Options& options) {
                 "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
   options.whole("--temperature-column", arguments->temperature_column, known_columns,
                 "the CSV's column, from 1, that holds a temperature, degC");
+  options.text(
+      "--attitude", arguments->attitude.file,
+      "a file with the attitude that something else measured, and its time; the log itself: take its columns for that");
+  options.text(
+      "--attitude-columns", arguments->attitude.columns,
+      "its columns, numbers from 1 or names, commas between: 4 of a quaternion, 3 roll pitch yaw, 9 of a matrix");
   options.number("--gyro-unit", arguments->gyro_unit, range::gyro_unit, "nominal rad/s of one raw unit of the gyros");
   options.number("--false-alarm-rate", arguments->false_alarm_rate, range::false_alarm_rate, "of the whole diagnosis");
   options.flag("--details", arguments->details, "every test and every parameter");

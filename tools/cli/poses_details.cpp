@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_words.hpp"
 #include "tools/cli/rest_output.hpp"
 
@@ -282,6 +283,9 @@ std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si) {
   text += clipping_text(d, shown);
   if (d.read_outs) {
     text += read_outs_text(*d.read_outs, shown);
+  }
+  if (d.by_attitude) {
+    text += attitude_text(*d.by_attitude, shown);
   }
   if (d.rest) {
     text += d.force_at_rest_g > 0.0 ? fmt::format("|f| {:.5f} g; ", d.force_at_rest_g) : std::string();

@@ -387,7 +387,7 @@ Expected<RawLog> read_raw_poses(const RawFiles& files, const RawColumns& columns
   if (!read) {
     return tl::unexpected(read.error());
   }
-  RawLog log{std::move(read->input), false, std::move(read->notes)};
+  RawLog log{std::move(read->input), false, read->begin_s, std::move(read->notes)};
   const bool gyros = log.input.sensors != Sensors::accelerometers, accels = log.input.sensors != Sensors::gyros;
   log.si = (!gyros || read->gyro_si > 0.0) && (!accels || read->accel_si > 0.0);
   log.input.gyros_si = read->gyro_si > 0.0;

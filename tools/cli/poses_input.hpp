@@ -24,8 +24,9 @@ struct RawFiles {
 };
 struct RawLog {
   diagnosis::PoseInput input;
-  bool si = false;    // rad/s and m/s^2
-  std::string notes;  // what was taken for what, where no order of the handbook says it; empty: nothing to say
+  bool si = false;             // rad/s and m/s^2
+  long double begin_s = 0.0L;  // of a time of the calendar: what was taken off
+  std::string notes;           // what was taken for what, where no order of the handbook says it; empty: nothing to say
 };
 // Logs as columns, whatever their form (protocol/import/column_source.hpp), by their names or in the order of the handbook (poses_layout.hpp). What
 // units the names say is taken to SI; everything else is raw. Errors (bad_input): no such columns; a line without a number, a time that does not

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_words.hpp"
 #include "tools/cli/rest_output.hpp"
 
@@ -224,6 +225,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"supports", d.supports},
           {"not_by_position", d.not_by_position},
           {"read_outs", d.read_outs ? read_outs_json(*d.read_outs) : Json()},
+          {"attitude", d.by_attitude ? attitude_json(*d.by_attitude) : Json()},
           {"rest", d.rest ? rest_json(*d.rest) : Json()},
           {"clipped", to_json(d.clipped)},
           {"left_out", to_json(d.left_out)},

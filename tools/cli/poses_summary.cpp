@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "daemon/estimate/quantity_text.hpp"
+#include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_output.hpp"
 #include "tools/cli/poses_words.hpp"
 #include "tools/cli/rest_output.hpp"
@@ -365,6 +366,9 @@ std::string poses_summary(const PoseDiagnosis& d, bool si) {
   std::string text = heading(d) + findings(d, shown);
   if (d.read_outs) {
     text += read_outs(*d.read_outs, shown);
+  }
+  if (d.by_attitude) {
+    text += attitude_text(*d.by_attitude, shown);
   }
   if (d.rest) {
     text += rest_findings(*d.rest) + left_out(d) + rest_table(*d.rest);
