@@ -135,7 +135,8 @@ std::string around_text(const ByAttitude& d, const Units& shown) {
     text +=
         fmt::format("  the noise is not what is assumed of it: sigma is larger by up to {:.2f} therefore\n", d.misfit);
   }
-  if (d.independence.sigma > 0.0 && !d.independence.shown) {
+  constexpr double telling = 0.3;  // beyond it the attitude's own noise hides that of the gyros
+  if (d.independence.sigma > 0.0 && d.independence.sigma < telling && !d.independence.shown) {
     text += fmt::format(
         "  whether it was computed from these gyros is not shown: of their noise it lacks {:.2f} +- {:.2f}, a "
         "reference all\n",

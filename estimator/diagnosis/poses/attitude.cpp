@@ -182,13 +182,13 @@ Independence independence_of(const PoseInput& input, const AttitudeFit& fit, con
     }
   }
   constexpr double fewest = 300.0, certain = 4.0, half = 0.5, white = 0.3;
-  if (count < fewest || !(own > 0.0)) {
+  // Coloured, they show a motion of the ground, which both may see.
+  if (count < fewest || !(own > 0.0) || std::abs(neighbours / own) > white) {
     return found;
   }
   found.value = product / own;
   found.sigma = std::sqrt(std::max(1e-300, (other - product * product / own) / count / own));
-  // Coloured, they show a motion of the ground, which both may see.
-  found.derived = found.value + certain * found.sigma < half && std::abs(neighbours / own) < white;
+  found.derived = found.value + certain * found.sigma < half;
   found.shown = found.value - certain * found.sigma > half;
   return found;
 }
@@ -278,8 +278,11 @@ double reach_of(const ReferenceAttitude& attitude, const Knots& knots) {
 
 std::string why_not(const PoseInput& input, const ReferenceAttitude& attitude, const Knots& knots) {
   if (knots.all.empty()) {
-    return knots.without == attitude.time_s.size() ? "no row of it holds an attitude"
-                                                   : "it never changes: no turn to hold gyros against";
+    constexpr std::size_t few = 30;
+    const std::size_t rows = attitude.time_s.size() - knots.without;
+    return rows == 0    ? "no row of it holds an attitude"
+           : rows < few ? std::to_string(rows) + " rows of it hold an attitude: too few"
+                        : "it never changes: no turn to hold gyros against";
   }
   constexpr double least_deg = 1.0;
   const double reach = reach_of(attitude, knots) / units::degree;
