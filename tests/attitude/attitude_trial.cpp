@@ -2,7 +2,8 @@
 //
 //   selfcal_attitude_trial SEED LOGS [noise]     status 0: as many 95 % intervals hold the truth as have to
 //
-// `noise`: a negative control, in which the attitude's errors are ten times as large for a third of the log, as no model has it.
+// The negative control: intervals of 0.6 times the length have to hold too little. `noise`: the attitude's errors are ten times as large for
+// a third of each log, as no model has it.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -23,14 +24,17 @@ using selfcal::attitude_trial::Truth;
 using selfcal::diagnosis::ByAttitude;
 using selfcal::diagnosis::PoseParameter;
 
+constexpr double too_narrow = 0.6;  // the negative control: intervals of as much of the length
+
 struct Tally {
-  int all = 0, held = 0;
+  int all = 0, held = 0, held_by_less = 0;
   double square = 0.0;  // of error over sigma
   void add(double value, double sigma, double truth) {
     constexpr double of_95_percent = 1.959964;
     const double off = (value - truth) / sigma;
     ++all;
     held += std::abs(off) <= of_95_percent ? 1 : 0;
+    held_by_less += std::abs(off) <= too_narrow * of_95_percent ? 1 : 0;
     square += off * off;
   }
   double share() const { return 100.0 * held / all; }
@@ -146,6 +150,7 @@ int main(int argc, char** argv) {
            {&all[name], &of_kind[kind.name], &of_kind["all"], &of_kind[std::string(kind.name) + ": " + name]}) {
         sum->all += tally.all;
         sum->held += tally.held;
+        sum->held_by_less += tally.held_by_less;
         sum->square += tally.square;
       }
     }
@@ -159,7 +164,10 @@ int main(int argc, char** argv) {
   // 93 to 97 %, and beside it three sigma of what so few show by chance: a log's intervals are as good as six independent ones.
   const double share = of_kind["all"].share();
   const double chance = 3.0 * 100.0 * std::sqrt(0.05 * 0.95 / (6.0 * std::max(1, logs)));
-  const bool good = failed == 0 && share > 93.0 - chance && share < 97.0 + chance;
+  const double by_less = 100.0 * of_kind["all"].held_by_less / of_kind["all"].all;
+  std::printf("negative control: intervals of %.1f times the length hold %.1f %%, which has to be too little\n",
+              too_narrow, by_less);
+  const bool good = failed == 0 && share > 93.0 - chance && share < 97.0 + chance && by_less < 93.0 - chance;
   std::printf("%d logs, seed %llu: %.1f %% (93 to 97, chance %.1f), %d not answered: %s\n", logs,
               static_cast<unsigned long long>(seed), share, chance, failed, good ? "good" : "NOT AS IT HAS TO BE");
   return good ? 0 : 1;

@@ -146,8 +146,10 @@ Posterior posterior_of(const AttitudeModel& model, const AttitudeLayout& layout,
   const Eigen::MatrixXd walk = precision_of_walk(layout, model.node_s);
   std::vector<Candidate> all;
   std::vector<double> densities{0.0};
-  for (double f = 0.05; f < 60.0; f *= 2.0) {
-    densities.push_back(f * f * walk_unit);
+  constexpr int octaves = 11;
+  constexpr double least_walk = 0.05;
+  for (int k = 0; k < octaves; ++k) {
+    densities.push_back(std::ldexp(least_walk * least_walk * walk_unit, 2 * k));
   }
   double best = -std::numeric_limits<double>::infinity();
   Posterior found;
@@ -245,6 +247,7 @@ void set_aside(std::vector<AttitudeRow>& rows, const AttitudeNoise& noise, Used&
 // Before anything is known of the noise: rows far beyond what rows usually show end a piece.
 void set_aside_roughly(std::vector<AttitudeRow>& rows, Used& used) {
   std::vector<double> sizes;
+  sizes.reserve(rows.size());
   for (const AttitudeRow& row : rows) {
     sizes.push_back(row.more.norm());
   }
@@ -334,8 +337,10 @@ double walk_unit(const AttitudeFit& fit) {
 // The gyros' white noise, which a bias is known by, is itself known by a few hundred of its times at best: marginalised.
 Posterior averaged(const AttitudeFit& fit, const Posterior& best) {
   std::vector<Candidate> all;
-  for (double factor = 0.6; factor < 3.0; factor *= 1.25) {
-    const WeighedNoise at = beside(fit.noise, factor, fit.rows, fit.used);
+  constexpr int factors = 8;
+  constexpr double least = 0.6, ratio = 1.25;
+  for (int k = 0; k < factors; ++k) {
+    const WeighedNoise at = beside(fit.noise, least * std::pow(ratio, k), fit.rows, fit.used);
     const AttitudeInformation info = information_of(fit.rows, fit.used, at.noise, Columns(fit.model, fit.layout));
     const Posterior found = posterior_of(fit.model, fit.layout, info, walk_unit(fit));
     all.push_back({found.mean, found.covariance, found.log_evidence + at.log_likelihood});

@@ -194,6 +194,7 @@ Knots find_knots(const ReferenceAttitude& attitude) {
   const std::vector<Run> runs = runs_of(valid, q);
   const double row = middle_of(steps_of(attitude.time_s));
   std::vector<double> begin;
+  begin.reserve(runs.size());
   for (const Run& run : runs) {
     begin.push_back(attitude.time_s[run.first]);
   }

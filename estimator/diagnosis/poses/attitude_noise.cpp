@@ -85,10 +85,12 @@ AttitudeNoise best_ratio(const std::vector<AttitudeRow>& rows, const Used& used,
     noise.walk_psd = std::exp(log_ratio) / noise.interval_s;
     return profile(rows, used, noise);
   };
-  constexpr double low = -20.0, high = 10.0, step = 2.0;
+  constexpr double low = -20.0, step = 2.0;
+  constexpr int steps = 15;
   double top = low;
   best = -std::numeric_limits<double>::infinity();
-  for (double x = low; x <= high; x += step) {
+  for (int k = 0; k <= steps; ++k) {
+    const double x = low + k * step;
     const double here = at(x).log_likelihood;
     if (here > best) {
       best = here;

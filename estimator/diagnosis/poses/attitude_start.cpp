@@ -130,7 +130,7 @@ std::vector<std::size_t> agreeing(const GyroTrack& track, const std::vector<Wind
 Lagged refined(const GyroTrack& track, const std::vector<Window>& windows, const std::vector<Vector3>& phi,
                const Lagged& coarse, double half) {
   constexpr double fine = 20.0;
-  const Lagged first = best_lag(track, windows, phi, coarse.delay, half, half / fine);
+  Lagged first = best_lag(track, windows, phi, coarse.delay, half, half / fine);
   std::vector<Window> some;
   std::vector<Vector3> some_phi;
   double kept = 0.0, all = 0.0;
@@ -206,6 +206,7 @@ AttitudeStart find_start(const GyroTrack& track, const ReferenceAttitude& attitu
   std::vector<Lagged> all;
   for (const AttitudeReading& reading : attitude.readings) {
     std::vector<Vector3> phi;
+    phi.reserve(windows.size());
     for (const Window& w : windows) {
       phi.push_back(rotation_vector(reading.q_rm[w.first].conjugate() * reading.q_rm[w.last]));
     }
