@@ -7,64 +7,100 @@
 #include <functional>
 #include <optional>
 
+#include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
+#include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::cli {
+namespace {
 
-Expected<import::ColumnData> read_with_time(const import::ColumnSource& source,
-                                            const std::vector<import::NamedColumn>& named,
-                                            import::ColumnRequest request, std::size_t& time) {
-  std::vector<std::size_t> candidates = {time};
-  for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k].role == import::Role::time && k != time) {
-      candidates.push_back(k);
-    }
+void leave_out_timeless(import::ColumnData& data) {
+  std::vector<bool> timeless;
+  for (const long double stamp : data.stamps) {
+    timeless.push_back(!std::isfinite(stamp));
   }
-  std::optional<Expected<import::ColumnData>> first;
-  const auto rises = [](const Expected<import::ColumnData>& data) {
-    return data &&
-           std::all_of(data->stamps.begin(), data->stamps.end(), [](long double s) { return std::isfinite(s); }) &&
-           std::adjacent_find(data->stamps.begin(), data->stamps.end(), std::greater_equal<>()) == data->stamps.end();
-  };
-  for (const std::size_t candidate : candidates) {
+  import::leave_out(timeless, data);
+}
+
+void take_once(TimedRows& rows) {
+  const std::vector<bool> repeated = import::repeated_rows(rows.data);
+  if (const auto count = std::count(repeated.begin(), repeated.end(), true); count > 0) {
+    rows.notes = fmt::format("{} rows are the row before once more and are taken once", count);
+    import::leave_out(repeated, rows.data);
+  }
+}
+
+bool rises(const std::vector<long double>& stamps) {
+  return !stamps.empty() && std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
+}
+
+}  // namespace
+
+Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std::vector<std::size_t>& times,
+                                   import::ColumnRequest request) {
+  if (times.empty()) {
+    return source.read(request).map([](import::ColumnData data) { return TimedRows{std::move(data), 0, {}}; });
+  }
+  std::optional<Expected<TimedRows>> first;
+  for (const std::size_t candidate : times) {
     for (const bool date : {false, true}) {
       request.stamp = candidate;
       request.stamp_is_date = date;
-      Expected<import::ColumnData> data = source.read(request);
-      if (rises(data)) {
-        time = candidate;
-        return data;
+      Expected<TimedRows> rows = source.read(request).map([&](import::ColumnData data) {
+        return TimedRows{std::move(data), candidate, {}};
+      });
+      if (rows) {
+        if (request.tolerant) {
+          leave_out_timeless(rows->data);
+        }
+        take_once(*rows);
+        const std::string continued = import::continue_full_clocks(rows->data.stamps);
+        rows->notes += (rows->notes.empty() || continued.empty() ? "" : "; ") + continued;
+        if (rises(rows->data.stamps)) {
+          return rows;
+        }
       }
-      first = first ? std::move(first) : std::move(data);
+      first = first ? std::move(first) : std::move(rows);
     }
   }
   return std::move(*first);
 }
 
-std::string time_unit(const std::string& named, double interval) {
-  if (const auto unit = import::find_unit(named); unit && unit->quantity == import::Quantity::time) {
-    return named;
+Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSource& source,
+                                const std::vector<import::NamedColumn>& named, const std::string& file,
+                                const std::string& way_out) {
+  const std::vector<long double>& stamps = rows.data.stamps;
+  const double interval =
+      stamps.size() < 2
+          ? 1.0
+          : static_cast<double>((stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1));
+  const std::string& said = named[rows.time].unit;
+  if (const auto unit = import::find_unit(said); unit && unit->quantity == import::Quantity::time) {
+    return said;
   }
-  const std::vector<std::string> units = import::time_units(interval);
-  const bool seconds = units.empty() || std::find(units.begin(), units.end(), "s") != units.end();
-  return seconds ? "s" : units.front();
+  const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
+  const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);
+  if (units.empty() || std::find(units.begin(), units.end(), "s") != units.end()) {
+    return std::string("s");
+  }
+  if (units.size() > 1) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: intervals of {:.6g} are {} or {}: {}", file,
+                                                  source.title(rows.time), interval, units[0], units[1], way_out));
+  }
+  return units.front();
 }
 
-Expected<void> check_increasing(const std::string& path, const import::ColumnData& data) {
+Expected<void> check_increasing(const std::string& file, const import::ColumnData& data, const std::string& way_out) {
   for (std::size_t k = 1; k < data.rows; ++k) {
     if (data.stamps[k] <= data.stamps[k - 1]) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: {}: time {} does not increase", path, data.place(k),
-                                                    static_cast<double>(data.stamps[k])));
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: {}: time {:.10g} is not after {:.10g}{}", file, data.place(k),
+                              static_cast<double>(data.stamps[k]), static_cast<double>(data.stamps[k - 1]), way_out));
     }
   }
   return {};
-}
-
-double interval_of(const import::ColumnData& data) {
-  return data.rows < 2 ? 1.0
-                       : static_cast<double>((data.stamps.back() - data.stamps.front()) /
-                                             static_cast<long double>(data.rows - 1));
 }
 
 }  // namespace selfcal::cli

@@ -10,18 +10,25 @@
 
 namespace selfcal::cli {
 
-// Of the columns that are called a time the first that is one, with the other columns of REQUEST: a date of the day stands beside the time of the
-// day. `time` becomes it.
-Expected<import::ColumnData> read_with_time(const import::ColumnSource& source,
-                                            const std::vector<import::NamedColumn>& named,
-                                            import::ColumnRequest request, std::size_t& time);
+struct TimedRows {
+  import::ColumnData data;
+  std::size_t time = 0;  // the column that its stamps are of
+  std::string notes;     // what was done to them; empty: nothing
+};
 
-// A time that no name gives a unit is seconds, unless these make less than a sample a second and another unit makes a usual rate.
-std::string time_unit(const std::string& named, double interval);
+// With the first of the columns `times` whose stamps rise, or else with the first that can be read: a date of the day stands beside the time of
+// the day. Rows that stand twice are taken once, clocks that begin again where they are full go on, and where the request is tolerant rows
+// without a time are left out. No `times`: no stamps.
+Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std::vector<std::size_t>& times,
+                                   import::ColumnRequest request);
 
-// Error (bad_input): the place of the first time that does not increase.
-Expected<void> check_increasing(const std::string& path, const import::ColumnData& data);
+// A time that no name gives a unit is seconds, unless these make less than a sample a second and one other unit makes a usual rate. Error
+// (bad_input): several others do; `way_out` says what to do then.
+Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSource& source,
+                                const std::vector<import::NamedColumn>& named, const std::string& file,
+                                const std::string& way_out);
 
-double interval_of(const import::ColumnData& data);
+// Error (bad_input): the place of the first time that does not increase, with `way_out` behind it.
+Expected<void> check_increasing(const std::string& file, const import::ColumnData& data, const std::string& way_out);
 
 }  // namespace selfcal::cli

@@ -266,38 +266,44 @@ Expected<void> add_readings(const AttitudeColumns& columns, const import::Column
 Expected<diagnosis::ReferenceAttitude> read_columns(const std::string& path, const import::ColumnSource& source,
                                                     const AttitudeColumns& columns, const RawLog& log, bool in_log) {
   const std::vector<import::NamedColumn> named = import::read_names(source.names(), source.units());
-  const auto is_time = [](const import::NamedColumn& c) { return c.role == import::Role::time; };
-  const auto found = std::find_if(named.begin(), named.end(), is_time);
-  std::size_t time = found == named.end() ? 0 : static_cast<std::size_t>(found - named.begin());
-  if (std::find(columns.columns.begin(), columns.columns.end(), time) != columns.columns.end()) {
+  std::vector<std::size_t> times;
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == import::Role::time) {
+      times.push_back(k);
+    }
+  }
+  if (times.empty()) {
+    times = {0};
+  }
+  if (std::find(columns.columns.begin(), columns.columns.end(), times.front()) != columns.columns.end()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: no column of a time beside the attitude", path));
   }
   import::ColumnRequest request;
   request.columns = columns.columns;
   request.tolerant = true;
-  Expected<import::ColumnData> data = read_with_time(source, named, request, time);
-  if (!data) {
-    return tl::unexpected(data.error());
+  Expected<TimedRows> rows = read_with_time(source, times, request);
+  if (!rows) {
+    return tl::unexpected(rows.error());
   }
-  std::vector<bool> timeless;
-  for (const long double stamp : data->stamps) {
-    timeless.push_back(!std::isfinite(stamp));
+  const import::ColumnData& data = rows->data;
+  if (data.rows == 0) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: no row holds a time", path, source.title(rows->time)));
   }
-  import::leave_out(timeless, *data);
-  if (data->rows == 0) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {}: no row holds a time", path, source.title(time)));
-  }
-  if (const auto increasing = check_increasing(path, *data); !increasing) {
+  if (const auto increasing = check_increasing(path, data, ""); !increasing) {
     return tl::unexpected(increasing.error());
+  }
+  const Expected<std::string> unit = time_unit(*rows, source, named, path, "a head that names its unit settles it");
+  if (!unit) {
+    return tl::unexpected(unit.error());
   }
   diagnosis::ReferenceAttitude attitude;
   attitude.in_rows_of_log = in_log;
-  const auto si = static_cast<long double>(import::find_unit(time_unit(named[time].unit, interval_of(*data)))->si);
-  for (const long double stamp : data->stamps) {
+  const auto si = static_cast<long double>(import::find_unit(*unit)->si);
+  for (const long double stamp : data.stamps) {
     attitude.time_s.push_back(static_cast<double>(stamp * si - log.begin_s));
   }
   const std::string what = fmt::format("{}: {}", path, titles(source, columns.columns));
-  if (const auto added = add_readings(columns, *data, what, attitude); !added) {
+  if (const auto added = add_readings(columns, data, what, attitude); !added) {
     return tl::unexpected(added.error());
   }
   return attitude;

@@ -17,6 +17,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
+#include "tools/cli/log_time.hpp"
 
 namespace selfcal::cli {
 
@@ -82,105 +83,34 @@ double unit_of(const std::vector<import::NamedColumn>& named, const std::vector<
   return unit && unit->quantity == quantity ? unit->si : 0.0;
 }
 
+constexpr const char* rate_says = "--rate says how many rows a second it holds";
+
 std::string and_also(const std::string& a, const std::string& b) {
   return a + (a.empty() || b.empty() ? "" : "; ") + b;
 }
 
-// Of the columns that may be the time the first that is one: a date of the day stands beside the time of the day.
-struct ReadRows {
-  import::ColumnData data;
-  std::size_t time = 0;
-  std::string notes;
-};
-
-void take_once(ReadRows& rows) {
-  const std::vector<bool> repeated = import::repeated_rows(rows.data);
-  if (const auto count = std::count(repeated.begin(), repeated.end(), true); count > 0) {
-    rows.notes = fmt::format("{} rows are the row before once more and are taken once", count);
-    import::leave_out(repeated, rows.data);
-  }
-}
-
-bool rises(const std::vector<long double>& stamps) {
-  return std::adjacent_find(stamps.begin(), stamps.end(), std::greater_equal<>()) == stamps.end();
-}
-
-Expected<ReadRows> read_with_time(const import::ColumnSource& source, const PoseLayout& layout,
-                                  import::ColumnRequest request) {
-  if (layout.times.empty()) {
-    return source.read(request).map([](import::ColumnData data) { return ReadRows{std::move(data), 0, {}}; });
-  }
-  std::optional<Expected<ReadRows>> first;
-  for (const std::size_t candidate : layout.times) {
-    for (const bool date : {false, true}) {
-      request.stamp = candidate;
-      request.stamp_is_date = date;
-      Expected<ReadRows> rows = source.read(request).map([&](import::ColumnData data) {
-        return ReadRows{std::move(data), candidate, {}};
-      });
-      if (rows) {
-        take_once(*rows);
-        rows->notes = and_also(rows->notes, import::continue_full_clocks(rows->data.stamps));
-        if (rises(rows->data.stamps)) {
-          return rows;
-        }
-      }
-      first = first ? std::move(first) : std::move(rows);
-    }
-  }
-  return std::move(*first);
-}
-
 // A column that nobody calls a time and that is none: values that rise by chance, or a counter, whose unit is an interval.
-Expected<void> check_time(const ReadRows& rows, const import::ColumnSource& source,
+Expected<void> check_time(const TimedRows& rows, const import::ColumnSource& source,
                           const std::vector<import::NamedColumn>& named, const std::string& file) {
-  const std::vector<long double>& stamps = rows.data.stamps;
-  for (std::size_t k = 1; k < rows.data.rows; ++k) {
-    if (stamps[k] <= stamps[k - 1]) {
-      return fail(
-          ErrorKind::bad_input,
-          fmt::format("{}: {}: time {:.10g} is not after {:.10g}: cut the file there and give both parts, or "
-                      "let --rate say how many rows a second it holds",
-                      file, rows.data.place(k), static_cast<double>(stamps[k]), static_cast<double>(stamps[k - 1])));
-    }
+  if (const auto increasing = check_increasing(
+          file, rows.data,
+          ": cut the file there and give both parts, or let --rate say how many rows a second it holds");
+      !increasing) {
+    return tl::unexpected(increasing.error());
   }
+  const std::vector<long double>& stamps = rows.data.stamps;
   if (named[rows.time].role == import::Role::time) {
     return {};
   }
   const bool counts = std::all_of(stamps.begin(), stamps.end(), [](long double s) { return s == std::floor(s); }) &&
                       stamps.size() > 1 && stamps[1] - stamps[0] == 1.0L;
   if (counts || !import::rises_evenly(stamps)) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: {} {}: --rate says how many rows a second it holds", file, source.title(rows.time),
-                            counts ? "rises by 1, as a counter does, and no name calls it a time"
-                                   : "does not increase evenly, as a time does"));
+    return fail(ErrorKind::bad_input, fmt::format("{}: {} {}: {}", file, source.title(rows.time),
+                                                  counts ? "rises by 1, as a counter does, and no name calls it a time"
+                                                         : "does not increase evenly, as a time does",
+                                                  rate_says));
   }
   return {};
-}
-
-// A time that no name gives a unit is seconds, unless these make less than a sample a second and one other unit makes a usual rate.
-Expected<std::string> time_unit(const ReadRows& rows, const import::ColumnSource& source,
-                                const std::vector<import::NamedColumn>& named, const std::string& file) {
-  const std::vector<long double>& stamps = rows.data.stamps;
-  const double interval =
-      stamps.size() < 2
-          ? 1.0
-          : static_cast<double>((stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1));
-  const std::string& said = named[rows.time].unit;
-  if (const auto unit = import::find_unit(said); unit && unit->quantity == import::Quantity::time) {
-    return said;
-  }
-  const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
-  const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);
-  if (units.empty() || std::find(units.begin(), units.end(), "s") != units.end()) {
-    return std::string("s");
-  }
-  if (units.size() > 1) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {}: intervals of {:.6g} are {} or {}: --rate says how many rows "
-                                                  "a second it holds",
-                                                  file, source.title(rows.time), interval, units[0], units[1]));
-  }
-  return units.front();
 }
 
 // The only column that is called a temperature, from 1; 0: none.
@@ -199,7 +129,7 @@ struct OneLog {
 };
 
 // Time in s. A time of the calendar in seconds leaves no digits of an interval: from the first one on.
-void add_time(const ReadRows& rows, const std::string& unit, std::optional<double> rate_hz, OneLog& log) {
+void add_time(const TimedRows& rows, const std::string& unit, std::optional<double> rate_hz, OneLog& log) {
   if (rate_hz) {
     for (std::size_t i = 0; i < rows.data.rows; ++i) {
       log.input.time_s.push_back(static_cast<double>(i + 1) / *rate_hz);
@@ -236,7 +166,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const std::size_t angle = columns.angle > 0 ? ask(columns.angle) : 0;
   const std::size_t thermal = columns.temperature > 0 ? columns.temperature : named_temperature(named);
   const std::size_t temperature = thermal > 0 ? ask(thermal) : 0;
-  const Expected<ReadRows> rows = read_with_time(**source, *layout, request);
+  const Expected<TimedRows> rows = read_with_time(**source, layout->times, request);
   if (!rows) {
     return tl::unexpected(rows.error());
   }
@@ -245,7 +175,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
     if (const auto good = check_time(*rows, **source, named, path); !good) {
       return tl::unexpected(good.error());
     }
-    Expected<std::string> found = time_unit(*rows, **source, named, path);
+    Expected<std::string> found = time_unit(*rows, **source, named, path, rate_says);
     if (!found) {
       return tl::unexpected(found.error());
     }
