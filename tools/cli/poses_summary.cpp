@@ -55,6 +55,19 @@ std::string lines_of(const std::string& start, const std::string& sentence) {
   return wrapped(start, words_of(sentence), "");
 }
 
+// A text line by line, each broken so behind its first word.
+std::string folded(const std::string& text) {
+  std::string all;
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t to = text.find('\n', from);
+    const std::string line = text.substr(from, to - from);
+    const std::size_t end = std::min(line.find(' ', line.find_first_not_of(' ')), line.size());
+    all += lines_of(line.substr(0, end), end < line.size() ? line.substr(end + 1) : "");
+    from = to + 1;
+  }
+  return all;
+}
+
 std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
@@ -368,7 +381,7 @@ std::string poses_summary(const PoseDiagnosis& d, bool si) {
     text += read_outs(*d.read_outs, shown);
   }
   if (d.by_attitude) {
-    text += attitude_text(*d.by_attitude, shown);
+    text += folded(attitude_text(*d.by_attitude, shown));
   }
   if (d.rest) {
     text += rest_findings(*d.rest) + left_out(d) + rest_table(*d.rest);
