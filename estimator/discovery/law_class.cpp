@@ -39,11 +39,19 @@ std::vector<double> shares_of(const std::vector<Candidate>& alternatives) {
 LawClass::LawClass(const UnitRecording& like, Candidate own, const std::vector<std::vector<Candidate>>& others,
                    const std::vector<Candidate>& own_values, double least_odds, const std::stop_token& stop)
     : own_(std::move(own)), tried_(best_of(others)), least_odds_(least_odds), possible_{own_} {
-  std::vector<double> share = {
-      own_values.empty() ? 1.0 : Shortlist::wave_step};  // of a function's belief, of each that is possible
+  // Of a function's belief, that of each which is possible.
+  std::vector<double> share = {own_values.empty() ? 1.0 : Shortlist::wave_step};
+  // A wave that is another one has a peak as wide as this one's, of which one period stands for all.
+  double of_another_wave = share.front();
+  for (const Candidate& c : own_values) {
+    of_another_wave += Shortlist::wave_step * odds(c);
+  }
   for (const std::vector<Candidate>& alternatives : others) {
-    const std::vector<double> shares = shares_of(alternatives);
+    std::vector<double> shares = shares_of(alternatives);
     for (std::size_t j = 0; j < alternatives.size(); ++j) {
+      if (!own_values.empty() && alternatives[j].term.constants.size() == 2) {
+        shares[j] = of_another_wave;
+      }
       if (same_value(alternatives[j].term, own_.term)) {
         share.front() = std::min(share.front(), shares[j]);
       } else if (is_member(alternatives[j])) {
