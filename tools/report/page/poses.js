@@ -88,6 +88,33 @@ function showReadOuts(report) {
   }
 }
 
+function showAttitude(report) {
+  const a = objectOf(report.attitude);
+  if (!a.reading && !a.failure) {
+    return hideSection('attitude');
+  }
+  const place = document.getElementById('attitude-words');
+  const say = (words) => place.append(element('p', {}, words));
+  if (a.failure) {
+    say(`It is no reference: ${textOf(a.failure)}.`);
+  }
+  if (a.reading) {
+    say(`${textOf(a.reading)}: ${textOf(a.samples)} values over ${fixed(a.seconds, 0)} s, noise ${significant(1e3 * a.noise_rad, 3)} mrad an axis.`);
+  }
+  const clock = objectOf(a.clock);
+  if (clock.seen === true) {
+    say(`It is ${clock.delay_s < 0 ? 'early' : 'late'} by ${figure(1e3 * Math.abs(clock.delay_s), 1e3 * clock.delay_sigma_s)} ms, and its clock ` +
+        `${clock.drift_ppm < 0 ? 'slow' : 'fast'} by ${figure(Math.abs(clock.drift_ppm), clock.drift_sigma_ppm)} ppm.`);
+  }
+  const bias = listOf(a.gyro_bias).map((value, k) => ({name: `bias_${'xyz'[k]}`, unit: 'raw', value, sigma: listOf(a.gyro_bias_sigma)[k], determined: true}));
+  for (const [title, all, id] of [['Gyros', [...bias, ...listOf(a.gyros).map(objectOf)], 'attitude-gyros'],
+    ['Accelerometers', listOf(objectOf(a.gravity).accelerometers).map(objectOf), 'attitude-accelerometers']]) {
+    if (all.length > 0) {
+      document.getElementById('attitude-tables').append(parameterTable(title, all, id));
+    }
+  }
+}
+
 function showPoseNoise(report) {
   const place = document.getElementById('noise-plots');
   for (const [title, points, id] of [['gyros', listOf(objectOf(report.gyros).noise_at_rest), 'rest-gyros'],
@@ -133,6 +160,6 @@ function showPoses(report) {
     ['Poses', textOf(report.poses)], ['At rest', `${fixed(report.static_s, 0)} of ${fixed(report.duration_s, 0)} s`],
     ...(left.length > 0 ? [['Left out', `${left.length} parts: ${textOf(left[0].words)}`]] : []),
     ...(clipped.length > 0 ? [['Clipped', clipped.map((c) => `${textOf(c.sensor)} ${textOf(c.axis)}`).join(', ')]] : []),
-  ]), () => showNamed(report), () => showPoseParameters(report), () => showReadOuts(report), () => showPoseNoise(report), () => showTried(report),
+  ]), () => showNamed(report), () => showPoseParameters(report), () => showReadOuts(report), () => showAttitude(report), () => showPoseNoise(report), () => showTried(report),
         () => document.getElementById('unseen-list').append(...listOf(report.invisible).map((words) => element('li', {}, textOf(words)))));
 }

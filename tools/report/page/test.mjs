@@ -441,6 +441,7 @@ async function check_overlay(page) {
 
 // Every axis with its mean as the program said it, the verdict, and each line of what the log does not show.
 async function check_poses(page) {
+  expect(Boolean(expected.attitude) === await page.isVisible('#attitude-words'), 'the attitude is shown where there is one, and only there');
   const rows = await page.$$eval('#rest-axes tbody tr', (lines) => lines.map((line) => [...line.cells].map((cell) => cell.textContent)));
   expect(rows.length === expected.rest.axes.length, `${rows.length} axes of ${expected.rest.axes.length}`);
   for (const [k, axis] of expected.rest.axes.entries()) {
