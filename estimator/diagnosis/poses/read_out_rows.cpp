@@ -194,6 +194,7 @@ std::vector<std::vector<SteadyRate>> mounts_of(const PoseInput& input, const std
     }
   }
   std::vector<std::vector<SteadyRate>> all;
+  all.reserve(mounts.size());
   for (Mount& m : mounts) {
     all.push_back(std::move(m.rates));
   }
