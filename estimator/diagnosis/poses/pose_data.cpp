@@ -157,22 +157,28 @@ std::vector<PoseParameter> parameters_of(const AccelModel& m) {
   constexpr std::array<const char*, 9> names = {"bias_x",          "bias_y",          "bias_z",
                                                 "scale_x",         "scale_y",         "scale_z",
                                                 "misalignment_xy", "misalignment_xz", "misalignment_yz"};
+  // Errors of the sensor as it is: u = T (a - b), so a = T^-1 u + b. Each sigma by the element's own alone, to first order.
+  const Matrix3 M = (m.T * m.raw_per_g).inverse();
   const Nine x = values_of(m);
   std::vector<PoseParameter> all;
   for (Eigen::Index k = 0; k < 9; ++k) {
     PoseParameter p;
     p.name = names[static_cast<std::size_t>(k)];
     p.determined = !m.held(k) && m.sigma(k) < 0.5 * m.before(k);
-    // Errors of the sensor as it is: u = T (a - b), so a = T^-1 u + b.
-    const bool scale = k >= 3 && k < 6;
-    p.unit = k < 3 ? "raw" : scale && !m.nominal ? "raw/g" : "1";
-    p.value = k < 3 ? x(k) : scale ? 1.0 / (x(k) * m.raw_per_g) - 1.0 : -x(k) * m.raw_per_g;
-    p.sigma = k < 3 ? m.sigma(k) : m.sigma(k) * m.raw_per_g;
-    if (scale && m.nominal) {
-      p.sigma = std::hypot(p.sigma, m.gravity_sigma);
-    } else if (scale) {
-      p.value = 1.0 / x(k);
-      p.sigma = m.sigma(k) / (x(k) * x(k));
+    p.value = x(k);
+    p.sigma = m.sigma(k);
+    p.unit = "raw";
+    if (k >= 3) {
+      const auto [i, j] = free_elements[static_cast<std::size_t>(k - 3)];
+      const bool scale = i == j, per_g = scale && !m.nominal;
+      // In counts that nobody gave a scale a misalignment is the angle of its axis, a part of this axis's own scale factor.
+      const double unit = per_g ? m.raw_per_g : scale || m.nominal ? 1.0 : 1.0 / M(i, i);
+      p.value = unit * M(i, j) - (scale && m.nominal ? 1.0 : 0.0);
+      p.sigma = unit * M(i, i) * M(j, j) * m.sigma(k) * m.raw_per_g;
+      if (scale && m.nominal) {
+        p.sigma = std::hypot(p.sigma, m.gravity_sigma);
+      }
+      p.unit = per_g ? "raw/g" : "1";
     }
     all.push_back(p);
   }

@@ -147,7 +147,8 @@ struct PoseDiagnosis {
   double duration_s = 0.0;  // of the log
   std::vector<Clipping> clipped;
   std::vector<LeftOut> left_out;
-  // Accelerometers: bias, scale, misalignment fitted to |f| = g.
+  // Accelerometers: bias, scale, misalignment fitted to |f| = g. The sensors' own matrix: reading = M force + bias, M less 1; of counts without a
+  // nominal scale M_ii in raw/g and M_ij / M_ii.
   double accel_rms_g = 0.0, accel_held_out_rms_g = 0.0;
   bool accel_tested = false;  // whether there are poses enough to test what the model leaves
   bool accel_adequate = false;
@@ -170,7 +171,7 @@ struct PoseDiagnosis {
   std::vector<PoseEffect> gyro_named;         // forward selection
   std::vector<PoseEffect> gyro_open;          // what is left beside what is named: coefficients and sigma
   std::vector<Confounded> confounded;
-  // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted.
+  // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted, reading = M rate + bias, M less 1.
   int turns = 0, turns_clipped = 0;
   std::vector<PoseParameter> gyro_parameters;
   double direction_before = 0.0, direction_after = 0.0;

@@ -5,12 +5,16 @@
 
 #include <cmath>
 #include <random>
+#include <string>
+#include <vector>
 
 namespace selfcal::diagnosis {
 namespace {
 
 // 24 poses of 4 s, turned in 2 s about random axes; counts of 2e-4 rad/s and 2.4e-4 g with noise of 4 counts.
-PoseInput hand_turned(const Matrix3& G, std::uint32_t seed) {
+// `gyros`, `accelerometers`: what they read of a rate and of a force.
+PoseInput hand_turned(const Matrix3& G, std::uint32_t seed, const Matrix3& gyros = Matrix3::Identity(),
+                      const Matrix3& accelerometers = Matrix3::Identity()) {
   constexpr double dt = 0.01, gyro_unit = 2e-4, accel_unit = 2.4e-4;
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -21,8 +25,8 @@ PoseInput hand_turned(const Matrix3& G, std::uint32_t seed) {
   const auto sample = [&](const Vector3& rate) {
     u = matrix_from_rotation_vector(-rate * dt) * u;
     t += dt;
-    const Vector3 gyro = rate / gyro_unit + Vector3(32500, 32400, 32600) + G * u;
-    const Vector3 accel = u / accel_unit + Vector3(33100, 33300, 32400);
+    const Vector3 gyro = gyros * rate / gyro_unit + Vector3(32500, 32400, 32600) + G * u;
+    const Vector3 accel = accelerometers * u / accel_unit + Vector3(33100, 33300, 32400);
     input.time_s.push_back(t);
     input.gyro.push_back({gyro.x() + 4 * normal(random), gyro.y() + 4 * normal(random), gyro.z() + 4 * normal(random)});
     input.accel.push_back(
@@ -56,6 +60,37 @@ TEST(Poses, NamesAGSensitivity) {
   }
   // 5 counts over 2 s turn gravity by 2 mrad or 0.1 deg; what remains is white noise, 4 counts: 0.01 deg over a turn.
   EXPECT_GT(d.direction_before_held_out, 3.0 * d.direction_after_held_out);
+}
+
+// Products of misalignments of 4 % are 1.6e-3 of a scale factor, and a misalignment beside scale factors of 10 % is a tenth larger: what is told
+// is the sensors' own matrix, not its inverse with other signs.
+TEST(Poses, TellsTheSensorsOwnMatrix) {
+  Matrix3 gyros, accelerometers;
+  gyros << 1.10, 0.04, -0.03, 0.04, 0.92, 0.035, -0.04, 0.03, 1.05;
+  accelerometers << 0.90, 0.04, -0.03, 0.0, 1.08, 0.035, 0.0, 0.0, 0.95;
+  const PoseDiagnosis d = diagnose_poses(hand_turned(Matrix3::Zero(), 3, gyros, accelerometers), 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  int told = 0;
+  const auto check = [&](const std::vector<PoseParameter>& parameters, const Matrix3& truth, double raw_per_unit) {
+    for (const PoseParameter& p : parameters) {
+      if (!p.determined || p.name.starts_with("bias")) {
+        continue;
+      }
+      const bool scale = p.name.starts_with("scale_");
+      const std::string axes = p.name.substr(p.name.find('_') + 1);
+      const int i = axes.front() - 'x', j = axes.back() - 'x';
+      const double expected = p.unit == "raw/g" ? truth(i, j) * raw_per_unit
+                              : scale           ? truth(i, j) - 1.0
+                                                : truth(i, j) / (raw_per_unit > 1.0 ? truth(i, i) : 1.0);
+      EXPECT_LT(std::abs(p.value - expected), 5.0 * p.sigma) << p.name << " " << p.value << " of " << expected;
+      EXPECT_LT(p.sigma, (p.unit == "raw/g" ? raw_per_unit : 1.0) * 1e-3) << p.name;
+      ++told;
+    }
+  };
+  check(d.gyro_parameters, gyros, 1.0);
+  // Of counts the misalignments are angles: parts of their own axis's scale factor.
+  check(d.accel_parameters, accelerometers, 1.0 / 2.4e-4);
+  EXPECT_EQ(told, 15);
 }
 
 TEST(Poses, NamesNothingWhereNothingIs) {
