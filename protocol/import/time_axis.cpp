@@ -5,23 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::import {
 namespace {
 
 constexpr long double gap_intervals = 1.5L;  // as the check of a recording has it
-
-long double median_interval(const std::vector<long double>& stamps) {
-  std::vector<long double> intervals;
-  intervals.reserve(stamps.size());
-  for (std::size_t k = 1; k < stamps.size(); ++k) {
-    intervals.push_back(stamps[k] - stamps[k - 1]);
-  }
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
-}
 
 // How finely stamps are written: the largest power of ten that all of the first ones are multiples of.
 long double resolution_of(const std::vector<long double>& stamps) {

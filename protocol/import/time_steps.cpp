@@ -15,17 +15,6 @@ namespace {
 constexpr std::array<long double, 7> full = {65536.0L,  16777216.0L, 4294967296.0L, 86400.0L,
                                              604800.0L, 86400000.0L, 604800000.0L};
 
-long double usual_interval(const std::vector<long double>& stamps) {
-  std::vector<long double> steps;
-  steps.reserve(stamps.size());
-  for (std::size_t k = 1; k < stamps.size(); ++k) {
-    steps.push_back(stamps[k] - stamps[k - 1]);
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
-
 // Whether a column rises from row to row but where rows repeat.
 bool has_a_clock(const ColumnData& data, const std::vector<bool>& repeated) {
   constexpr std::size_t most_falls = 100;  // of a clock that begins again: one in as many rows
@@ -40,11 +29,22 @@ bool has_a_clock(const ColumnData& data, const std::vector<bool>& repeated) {
 
 }  // namespace
 
+long double median_interval(const std::vector<long double>& stamps) {
+  std::vector<long double> intervals;
+  intervals.reserve(stamps.size());
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    intervals.push_back(stamps[k] - stamps[k - 1]);
+  }
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle;
+}
+
 std::string continue_full_clocks(std::vector<long double>& stamps) {
   if (stamps.size() < 3) {
     return {};
   }
-  const long double usual = usual_interval(stamps);
+  const long double usual = median_interval(stamps);
   long double added = 0.0L, before = stamps.front();
   std::size_t places = 0;
   std::string words;

@@ -9,6 +9,9 @@
 
 namespace selfcal::import {
 
+// Of two stamps and more, in their unit.
+long double median_interval(const std::vector<long double>& stamps);
+
 // Clocks and counters that begin again where they are full: 2^16, 2^24, 2^32 ticks, a day or a GPS week in s or ms. Where a stamp falls by
 // so much that with one of these added it is the usual interval behind the one before, it goes on from there. Words on where; empty: nowhere.
 std::string continue_full_clocks(std::vector<long double>& stamps);
