@@ -64,6 +64,22 @@ std::string within_grammar(Random& random) {
   return quantity(random);
 }
 
+// Three quantities, or a kernel and two: forces, rates, the gimbal's angles and their harmonics, time, senses, the count of turns.
+std::string deep_quantity(Random& random) {
+  if (random.uniform(0.0, 1.0) < 0.75) {
+    return quantity(random);
+  }
+  static constexpr std::array<const char*, 9> more = {"sin(2*outer)", "cos(2*outer)", "sin(2*inner)", "cos(2*inner)",
+                                                      "sin(3*outer)", "cos(3*inner)", "sin(inner)",   "n",
+                                                      "cos(3*outer)"};
+  return one_of(more, random);
+}
+
+std::string product_of_three(Random& random) {
+  const std::string two = deep_quantity(random) + "*" + deep_quantity(random);
+  return (random.uniform(0.0, 1.0) < 0.6 ? deep_quantity(random) : kernel(random)) + "*" + two;
+}
+
 // Forms that the search had not when the trial was made. Since then it has quotients of one quantity by another, waves over the count of
 // turns.
 std::string beyond_first_grammar(Random& random) {
@@ -116,7 +132,9 @@ std::string beyond_grammar(Random& random) {
 sim::Law draw_law(const std::string& kind, Random& random) {
   sim::Law law;
   law.axis = static_cast<int>(random.uniform(0.0, 5.9999));
-  law.expression = kind == "foreign" ? beyond_grammar(random) : within_grammar(random);
+  law.expression = kind == "foreign" ? beyond_grammar(random)
+                   : kind == "deep"  ? product_of_three(random)
+                                     : within_grammar(random);
   law.coefficient = law.axis < 3 ? 0.01 * units::degree_per_hour : 10.0 * units::micro_g;
   if (kind == "process") {
     const bool jump = random.uniform(0.0, 1.0) < 0.5;
@@ -229,6 +247,7 @@ std::vector<Recipe> recipes(const Counts& counts) {
   for (int k = 0; k < counts.beside; ++k) {
     all.push_back({"beside", 30.0, catalogue[static_cast<std::size_t>(k) % catalogue.size()]});
   }
+  add("deep", 30.0, counts.deep);
   return all;
 }
 
@@ -259,7 +278,7 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
   if (const auto added = add_laws(c, count, *filtered, random); !added) {
     return tl::unexpected(added.error());
   }
-  if (c.kind == "law" || c.kind == "pair") {
+  if (c.kind == "law" || c.kind == "pair" || c.kind == "deep") {
     const auto bound = bound_of(*filtered, c.physics.laws);
     if (!bound) {
       return tl::unexpected(bound.error());

@@ -1,8 +1,8 @@
 // Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
 //
-//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE FILE   one JSON line a case, as far as missing
+//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP FILE   one JSON line a case, as far as missing
 //   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
-//   selfcal_discovery_generate draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE NUMBER FILE   a case's recording; prints its line of
+//   selfcal_discovery_generate draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP NUMBER FILE   a case's recording; prints its line of
 //                                                            the key as "case", and for the program that asks what is left as "assumed"
 //   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
 //                                                            another schedule: a file, or "random:SECONDS"
@@ -76,7 +76,7 @@ ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
 
 std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts) {
   return discovery_trial::recipes(
-      {counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5), counts.at(6)});
+      {counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5), counts.at(6), counts.at(7)});
 }
 
 // What a key follows from: its seed and the number of cases of each kind.
@@ -102,14 +102,14 @@ struct Drawing {
   }
 };
 
-// SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE
+// SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP
 Expected<Drawing> drawing_in(std::span<char*> words) {
   const auto seed = to_number(words[0]);
   if (!seed) {
     return fail(ErrorKind::usage, fmt::format("{}: no seed", words[0]));
   }
   Drawing drawing{static_cast<std::uint64_t>(*seed), ordered_json::array()};
-  for (std::size_t k = 1; k < 8; ++k) {
+  for (std::size_t k = 1; k < 9; ++k) {
     const auto count = to_number(words[k]);
     if (!count) {
       return fail(ErrorKind::usage, fmt::format("{}: no count", words[k]));
@@ -126,12 +126,12 @@ int write_key(std::span<char*> arguments) {
   }
   int done = 0;
   {
-    std::ifstream file(arguments[8]);
+    std::ifstream file(arguments[9]);
     for (std::string line; std::getline(file, line);) {
       ++done;
     }
   }
-  std::ofstream file(arguments[8], std::ios::app);
+  std::ofstream file(arguments[9], std::ios::app);
   for (int n = done; n < static_cast<int>(recipes_of(drawing->counts).size()); ++n) {
     const auto line = drawing->line(n);
     if (!line) {
@@ -139,7 +139,7 @@ int write_key(std::span<char*> arguments) {
     }
     file << line->dump() << '\n' << std::flush;
   }
-  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[8])});
+  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[9])});
 }
 
 // The case whose line of the key has this number.
@@ -166,9 +166,9 @@ int write_record(const Case& c, const std::string& path) {
 
 int draw(std::span<char*> arguments) {
   const auto drawing = drawing_in(arguments);
-  const auto number = to_number(arguments[8]);
+  const auto number = to_number(arguments[9]);
   if (!drawing || !number) {
-    return complain(drawing ? Error{ErrorKind::usage, fmt::format("{}: no case", arguments[8])} : drawing.error());
+    return complain(drawing ? Error{ErrorKind::usage, fmt::format("{}: no case", arguments[9])} : drawing.error());
   }
   Case drawn;
   const auto line = drawing->line(*number, &drawn);
@@ -176,7 +176,7 @@ int draw(std::span<char*> arguments) {
     return complain(line.error());
   }
   fmt::print("{}\n", ordered_json{{"case", *line}, {"assumed", *line}}.dump());
-  return write_record(drawn, arguments[9]);
+  return write_record(drawn, arguments[10]);
 }
 
 int print_left(const Case& c, const std::string& laws) {
@@ -229,10 +229,10 @@ int write_again(Case c, const std::string& path, int time, const std::string& pl
 
 int run(std::span<char*> arguments) {
   const std::string verb = arguments.size() > 1 ? arguments[1] : "";
-  if (verb == "key" && arguments.size() == 11) {
+  if (verb == "key" && arguments.size() == 12) {
     return write_key(arguments.subspan(2));
   }
-  if (verb == "draw" && arguments.size() == 12) {
+  if (verb == "draw" && arguments.size() == 13) {
     return draw(arguments.subspan(2));
   }
   const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
@@ -246,11 +246,11 @@ int run(std::span<char*> arguments) {
     }
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
-  fmt::print(
-      stderr,
-      "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE FILE | "
-      "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE NUMBER FILE | record KEY NUMBER FILE | again KEY "
-      "NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
+  fmt::print(stderr,
+             "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP FILE | "
+             "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP NUMBER FILE | record KEY NUMBER FILE | "
+             "again KEY "
+             "NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 
