@@ -103,6 +103,11 @@ class Builder {
     add_grid(decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
     add_grid(decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
     add_grid(decays_, "exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
+    // Beside two quantities the constants stand 2.5 apart: a decay between two of them is like one of them to 0.95.
+    add_grid(coarse_decays_, "exp(-since/?)", Kernel::creep, {4.0, 11.0, 26.0, 60.0, 140.0}, 0.5);
+    add_grid(coarse_decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, {2.0, 20.0}, 0.1);
+    add_grid(coarse_decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {2.0, 20.0}, 0.1);
+    add_grid(coarse_decays_, "exp(-t/?)", Kernel::warm_up, {0.06, 0.18, 0.5}, 0.3, duration_h_);
     waves();
     quotients();
     for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {
@@ -128,7 +133,6 @@ class Builder {
   // Half a period of resolution apart over the `whole`. A period is as probable as any other on a logarithmic scale: of two that one plan
   // cannot tell apart the longer one wins.
   void add_waves(std::vector<Choice>& choices, const std::string& phase, Kernel kernel, double whole, double shortest) {
-    double sum = 0.0;
     for (int k = 1; 2.0 * whole / k > shortest; ++k) {
       const double period = 2.0 * whole / k;
       const int sine = add("sin" + phase, kernel, period);
@@ -136,12 +140,9 @@ class Builder {
       if (sine >= 0 && cosine >= 0) {
         choices.push_back({sine, 1.0 / k});
         cosine_[sine] = cosine;
-        sum += 1.0 / k;
       }
     }
-    for (Choice& wave : choices) {
-      wave.belief /= sum;
-    }
+    make_certain(choices);
   }
 
   // A response that grows or falls by a share of what it is: a stiffness, a gap. The constant is what the sum of both falls short of at
@@ -156,10 +157,37 @@ class Builder {
     }
   }
 
+  // Those of at most five periods in the recording: beside two quantities others are too many.
+  std::vector<Choice> slow_waves() const {
+    constexpr std::size_t most = 10;
+    std::vector<Choice> slow(waves_.begin(),
+                             waves_.begin() + static_cast<std::ptrdiff_t>(std::min(most, waves_.size())));
+    make_certain(slow);
+    return slow;
+  }
+  static void make_certain(std::vector<Choice>& choices) {
+    double sum = 0.0;
+    for (const Choice& choice : choices) {
+      sum += choice.belief;
+    }
+    for (Choice& choice : choices) {
+      choice.belief /= sum;
+    }
+  }
+
   struct Draw {
     std::vector<int> factors;
     double belief = 1.0;
   };
+
+  // Draws in which one quantity at least is a plain one.
+  std::vector<Draw> with_plain(std::vector<Draw> draws) const {
+    const int last_plain = main_.back().factor;
+    std::erase_if(draws, [&](const Draw& draw) {
+      return std::none_of(draw.factors.begin(), draw.factors.end(), [&](int factor) { return factor <= last_plain; });
+    });
+    return draws;
+  }
 
   // All unordered draws of `depth` different choices. `alone`: nothing is multiplied to them.
   static std::vector<Draw> products(const std::vector<Choice>& choices, int depth, bool alone = false) {
@@ -200,22 +228,23 @@ class Builder {
 
   // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
   void enumerate() {
-    const std::vector<Draw> nothing(1), one = products(all_, 1), main_one = products(main_, 1),
+    const std::vector<Draw> nothing(1), one = products(all_, 1), two = products(all_, 2), main_one = products(main_, 1),
                                         main_two = products(main_, 2);
-    collect(products(all_, 1, true), 0.195);
-    collect(products(all_, 2), 0.29);
-    collect(products(main_, 3), 0.04 / (plain_share * plain_share * plain_share));
-    collect(times(decays_, nothing), 0.115);
-    collect(times(decays_, one), 0.145);
-    collect(times(decays_, main_two), 0.03 / (plain_share * plain_share));
-    collect(times(waves_, nothing), 0.066);
-    collect(times(waves_, one), 0.048);
+    collect(products(all_, 1, true), 0.174);
+    collect(two, 0.24);
+    collect(products(all_, 3), 0.1);
+    collect(times(decays_, nothing), 0.105);
+    collect(times(decays_, one), 0.135);
+    collect(times(coarse_decays_, two), 0.06);
+    collect(times(waves_, nothing), 0.062);
+    collect(times(waves_, one), 0.045);
+    collect(times(slow_waves(), with_plain(two)), 0.018);
     // Equal dwells do not tell them from waves over the time: where a sensor goes by the time ten times as often as by the count, that decides.
     collect(times(turn_waves_, nothing), 0.004);
     collect(times(turn_waves_, main_one), 0.004 / plain_share);
     collect(times(quotients_, nothing), 0.01);
     collect(times(quotients_, main_one), 0.02 / plain_share);
-    collect(times(steps_, nothing), 0.033);
+    collect(times(steps_, nothing), 0.025);
   }
 
   int add_function(const std::vector<int>& factors, double cost) {
@@ -231,7 +260,11 @@ class Builder {
       return -1;  // zero, or a constant: that is the bias
     }
     const double rms = std::sqrt(square);
-    means_.push_back(mean / rms);
+    const auto column = static_cast<Eigen::Index>(scales_.size());
+    if (column == dictionary_.means.cols()) {
+      dictionary_.means.conservativeResize(mean.size(), std::max<Eigen::Index>(1024, 2 * column));
+    }
+    dictionary_.means.col(column) = mean / rms;
     scales_.push_back(rms);
     Function function{factors, Kernel::none, 0.0, -1, false, cost};
     const Factor& first = dictionary_.factors[static_cast<std::size_t>(factors.front())];
@@ -259,11 +292,9 @@ class Builder {
   }
 
   void finish() {
-    dictionary_.means.resize(sums_.piece_dt.size(), static_cast<Eigen::Index>(means_.size()));
-    dictionary_.scale = Eigen::Map<const Eigen::VectorXd>(scales_.data(), static_cast<Eigen::Index>(scales_.size()));
-    for (std::size_t k = 0; k < means_.size(); ++k) {
-      dictionary_.means.col(static_cast<Eigen::Index>(k)) = means_[k];
-    }
+    const auto count = static_cast<Eigen::Index>(scales_.size());
+    dictionary_.means.conservativeResize(sums_.piece_dt.size(), count);
+    dictionary_.scale = Eigen::Map<const Eigen::VectorXd>(scales_.data(), count);
   }
 
   const PieceSums& sums_;
@@ -272,9 +303,8 @@ class Builder {
   Dictionary dictionary_;
   std::vector<Eigen::ArrayXd> values_;  // [factors]
   std::vector<double> scales_;
-  std::vector<Choice> main_, all_, decays_, steps_, waves_, turn_waves_, quotients_;
+  std::vector<Choice> main_, all_, decays_, coarse_decays_, steps_, waves_, turn_waves_, quotients_;
   std::map<int, int> cosine_;  // of a wave's sine
-  std::vector<Eigen::VectorXd> means_;
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The functions that the search tries: products of up to three factors, at most one of which has a constant.
+// The functions that the search tries: products of up to three factors, at most one of which has a constant. A kernel with two quantities has
+// fewer constants than one alone, a wave with two is one of at most five periods.
 //
 // Their values are kept as means over the pieces of the recording; the expression of each is text that laws::Expression
 // reads. The cost of a function is the negative logarithm of its probability before any data: the share of belief in its
