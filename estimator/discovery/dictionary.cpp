@@ -23,6 +23,14 @@ class Builder {
       duration_s = std::max(duration_s, node.time_s + 0.5 * node.dt);
     }
     duration_h_ = duration_s / seconds_per_hour;
+    node_dt_.resize(static_cast<Eigen::Index>(sums.nodes.size()));
+    for (std::size_t k = 0; k < sums.nodes.size(); ++k) {
+      node_dt_(static_cast<Eigen::Index>(k)) = sums.nodes[k].dt;
+      if (runs_.empty() || sums.piece_of[k] != runs_.back().piece) {
+        runs_.push_back({sums.piece_of[k], static_cast<Eigen::Index>(k), 0});
+      }
+      ++runs_.back().count;
+    }
   }
 
   Dictionary run() {
@@ -180,11 +188,23 @@ class Builder {
     double belief = 1.0;
   };
 
-  // Draws in which one quantity at least is a plain one.
+  bool is_plain(int factor) const { return factor <= main_.back().factor; }  // they are the first
+  // Draws in which one quantity at least is a plain one; a size, a square or a harmonic.
   std::vector<Draw> with_plain(std::vector<Draw> draws) const {
-    const int last_plain = main_.back().factor;
     std::erase_if(draws, [&](const Draw& draw) {
-      return std::none_of(draw.factors.begin(), draw.factors.end(), [&](int factor) { return factor <= last_plain; });
+      return std::ranges::none_of(draw.factors, [&](int factor) { return is_plain(factor); });
+    });
+    return draws;
+  }
+  // T and its rate together are a quantity of their own.
+  std::vector<Draw> with_formed(std::vector<Draw> draws) const {
+    const auto has = [&](const Draw& draw, const char* text) {
+      return std::ranges::any_of(
+          draw.factors, [&](int factor) { return dictionary_.factors[static_cast<std::size_t>(factor)].text == text; });
+    };
+    std::erase_if(draws, [&](const Draw& draw) {
+      return std::ranges::all_of(draw.factors, [&](int factor) { return is_plain(factor); }) ||
+             (has(draw, "T") && has(draw, "dT"));
     });
     return draws;
   }
@@ -226,33 +246,54 @@ class Builder {
     return draws;
   }
 
-  // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one.
+  // Shares of belief before any data: what sensors do is mostly one or two quantities, or a creep or warm-up of one. Of three factors those
+  // of plain quantities are the more probable ones.
   void enumerate() {
+    constexpr double plain_two = plain_share * plain_share, plain_three = plain_two * plain_share;
+    constexpr double formed_two = 1.0 - plain_two, formed_three = 1.0 - plain_three;
     const std::vector<Draw> nothing(1), one = products(all_, 1), two = products(all_, 2), main_one = products(main_, 1),
-                                        main_two = products(main_, 2);
-    collect(products(all_, 1, true), 0.174);
-    collect(two, 0.24);
-    collect(products(all_, 3), 0.1);
-    collect(times(decays_, nothing), 0.105);
-    collect(times(decays_, one), 0.135);
-    collect(times(coarse_decays_, two), 0.06);
-    collect(times(waves_, nothing), 0.062);
-    collect(times(waves_, one), 0.045);
-    collect(times(slow_waves(), with_plain(two)), 0.018);
+                                        main_two = products(main_, 2), other_two = with_formed(two);
+    collect(products(all_, 1, true), 0.185);
+    collect(two, 0.27);
+    collect(products(main_, 3), 0.037 / plain_three);
+    collect(with_formed(products(all_, 3)), 0.03 / formed_three);
+    collect(times(decays_, nothing), 0.11);
+    collect(times(decays_, one), 0.14);
+    collect(times(decays_, main_two), 0.028 / plain_two);
+    collect(times(coarse_decays_, other_two), 0.015 / formed_two);
+    collect(times(waves_, nothing), 0.063);
+    collect(times(waves_, one), 0.046);
+    collect(times(slow_waves(), main_two), 0.006 / plain_two);
+    collect(times(slow_waves(), with_plain(other_two)), 0.004 / formed_two);
     // Equal dwells do not tell them from waves over the time: where a sensor goes by the time ten times as often as by the count, that decides.
     collect(times(turn_waves_, nothing), 0.004);
     collect(times(turn_waves_, main_one), 0.004 / plain_share);
-    collect(times(quotients_, nothing), 0.01);
-    collect(times(quotients_, main_one), 0.02 / plain_share);
-    collect(times(steps_, nothing), 0.025);
+    collect(times(quotients_, nothing), 0.009);
+    collect(times(quotients_, main_one), 0.019 / plain_share);
+    collect(times(steps_, nothing), 0.03);
+  }
+
+  // Of a product over the pieces. All but its last factor are those of the product before, more often than not.
+  Eigen::VectorXd means_of(const std::vector<int>& factors) {
+    const std::vector<int> leading(factors.begin(), factors.end() - 1);
+    if (leading != leading_ || leading_product_.size() == 0) {
+      leading_ = leading;
+      leading_product_ = node_dt_;
+      for (const int factor : leading) {
+        leading_product_ *= values_[static_cast<std::size_t>(factor)];
+      }
+    }
+    const Eigen::ArrayXd& last = values_[static_cast<std::size_t>(factors.back())];
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(sums_.piece_dt.size());
+    for (const Run& run : runs_) {
+      mean(run.piece) +=
+          leading_product_.segment(run.first, run.count).matrix().dot(last.segment(run.first, run.count).matrix());
+    }
+    return (sums_.piece_dt.array() > 0.0).select(mean.array() / sums_.piece_dt.array().max(1e-12), 0.0);
   }
 
   int add_function(const std::vector<int>& factors, double cost) {
-    Eigen::ArrayXd product = values_[static_cast<std::size_t>(factors.front())];
-    for (std::size_t k = 1; k < factors.size(); ++k) {
-      product *= values_[static_cast<std::size_t>(factors[k])];
-    }
-    Eigen::VectorXd mean = sums_.means(product);
+    const Eigen::VectorXd mean = means_of(factors);
     const double total = sums_.piece_dt.sum();
     const double average = mean.dot(sums_.piece_dt) / total;
     const double square = (mean.array().square() * sums_.piece_dt.array()).sum() / total;
@@ -300,6 +341,14 @@ class Builder {
   const PieceSums& sums_;
   laws::VariableSet available_;
   double duration_h_ = 0.0;
+  // Nodes one behind the other that lie in one piece.
+  struct Run {
+    Eigen::Index piece = 0, first = 0, count = 0;
+  };
+  std::vector<Run> runs_;
+  Eigen::ArrayXd node_dt_;
+  std::vector<int> leading_;
+  Eigen::ArrayXd leading_product_;  // of these, times dt
   Dictionary dictionary_;
   std::vector<Eigen::ArrayXd> values_;  // [factors]
   std::vector<double> scales_;

@@ -80,8 +80,16 @@ double LawClass::odds(const Candidate& c) const {
 bool LawClass::is_member(const Candidate& c) const { return c.merit() > own_.merit() + std::log(least_odds_); }
 
 std::size_t LawClass::best_elsewhere() const {
+  // A form between two others that fit predicts either: |y||z| stands for y^2 and z^2. It must be probable itself.
+  constexpr double least_odds = 0.05;
+  const auto merit = [](const Candidate& c) { return c.merit(); };
+  const double highest = merit(*std::max_element(possible_.begin(), possible_.end(),
+                                                 [&](const auto& a, const auto& b) { return merit(a) < merit(b); }));
   std::size_t best = 0;
   for (std::size_t a = 1; a < possible_.size(); ++a) {
+    if (merit(possible_[a]) < highest + std::log(least_odds)) {
+      continue;
+    }
     const bool most_probable = std::none_of(possible_.begin(), possible_.end(), [&](const Candidate& other) {
       return same_law(other.term, possible_[a].term) && other.merit() > possible_[a].merit();
     });

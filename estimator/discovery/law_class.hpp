@@ -26,8 +26,8 @@ class LawClass {
   // Members with each value of a constant by itself, `own` first, and what holds of them elsewhere.
   const std::vector<Candidate>& possible() const { return possible_; }
   const CarryOver& elsewhere() const { return elsewhere_; }
-  // The place in `possible` of what holds elsewhere with the greatest probability. Of values of one constant only the most
-  // probable one is asked: a fit would move the others to it.
+  // The place in `possible` of what holds elsewhere with the greatest probability, of those with a twentieth of the odds of the most probable
+  // one and more. Of values of one constant only the most probable one is asked: a fit would move the others to it.
   std::size_t best_elsewhere() const;
 
   // Each expression once, `own` first.

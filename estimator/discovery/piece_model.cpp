@@ -31,8 +31,9 @@ void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
   const auto f = static_cast<std::size_t>(axis);
   own[f] = all(rows, rows);
   const Eigen::LDLT<Eigen::MatrixXd> root(own[f]);
-  const Eigen::MatrixXf triangle = root.matrixLDLT().transpose().cast<float>();
-  const Eigen::ArrayXd weight = root.vectorD().array().max(0.0);
+  const Eigen::VectorXd size = root.vectorD().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd upper = root.matrixU();
+  const Eigen::MatrixXf triangle = (size.asDiagonal() * upper).cast<float>();
   function[f].resize(D.cols());
   partner[f] = Eigen::VectorXd::Zero(D.cols());
   Eigen::Index count = 0;
@@ -41,13 +42,14 @@ void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
     count = std::min(most, D.cols() - first);
     const auto partner_of = [&](Eigen::Index k) { return dictionary.functions[static_cast<std::size_t>(k)].partner; };
     count += partner_of(first + count - 1) == first + count ? 1 : 0;  // a wave's partner follows it
-    const Eigen::MatrixXd turned = root.transpositionsP() * D.middleCols(first, count);
-    const Eigen::MatrixXd image = (triangle.triangularView<Eigen::UnitUpper>() * turned.cast<float>()).cast<double>();
-    function[f].segment(first, count) = (image.array().square().colwise() * weight).colwise().sum().transpose();
+    Eigen::MatrixXf image = D.middleCols(first, count).cast<float>();
+    image = root.transpositionsP() * image;
+    image = triangle.triangularView<Eigen::Upper>() * image;
+    function[f].segment(first, count) = image.colwise().squaredNorm().transpose().cast<double>();
     for (Eigen::Index k = 0; k < count; ++k) {
       const int p = partner_of(first + k);
       if (p >= 0) {
-        partner[f](first + k) = (image.col(k).array() * image.col(p - first).array() * weight).sum();
+        partner[f](first + k) = static_cast<double>(image.col(k).dot(image.col(p - first)));
       }
     }
   }
