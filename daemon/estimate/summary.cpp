@@ -147,6 +147,15 @@ const discovery::DiscoveredLaw* unsure_law(const discovery::Discovery* beyond) {
   return any ? &beyond->described.front() : nullptr;
 }
 
+// What laws explain of the misfit where they do not explain the recording; empty where that is less than half.
+std::string most_of_it(const discovery::Discovery* beyond) {
+  constexpr double half = 0.5;
+  return beyond == nullptr || beyond->laws.empty() || explained_share(*beyond) < half
+             ? std::string()
+             : fmt::format("{:.0f} % of the misfit is that {}", 100.0 * explained_share(*beyond),
+                           discovered_words(*beyond));
+}
+
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
   if (beyond != nullptr && explains(beyond)) {
     return discovered_figures(*beyond) + ".";
@@ -167,7 +176,7 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text +=
         fmt::format("; the best of the catalogue, {} ({}), leaves it", best.effect, figures_with_significance(best));
   }
-  if (beyond != nullptr && explained_share(*beyond) > 0.0) {
+  if (beyond != nullptr && explained_share(*beyond) > 0.0 && most_of_it(beyond).empty()) {
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
   }
@@ -175,8 +184,9 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text += fmt::format("; {} follows one of {} equations, none of which holds elsewhere more probably than not",
                         name_of_axis(law->term.axis), std::max<std::size_t>(2, law->ambiguous.size()));
   } else if (beyond != nullptr && !beyond->described.empty()) {
-    text += fmt::format("; {} follows no equation that was tried, only a sum of several",
-                        name_of_axis(beyond->described.front().term.axis));
+    const discovery::DiscoveredLaw& first = beyond->described.front();
+    text += fmt::format("; {} follows no equation that was tried, {}", name_of_axis(first.term.axis),
+                        beyond->described.size() > 1 ? "only a sum of several" : first.expression + " comes nearest");
   }
   return text + ".";
 }
@@ -255,7 +265,12 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
     s.verdict =
         explains(beyond)
             ? fmt::format("These 24 values are biased by {}: {}.", beyond_what(*beyond), discovered_words(*beyond))
-            : "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.";
+        : most_of_it(beyond).empty()
+            ? "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values."
+            : fmt::format(
+                  "Recording and model disagree: {}; nothing that was tried explains the rest: do not use these 24 "
+                  "values.",
+                  most_of_it(beyond));
     s.cause = unexplained_cause(*d, beyond);
     s.next = command("diagnose", subject);
   } else {
@@ -269,7 +284,11 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
 // Equations are written with the 24 beside them; where several explain the recording as well, a next rotation parts them.
 Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discovery::Discovery* beyond) {
   if (beyond == nullptr || !explains(beyond)) {
-    return {SummaryStanding::bad, "Recording and model differ, and nothing in the catalogue explains it.",
+    const std::string most = most_of_it(beyond);
+    return {SummaryStanding::bad,
+            most.empty()
+                ? std::string("Recording and model differ, and nothing in the catalogue explains it.")
+                : fmt::format("Recording and model differ: {}; nothing that was tried explains the rest.", most),
             unexplained_cause(d, beyond),
             command("diagnose", subject,
                     unsure_law(beyond) != nullptr ? "--next-experiment next.toml" : "--split-schedule next.toml")};

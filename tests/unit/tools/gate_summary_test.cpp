@@ -178,6 +178,36 @@ TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
   EXPECT_THAT(part.cause, HasSubstr("50 % of the misfit"));
 }
 
+// An equation that makes most of the misfit beside an axis that follows none is no explanation; the verdict says both.
+TEST(Summary, AnEquationBesideWhatIsOnlyDescribedIsSaid) {
+  diagnosis::Diagnosis d = creep();
+  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
+  d.unexplained = true;
+  d.rejected = d.findings;
+  d.findings.clear();
+  discovery::Discovery found;
+  found.rows = 5000.0;
+  found.misfit_before = 1000.0;
+  discovery::DiscoveredLaw law;
+  law.term.axis = 0;
+  law.expression = "fz*wo";
+  law.carries_over = 1.0;
+  law.gain = 930.0;
+  found.laws = {law};
+  law.term.axis = 4;
+  law.expression = "exp(-since/70)*fx";
+  law.gain = 60.0;
+  found.described = {law};
+  const Summary s = summary_of(d, {"r.h5", 0}, &found);
+  EXPECT_EQ(s.standing, SummaryStanding::bad);
+  EXPECT_EQ(s.verdict,
+            "Recording and model differ: 93 % of the misfit is that gyro_x follows fz*wo; nothing that was tried "
+            "explains the rest.");
+  EXPECT_THAT(s.cause, HasSubstr("accel_y follows no equation that was tried, exp(-since/70)*fx comes nearest"));
+  found.laws.front().gain = 400.0;
+  EXPECT_THAT(summary_of(d, {"r.h5", 0}, &found).verdict, HasSubstr("nothing in the catalogue explains it"));
+}
+
 TEST(Summary, IsBrokenToTheTerminalAndItsNextStepIsNeverCut) {
   const Summary summary{SummaryStanding::bad, "one two three four five six seven eight nine ten eleven twelve",
                         "why so", "selfcal diagnose /a/long/path/to/a/recording.h5 --split-schedule"};
