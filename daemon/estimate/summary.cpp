@@ -147,13 +147,29 @@ const discovery::DiscoveredLaw* unsure_law(const discovery::Discovery* beyond) {
   return any ? &beyond->described.front() : nullptr;
 }
 
+// What is only described, as the end of a sentence.
+std::string described_clause(const discovery::Discovery& beyond) {
+  if (const discovery::DiscoveredLaw* law = unsure_law(&beyond)) {
+    return fmt::format("; {} follows one of {} equations, none of which holds elsewhere more probably than not",
+                       name_of_axis(law->term.axis), std::max<std::size_t>(2, law->ambiguous.size()));
+  }
+  if (beyond.described.empty()) {
+    return {};
+  }
+  const discovery::DiscoveredLaw& first = beyond.described.front();
+  return fmt::format("; {} follows no equation that was tried, {}", name_of_axis(first.term.axis),
+                     beyond.described.size() > 1 ? "only a sum of several" : first.expression + " comes nearest");
+}
+
 // What laws explain of the misfit where they do not explain the recording; empty where that is less than half.
 std::string most_of_it(const discovery::Discovery* beyond) {
-  constexpr double half = 0.5;
-  return beyond == nullptr || beyond->laws.empty() || explained_share(*beyond) < half
-             ? std::string()
-             : fmt::format("{:.0f} % of the misfit is that {}", 100.0 * explained_share(*beyond),
-                           discovered_words(*beyond));
+  constexpr double half = 0.5, nearly_all = 0.99;
+  if (beyond == nullptr || beyond->laws.empty() || explained_share(*beyond) < half) {
+    return {};
+  }
+  const double share = explained_share(*beyond);
+  return fmt::format("{}{:.0f} % of the misfit is that {}", share > nearly_all ? "more than " : "",
+                     100.0 * std::min(share, nearly_all), discovered_words(*beyond));
 }
 
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
@@ -161,6 +177,9 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     return discovered_figures(*beyond) + ".";
   }
   std::string text;
+  if (!most_of_it(beyond).empty()) {
+    return law_figures(*beyond) + described_clause(*beyond) + ".";
+  }
   // The mean over all hides what few places hold.
   const bool hidden = std::abs(d.after.nis - 1.0) < 0.1;
   if (!d.remaining.empty()) {
@@ -180,13 +199,8 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
   }
-  if (const discovery::DiscoveredLaw* law = unsure_law(beyond)) {
-    text += fmt::format("; {} follows one of {} equations, none of which holds elsewhere more probably than not",
-                        name_of_axis(law->term.axis), std::max<std::size_t>(2, law->ambiguous.size()));
-  } else if (beyond != nullptr && !beyond->described.empty()) {
-    const discovery::DiscoveredLaw& first = beyond->described.front();
-    text += fmt::format("; {} follows no equation that was tried, {}", name_of_axis(first.term.axis),
-                        beyond->described.size() > 1 ? "only a sum of several" : first.expression + " comes nearest");
+  if (beyond != nullptr) {
+    text += described_clause(*beyond);
   }
   return text + ".";
 }

@@ -37,6 +37,7 @@ struct DiagnoseArguments {
   std::string holdout;
   DiscoveryArguments discovery;
   bool json = false;
+  bool details = false;
   bool strict = false;
   double false_alarm_rate = diagnosis::DiagnosisOptions{}.false_alarm_rate;
   double arw_deg_per_sqrt_h = 0.001, vrw_ug_per_sqrt_hz = 5.0;
@@ -270,9 +271,9 @@ Expected<std::vector<diagnosis::Diagnosis>> diagnose_each(const Others& others,
 // There is no physics to try on another recording, to split or to write.
 Expected<int> tell_faults(const DiagnoseArguments& arguments, const diagnosis::Diagnosis& diagnosis,
                           const document::InputFile& file) {
-  fmt::print("{}", arguments.json
-                       ? diagnosis_json(diagnosis, arguments.false_alarm_rate, file).dump() + "\n"
-                       : diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout)));
+  fmt::print("{}", arguments.json ? diagnosis_json(diagnosis, arguments.false_alarm_rate, file).dump() + "\n"
+                                  : diagnosis_text(diagnosis, {arguments.recording, 0}, Detail::full,
+                                                   use_colour(stdout), text_columns(stdout)));
   for (const std::string* asked :
        {&arguments.holdout, &arguments.split_schedule, &arguments.physics, &arguments.amended}) {
     if (!asked->empty()) {
@@ -391,12 +392,14 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     }
     fmt::print("{}\n", json.dump());
   } else {
-    fmt::print("{}{}{}{}{}{}",
-               diagnosis_text(diagnosis, {arguments.recording, 0}, use_colour(stdout), text_columns(stdout),
+    const Detail detail = arguments.details ? Detail::full : Detail::brief;
+    fmt::print("{}{}{}{}{}{}{}",
+               diagnosis_text(diagnosis, {arguments.recording, 0}, detail, use_colour(stdout), text_columns(stdout),
                               beyond->found_or_null()),
-               diagnosis.unexplained ? dwell_table(data, diagnosis) : std::string(), beyond->text(),
-               description ? empirical_text(*description) : std::string(), splits_text(*splits),
-               *holdout ? holdout_text(**holdout) : std::string());
+               diagnosis.unexplained && arguments.details ? dwell_table(data, diagnosis) : std::string(),
+               beyond->text(detail), description && arguments.details ? empirical_text(*description) : std::string(),
+               splits_text(*splits), *holdout ? holdout_text(**holdout) : std::string(),
+               arguments.details ? "" : "\nmore: --details\n");
   }
   if (const auto written = write_files(arguments, diagnosis, *beyond, options, **opened); !written) {
     return tl::unexpected(written.error());
@@ -408,6 +411,7 @@ CommandRun configure(Options& options) {
   auto arguments = std::make_shared<DiagnoseArguments>();
   options.text("RECORDING", arguments->recording, "HDF5 recording, or CSV with its TOML file", Needed::yes);
   options.flag("--json", arguments->json, "one JSON document on standard output");
+  options.flag("--details", arguments->details, "every place, all that was tried, every rival of an equation");
   add_strict_option(options, arguments->strict);
   options.text("--physics", arguments->physics, "write what was named as a physics file for the simulation");
   options.text("--amended", arguments->amended,

@@ -11,13 +11,14 @@
 #include "estimator/diagnosis/holdout.hpp"
 #include "estimator/diagnosis/isolability.hpp"
 #include "protocol/document/document_head.hpp"
+#include "tools/cli/discovery_output.hpp"
 
 namespace selfcal::cli {
 
-// Verdict, cause and next step, broken to `columns` (0: not broken), then the figures. `subject` is what the commands name,
-// `beyond` what was found where the catalogue explains nothing.
-std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis, const Subject& subject, bool colour, int columns,
-                           const discovery::Discovery* beyond = nullptr);
+// Verdict, cause and next step, broken to `columns` (0: not broken), then the figures: what was found and what it makes of the 24, or all
+// that was tried and every place. `subject` is what the commands name, `beyond` what was found where the catalogue explains nothing.
+std::string diagnosis_text(const diagnosis::Diagnosis& diagnosis, const Subject& subject, Detail detail, bool colour,
+                           int columns, const discovery::Discovery* beyond = nullptr);
 Summary summary_of_comparison(const diagnosis::Comparison& comparison);
 // The fields of a diagnosis; "parameters" holds recording, simulation, difference and its sigma.
 nlohmann::ordered_json comparison_json(const diagnosis::Comparison& comparison, double false_alarm_rate,

@@ -22,7 +22,7 @@ using diagnosis::Diagnosis;
 using diagnosis::Finding;
 using diagnosis::Located;
 
-constexpr std::size_t most_places = 8;
+constexpr std::size_t most_places = 8, most_places_in_brief = 3, most_values_in_brief = 6;
 
 std::string adequacy_text(const Diagnosis& d) {
   std::string text = fmt::format("{:<8}{:>9}  {:>15}  {}\n", "", "NIS", "largest misfit", "innovations");
@@ -90,7 +90,7 @@ std::string remainder_text(const Diagnosis& d) {
 }
 
 // Those of the 24 that the omission moved by three sigma and more, most first.
-std::string corrections_text(const Diagnosis& d) {
+std::string corrections_text(const Diagnosis& d, Detail detail) {
   const auto moved = [&](int k) { return std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k); };
   std::vector<int> order;
   for (int k = 0; k < sensor_parameter_count; ++k) {
@@ -102,6 +102,9 @@ std::string corrections_text(const Diagnosis& d) {
   if (order.empty()) {
     return {};
   }
+  const std::size_t shown = detail == Detail::full ? order.size() : std::min(most_values_in_brief, order.size());
+  const std::size_t more = order.size() - shown;
+  order.resize(shown);
   std::string text = fmt::format("\ncorrected values of the 24:\n  {:<22}{:>11}{:>11}{:>9}  {:<7}{}\n", "", "without",
                                  "corrected", "sigma", "unit", "moved by");
   for (const int k : order) {
@@ -112,18 +115,19 @@ std::string corrections_text(const Diagnosis& d) {
                         quantity_text(d.calibration.value(k) / p.si_per_unit, sigma).value, after.value, after.sigma,
                         p.unit, number_text(moved(k)));
   }
-  return text;
+  return text + (more > 0 ? fmt::format("  and {} more\n", more) : std::string());
 }
 
 // One list, largest first, whatever a place was found by.
-std::string places_text(const char* head, std::vector<Located> places, const std::vector<Located>& by) {
+std::string places_text(const char* head, std::vector<Located> places, const std::vector<Located>& by,
+                        std::size_t most = most_places) {
   places.insert(places.end(), by.begin(), by.end());
   if (places.empty()) {
     return {};
   }
   std::stable_sort(places.begin(), places.end(),
                    [](const Located& a, const Located& b) { return a.significance > b.significance; });
-  places.resize(std::min(most_places, places.size()));
+  places.resize(std::min(most, places.size()));
   std::string text = fmt::format("\n{}:\n", head);
   for (const Located& l : places) {
     text += fmt::format("  {:>6} sigma  {}\n", number_text(l.significance), l.words);
@@ -134,9 +138,24 @@ std::string places_text(const char* head, std::vector<Located> places, const std
 // What is found beyond the catalogue stands below, and may leave nothing.
 const char* remains_head(const discovery::Discovery* beyond) {
   if (!explains(beyond)) {
-    return "what remains, largest first";
+    return beyond == nullptr || beyond->laws.empty() ? "what remains, largest first"
+                                                     : "what the catalogue leaves, largest first";
   }
   return beyond->left ? "what remains beside the equations, largest first" : "what the catalogue leaves, largest first";
+}
+
+std::string suspected_text(const Diagnosis& d, Detail detail) {
+  if (d.suspected.empty()) {
+    return {};
+  }
+  std::string text = "\ntoo weak to name:";
+  for (const Finding& f : d.suspected) {
+    text += detail == Detail::full
+                ? fmt::format("\n  {:>6} sigma  {}: {}; would show with {}", number_text(f.significance), f.effect,
+                              effect_words(f.effect), f.experiment)
+                : fmt::format("\n  {:>6} sigma  {}", number_text(f.significance), f.effect);
+  }
+  return text + "\n";
 }
 
 std::string undetectable_text(const Diagnosis& d) {
@@ -155,8 +174,8 @@ std::string undetectable_text(const Diagnosis& d) {
 
 }  // namespace
 
-std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject, bool colour, int columns,
-                           const discovery::Discovery* beyond) {
+std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject, Detail detail, bool colour,
+                           int columns, const discovery::Discovery* beyond) {
   const Diagnosis d = with_laws(of_catalogue, beyond);
   std::string text = summary_text(summary_of(d, subject, beyond), colour, columns);
   if (!d.faults.empty()) {
@@ -175,7 +194,12 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
   text += remainder_text(d);
   // Where nothing explains the recording, nothing corrects the 24.
   if (!d.unexplained || explains(beyond)) {
-    text += corrections_text(d);
+    text += corrections_text(d, detail);
+  }
+  if (detail == Detail::brief) {
+    const bool open = d.unexplained && !explains(beyond);
+    return text + (open ? places_text(remains_head(beyond), d.remaining, d.remaining_by, most_places_in_brief) : "") +
+           suspected_text(d, detail);
   }
   if (!d.before.accepted) {
     text += places_text("where recording and the 24 alone differ, largest first", d.located, d.located_by);
@@ -184,14 +208,7 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
     text += findings_text("tried and rejected by what remains", d.rejected);
     text += places_text(remains_head(beyond), d.remaining, d.remaining_by);
   }
-  if (!d.suspected.empty()) {
-    text += "\ntoo weak to name:\n";
-    for (const Finding& f : d.suspected) {
-      text += fmt::format("  {:>6} sigma  {}: {}; would show with {}\n", number_text(f.significance), f.effect,
-                          effect_words(f.effect), f.experiment);
-    }
-  }
-  return text + undetectable_text(d);
+  return text + suspected_text(d, detail) + undetectable_text(d);
 }
 
 std::string comparison_text(const diagnosis::Comparison& c) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
@@ -83,7 +84,42 @@ std::string class_text(const DiscoveredLaw& law) {
   return text;
 }
 
-std::string law_text(const DiscoveredLaw& law) {
+// The most probable ones in a line.
+std::string rivals_text(const DiscoveredLaw& law) {
+  constexpr std::size_t most = 2;
+  std::vector<const ClassMember*> rivals;
+  for (const ClassMember& m : law.ambiguous) {
+    if (!is_itself(m, law)) {
+      rivals.push_back(&m);
+    }
+  }
+  if (rivals.empty()) {
+    return {};
+  }
+  std::stable_sort(rivals.begin(), rivals.end(), [](const auto* a, const auto* b) { return a->odds > b->odds; });
+  std::vector<std::string> words;
+  for (const ClassMember* m : std::span(rivals).first(std::min(most, rivals.size()))) {
+    const std::string axis = m->axis == law.term.axis ? "" : std::string(name_of_axis(m->axis)) + " ";
+    words.push_back(fmt::format("{}{} (odds {:.2g})", axis, m->expression, m->odds));
+  }
+  const std::size_t more = rivals.size() - words.size();
+  return fmt::format("    explains this recording too: {}{}\n", fmt::join(words, ", "),
+                     more > 0 ? fmt::format(", and {} more", more) : std::string());
+}
+
+std::string brief_law_text(const DiscoveredLaw& law) {
+  return fmt::format(
+             "  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit; holds on another plan with a probability of "
+             "{:.2f}\n",
+             name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
+             law.expression, law.significance, 100.0 * law.share, law.carries_over) +
+         constants_text(law.constants) + rivals_text(law);
+}
+
+std::string law_text(const DiscoveredLaw& law, Detail detail) {
+  if (detail == Detail::brief) {
+    return brief_law_text(law);
+  }
   std::string text =
       fmt::format("  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit, held-out gain {:.0f}\n",
                   name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
@@ -98,7 +134,7 @@ std::string law_text(const DiscoveredLaw& law) {
 }
 
 // An axis whose form is none of what was tried.
-std::string described_text(const Discovery& found) {
+std::string described_text(const Discovery& found, Detail detail) {
   if (found.described.empty()) {
     return {};
   }
@@ -115,7 +151,7 @@ std::string described_text(const Discovery& found) {
     text += fmt::format("    {:<8} ({}) * {}, {:.0f} % of the misfit\n", name_of_axis(law.term.axis),
                         with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,
                         100.0 * law.share);
-    text += law.unsure ? class_text(law) : std::string();
+    text += !law.unsure ? std::string() : detail == Detail::brief ? rivals_text(law) : class_text(law);
   }
   return text;
 }
@@ -253,16 +289,17 @@ std::string next_text(const std::optional<discovery::NextExperiment>& next) {
 
 }  // namespace
 
-std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next) {
+std::string discovery_text(const Discovery& found, const std::optional<discovery::NextExperiment>& next,
+                           Detail detail) {
   if (found.laws.empty() && found.processes.empty()) {
-    return fmt::format("discovery: no equation among {} explains what remains\n", found.functions_tried) +
-           described_text(found) + left_text(found) + next_text(next);
+    return fmt::format("\ndiscovery: no equation among {} explains what remains\n", found.functions_tried) +
+           described_text(found, detail) + left_text(found) + next_text(next);
   }
   std::string text =
-      fmt::format("discovery: found among {} equations; each predicts the dwells and rotations left out of its fit\n",
+      fmt::format("\ndiscovery: found among {} equations; each predicts the dwells and rotations left out of its fit\n",
                   found.functions_tried);
   for (const DiscoveredLaw& law : found.laws) {
-    text += law_text(law);
+    text += law_text(law, detail);
   }
   for (const discovery::DiscoveredProcess& p : found.processes) {
     const bool walk = p.kind == discovery::ProcessKind::random_walk;
@@ -272,7 +309,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
   if (found.instead) {
     text += "  or " + instead_words(*found.instead) + "\n";
   }
-  return text + described_text(found) + left_text(found) + next_text(next);
+  return text + described_text(found, detail) + left_text(found) + next_text(next);
 }
 
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {

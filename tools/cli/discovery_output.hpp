@@ -14,10 +14,14 @@
 
 namespace selfcal::cli {
 
+// What was found, or all that was tried besides and every rival.
+enum class Detail { brief, full };
+
 std::string together_text(const Together& together);
 // Named effects fitted together on all recordings, and beside the laws. Empty where none was.
 std::string effects_text(const discovery::JointFit& joint);
-std::string discovery_text(const discovery::Discovery& found, const std::optional<discovery::NextExperiment>& next);
+std::string discovery_text(const discovery::Discovery& found, const std::optional<discovery::NextExperiment>& next,
+                           Detail detail);
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried);
 nlohmann::ordered_json trial_json(const std::vector<discovery::TriedLaw>& tried);
 std::vector<LawText> laws_of(const discovery::Discovery& found);

@@ -105,9 +105,10 @@ void add_discovery_options(Options& options, DiscoveryArguments& arguments) {
                "write the schedule that would tell the equations found from their rivals");
 }
 
-std::string BeyondCatalogue::text() const {
+std::string BeyondCatalogue::text(Detail detail) const {
   return (together ? together_text(*together) : std::string()) + (joint ? effects_text(*joint) : std::string()) +
-         (found ? discovery_text(*found, next) : std::string()) + (tried.empty() ? std::string() : trial_text(tried));
+         (found ? discovery_text(*found, next, detail) : std::string()) +
+         (tried.empty() ? std::string() : trial_text(tried));
 }
 
 void BeyondCatalogue::add_to(nlohmann::ordered_json& document) const {

@@ -39,7 +39,7 @@ struct BeyondCatalogue {
   ParameterVector parameters() const {
     return joint ? joint->shared.parameters.front() : found->fit.recordings.front().parameters;
   }
-  std::string text() const;
+  std::string text(Detail detail) const;
   void add_to(nlohmann::ordered_json& document) const;
 };
 
