@@ -51,7 +51,7 @@ class BlockSignatures : public ExtraSignatures {
         case LocatedColumn::Kind::rotation: dt = rotation && m.index == number ? c.dt : 0.0; break;
         case LocatedColumn::Kind::after_turn:
           dt = std::min(c.since_turn_end_s, m.end_s) - std::max(c.since_turn_start_s, m.start_s);
-          dt = rotation ? 0.0 : std::max(0.0, dt);
+          dt = rotation || before_its_turn_ended(block, c) ? 0.0 : std::max(0.0, dt);
           break;
         case LocatedColumn::Kind::time:
           dt = std::max(0.0, std::min(c.end_s, m.end_s) - std::max(c.start_s, m.start_s));
@@ -61,6 +61,14 @@ class BlockSignatures : public ExtraSignatures {
         (m.axis < 3 ? angle : velocity)(m.axis % 3, first_map_ + static_cast<int>(k)) = dt * map_unit(m.axis);
       }
     }
+  }
+
+  // A dwell as found may begin milliseconds before the turn has ended. What the clock of the turn before says there is no time after
+  // this one, and 10 ms of a bias are a knock on the velocity: nothing that a place of the map stands for.
+  bool before_its_turn_ended(const SensorBlock& block, const EffectContext& c) const {
+    constexpr double apart_s = 1.0;  // a turn's end as found and as it was differ by 0.3 s at most
+    const Segment& dwell = context_.segments()[context_.segment_at(0.5 * (block.start_s + block.end_s))];
+    return c.since_turn_end_s > block.end_s - dwell.start_s + apart_s;
   }
 
   const RecordingContext& context_;

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/ideal_recording.hpp"
@@ -103,6 +105,46 @@ TEST_F(CreepingRecording, OwnsItsIncrements) {
   EXPECT_EQ(copy.taken_out().effects.size(), 1U);
   const CorrectedRecording nothing(RecordingContext(ideal_.data()), input_, {});
   EXPECT_EQ(nothing.data().delta_v.data(), ideal_.data().delta_v.data());
+}
+
+// Read-outs that come 60 ms before the gyros end each turn as much too early. What the clock of the turn before says in those 60 ms is no
+// time after this one: of dwells of 58 s none is 60 s after its turn.
+TEST(Places, NoDwellIsAsLongAfterItsTurnAsTheTurnBefore) {
+  const IdealRecording ideal(*named_schedule("horizontal", 58.0, 5.0), {0.02, -0.03, 0.6}, {0.7, 0.2, 0.0}, 50.0);
+  constexpr std::size_t early = 3;  // samples
+  ImuData data = ideal.data();
+  std::vector<double> outer(data.gimbal_outer.begin(), data.gimbal_outer.end());
+  std::vector<double> inner(data.gimbal_inner.begin(), data.gimbal_inner.end());
+  for (std::vector<double>* angle : {&outer, &inner}) {
+    std::rotate(angle->begin(), angle->begin() + early, angle->end());
+    std::fill(angle->end() - early, angle->end(), *(angle->end() - early - 1));
+  }
+  data.gimbal_outer = outer;
+  data.gimbal_inner = inner;
+  PassInput input;
+  input.data = &data;
+  input.C_nb = ideal.C_nb_start();
+  input.noise.gyro_arw = 0.001 * units::degree_per_sqrt_hour;
+  input.noise.accel_vrw = 5.0 * units::micro_g_per_sqrt_hz;
+  input.noise.observation.sigma = 3e-6;
+  input.prior.parameter_sigma = 2.0 * plausible_limit();
+  const RecordingContext context(data);
+  SignaturePass pass(context, {}, true);
+  const SignatureRows rows = pass.run(input);
+  int late = 0, sooner = 0;
+  for (std::size_t k = 0; k < pass.map().size(); ++k) {
+    const LocatedColumn& m = pass.map()[k];
+    const double norm = rows.columns.col(static_cast<Eigen::Index>(k)).norm();
+    if (m.kind == LocatedColumn::Kind::after_turn && m.start_s >= 60.0) {
+      EXPECT_EQ(norm, 0.0) << m.axis;
+      ++late;
+    } else if (m.kind == LocatedColumn::Kind::after_turn) {
+      EXPECT_GT(norm, 0.0);
+      ++sooner;
+    }
+  }
+  EXPECT_EQ(late, 6);
+  EXPECT_EQ(sooner, 24);
 }
 
 }  // namespace
