@@ -78,6 +78,47 @@ Eigen::MatrixXd fitted(const Eigen::VectorXd& rate, const std::vector<Line>& lin
   return design.leftCols(pairs);
 }
 
+// Whether taking it out makes each half of the dwell quieter. A beat goes on as long as nothing turns; the base that rocks or tilts in one part
+// of a dwell has peaks in its spectrum too, and a sine taken out for them puts one into the other part. `rate`: all but this line is
+// taken out. Hann's weights keep the steps of a coarse quantum at the ends out.
+bool steady(const Eigen::VectorXd& rate, const Line& line, const Eigen::Vector2d& size, double rate_hz) {
+  const Eigen::Index half = rate.size() / 2;
+  for (const Eigen::Index first : {Eigen::Index{0}, rate.size() - half}) {
+    Eigen::Vector2d there = Eigen::Vector2d::Zero();
+    for (Eigen::Index i = 0; i < half; ++i) {
+      const double weight =
+          1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(half));
+      const double phase = 2.0 * std::numbers::pi * line.frequency_hz * static_cast<double>(first + i) / rate_hz;
+      there += weight * rate(first + i) * Eigen::Vector2d(std::cos(phase), std::sin(phase));
+    }
+    there *= 2.0 / static_cast<double>(half);
+    if (there.dot(size) < 0.5 * size.squaredNorm()) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Those of the lines that are steady beside the others.
+std::vector<Line> steady_ones(const Eigen::VectorXd& rate, const std::vector<Line>& lines, double rate_hz) {
+  if (lines.empty()) {
+    return {};
+  }
+  Eigen::VectorXd size;
+  const Eigen::MatrixXd design = fitted(rate, lines, rate_hz, size);
+  Eigen::VectorXd left = rate - design * size;
+  left.array() -= left.mean();
+  std::vector<Line> kept;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(2 * k);
+    const Eigen::Vector2d own = size.segment<2>(at);
+    if (steady(left + design.middleCols<2>(at) * own, lines[k], own, rate_hz)) {
+      kept.push_back(lines[k]);
+    }
+  }
+  return kept;
+}
+
 void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, double resolution_hz) {
   const auto same = std::find_if(all.begin(), all.end(), [&](const VibrationLine& l) {
     return l.axis == line.axis && std::abs(l.frequency_hz - line.frequency_hz) < resolution_hz;
@@ -108,7 +149,7 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
       for (Eigen::Index i = 0; i < rate.size(); ++i) {
         rate(i) = increments[s.first + static_cast<std::size_t>(i)][k] * fs;
       }
-      const std::vector<Line> lines = peaks(rate, fs, searched);
+      const std::vector<Line> lines = steady_ones(rate, peaks(rate, fs, searched), fs);
       if (lines.empty()) {
         continue;
       }

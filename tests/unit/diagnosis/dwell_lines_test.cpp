@@ -20,7 +20,7 @@ struct Dwell {
   ImuData data;
   std::vector<Segment> segments;
 
-  explicit Dwell(double amplitude) {
+  explicit Dwell(double amplitude, double until_s = length_s) {
     const auto n = static_cast<std::size_t>(rate_hz * length_s);
     std::mt19937_64 engine(5);
     std::normal_distribution<double> normal(0.0, integral_noise);
@@ -29,7 +29,8 @@ struct Dwell {
     for (std::size_t i = 0; i < n; ++i) {
       const double t = static_cast<double>(i) / rate_hz;
       const double now = normal(engine);
-      const double force = bias + amplitude * std::cos(2.0 * std::numbers::pi * frequency_hz * t);
+      const double line = t < until_s ? amplitude : 0.0;
+      const double force = bias + line * std::cos(2.0 * std::numbers::pi * frequency_hz * t);
       velocity.push_back({0.0, 0.0, force / rate_hz + now - last});
       last = now;
       time.push_back(t + 1.0 / rate_hz);
@@ -84,6 +85,14 @@ TEST(DwellLines, BiasStays) {
   }
   // A tenth of a bin off, the sinusoid's mean over the dwell is at most a/(2 pi f T) of its amplitude.
   EXPECT_NEAR(after, before, 50.0 * amplitude_sigma / (2.0 * std::numbers::pi * frequency_hz * length_s));
+}
+
+// A base that rocks for a third of the dwell has a peak too; a sine of the whole dwell in its place would be put into the other two thirds.
+TEST(DwellLines, WhatEndsWithinTheDwellIsNoLine) {
+  Dwell dwell(150.0 * amplitude_sigma, length_s / 3.0);
+  const AngleVelocity before = dwell.velocity;
+  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity).empty());
+  EXPECT_EQ(dwell.velocity, before);
 }
 
 TEST(DwellLines, NoiseAloneIsLeftAlone) {
