@@ -89,6 +89,17 @@ ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diag
   return list(places);
 }
 
+ordered_json to_json(const diagnosis::VelocityJump& jump) {
+  ordered_json j = {{"start_s", jump.start_s}, {"end_s", jump.end_s}};
+  for (const int axis : {0, 1, 2}) {
+    const std::string name(1, "xyz"[axis]);
+    j[name] = jump.size_b(axis);
+    j["sigma_" + name] = jump.sigma_b(axis);
+  }
+  j["unit"] = "m/s";
+  return j;
+}
+
 }  // namespace
 
 std::string verdict_name(diagnosis::DiagnosisVerdict verdict) {
@@ -138,6 +149,15 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_
   }
   if (!d.calibration.left_out.empty()) {
     j["left_out"] = left_out_json(d.calibration);
+  }
+  if (!d.jumps.empty()) {
+    j["velocity_jumps"] = ordered_json::array();
+    for (const auto& jump : d.jumps) {
+      j["velocity_jumps"].push_back(to_json(jump));
+    }
+  }
+  if (d.loudest > 1.0) {
+    j["accel_noise_loudest_tenth"] = d.loudest;
   }
   j["nothing_turned"] = d.nothing_turned;
   j["base"] = d.calibration.moored ? "moored" : "still";

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "estimator/diagnosis/noise/dwell_lines.hpp"
 #include "estimator/diagnosis/noise/noise_findings.hpp"
 #include "estimator/diagnosis/noise/process_check.hpp"
+#include "estimator/diagnosis/noise/velocity_jumps.hpp"
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
@@ -63,8 +65,7 @@ InnovationColour colour_of_rows(const SignatureRows& rows, const RecordingContex
 }
 
 // The densities fitted beside what was named: what was left out had taken its share of them.
-NoiseModel beside(const Stage& stage) {
-  const NoiseModel& noise = stage.hypothesis().noise;
+NoiseModel beside(const Stage& stage, const NoiseModel& noise) {
   PassInput trial = stage.point.pass(noise);
   const Navigated navigated = navigate(trial);
   trial.navigated = &navigated;
@@ -73,6 +74,33 @@ NoiseModel beside(const Stage& stage) {
     return run_pass(trial).log_likelihood;
   });
   return fitted.value_or(noise);
+}
+
+// Noise of the loudest tenth over that of the median.
+double loudest_of(const std::vector<Disturbance>& shaken) {
+  std::vector<double> factor;
+  factor.reserve(shaken.size());
+  for (const Disturbance& d : shaken) {
+    factor.push_back(d.factor);
+  }
+  std::sort(factor.begin(), factor.end());
+  return factor.empty() ? 1.0 : std::sqrt(factor[factor.size() * 9 / 10] / factor[factor.size() / 2]);
+}
+
+// Whether a beat of the accelerometers' quantum can make the line that a sway was found at: its velocity is up to quantum/pi.
+bool within_beat(const Finding& f, const NoiseCheck& noise) {
+  if (f.source == nullptr || f.source->constant.kind != EffectConstant::Kind::spectrum) {
+    return false;
+  }
+  double square = 0.0, quantum = 0.0;
+  for (std::size_t k = 0; k < f.source->parameters.size(); ++k) {
+    square += std::pow(f.parameters[k].value * f.source->parameters[k].si_per_unit, 2);
+  }
+  for (std::size_t axis = 3; axis < noise.axes.size(); ++axis) {
+    quantum = std::max(quantum, std::sqrt(12.0) * noise.axes[axis].increment_sigma);
+  }
+  const double frequency_hz = f.parameters[f.source->parameters.size()].value;
+  return 2.0 * std::numbers::pi * frequency_hz * std::sqrt(square) < quantum / std::numbers::pi;
 }
 
 class Diagnoser {
@@ -88,6 +116,7 @@ class Diagnoser {
  private:
   CorrectedRecording quiet_dwells(std::vector<VibrationLine>& lines) const;
   void name();
+  NoiseModel jumps_beside(const Stage& stage);
   void leave_unjudged();
   void judge_noise_alone();
   void decide(const RecordingContext& context, const SearchResult& found);
@@ -123,6 +152,10 @@ void Diagnoser::name() {
     PassInput without_lines = forward_pass(quiet.data(), d_.calibration);
     beats_ = fit_velocity_noise(without_lines, d_.noise, find_segments(data_));
     if (beats_) {
+      if (!without_lines.noise.shaken.empty()) {
+        d_.loudest = loudest_of(without_lines.noise.shaken);
+        d_.jumps = open_velocity_jumps(without_lines, find_segments(data_));
+      }
       recording = std::move(quiet);
       input = without_lines;
       input.data = &recording.data();
@@ -141,7 +174,7 @@ void Diagnoser::name() {
     Hypothesis named = found.stage.hypothesis();
     if (!named.terms
              .empty()) {  // a process alone is noise itself: what it is not stationary in stays with the densities
-      named.noise = beside(found.stage);
+      named.noise = beside(found.stage, jumps_beside(found.stage));
     }
     input.noise = named.noise;
     input.noise.biases.clear();
@@ -152,6 +185,15 @@ void Diagnoser::name() {
     found = search(context, input, {log_names_, say_, options_.stop});
   }
   decide(context, found);
+}
+
+// What was named stood in the turns, and no jump there was believed beside it.
+NoiseModel Diagnoser::jumps_beside(const Stage& stage) {
+  PassInput without = stage.point.pass(stage.hypothesis().noise);
+  if (!without.noise.shaken.empty()) {
+    d_.jumps = open_velocity_jumps(without, find_segments(data_), d_.jumps);
+  }
+  return without.noise;
 }
 
 void Diagnoser::decide(const RecordingContext& context, const SearchResult& found) {
@@ -170,6 +212,12 @@ void Diagnoser::decide(const RecordingContext& context, const SearchResult& foun
       d_.faults.push_back(fault_of(term, data_));
       leave_unjudged();
       return;
+    }
+  }
+  for (Finding& f : d_.findings) {
+    if (beats_ && within_beat(f, d_.noise)) {
+      f.effect = "vibration_line";
+      f.stochastic = true;
     }
   }
   d_.remainder = judgement.after.accepted ? remainder_of(found) : std::nullopt;

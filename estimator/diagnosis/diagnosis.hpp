@@ -14,6 +14,7 @@
 #include "estimator/diagnosis/data/faults.hpp"
 #include "estimator/diagnosis/effects/effect.hpp"
 #include "estimator/diagnosis/noise/noise_check.hpp"
+#include "estimator/diagnosis/noise/velocity_jumps.hpp"
 #include "estimator/diagnosis/regression/recording_context.hpp"
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/passes/calibration.hpp"
@@ -109,8 +110,10 @@ struct Diagnosis {
   std::vector<Undetectable> undetectable, detectable;
   Adequacy before, after;
   NoiseCheck noise;
-  CalibrationResult calibration;   // of the 24 alone
-  std::vector<ModelEffect> model;  // equations among the findings
+  std::vector<VelocityJump> jumps;  // there nothing was concluded from the velocity
+  double loudest = 1.0;             // the accelerometers' noise in the loudest tenth of the intervals over the median's
+  CalibrationResult calibration;    // of the 24 alone
+  std::vector<ModelEffect> model;   // equations among the findings
   // Equations among what is rejected, and whether nothing but what they leave speaks against them: no walk beside them, and not
   // that they are nearly one.
   std::vector<ModelEffect> rejected_model;

@@ -114,6 +114,12 @@ class UnseenTurns {
   double turned_ = 0.0;
 };
 
+double factor_at(const std::vector<Disturbance>& all, double time_s) {
+  const auto after =
+      std::upper_bound(all.begin(), all.end(), time_s, [](double t, const Disturbance& d) { return t < d.end_s; });
+  return after != all.end() && after->start_s <= time_s ? after->factor : 1.0;
+}
+
 VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
   VectorX sigma(layout.count());
   sigma.segment<3>(StateLayout::position).setConstant(input.prior.position);
@@ -150,11 +156,9 @@ UdFilter make_filter(const PassInput& input, const StateLayout& layout) {
 
 }  // namespace
 
-double NoiseModel::inflation(double time_s) const {
-  const auto after = std::upper_bound(disturbed.begin(), disturbed.end(), time_s,
-                                      [](double t, const Disturbance& d) { return t < d.end_s; });
-  return after != disturbed.end() && after->start_s <= time_s ? after->factor : 1.0;
-}
+double NoiseModel::inflation(double time_s) const { return factor_at(disturbed, time_s); }
+
+double NoiseModel::shaking(double time_s) const { return factor_at(shaken, time_s); }
 
 Navigated navigate(const PassInput& input) {
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, nullptr,
@@ -231,8 +235,11 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     model.drive.head<9>() = interval.drive;
     Gamma.topRows<9>() = interval.Gamma;
     if (input.noise.axes) {
-      model.set(
-          process_noise(navigator.site(), along_n(*input.noise.axes, C_before, C_nb), input.interval_s, input.sign));
+      WhiteNoise white = along_n(*input.noise.axes, C_before, C_nb);
+      const double shaking = input.noise.shaking(0.5 * (interval.start_s + interval.end_s));
+      white.force *= shaking;
+      white.velocity *= shaking;
+      model.set(process_noise(navigator.site(), white, input.interval_s, input.sign));
     }
     const double inflation = input.noise.inflation(0.5 * (interval.start_s + interval.end_s));
     MatrixX& L = interval.coasted ? coast_noise.L() : model.L;

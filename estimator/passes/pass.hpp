@@ -38,8 +38,10 @@ struct NoiseModel {
   ObservationModel observation;
   std::vector<BiasNoise> biases;       // that change with time
   std::vector<Disturbance> disturbed;  // chronological, no two overlap
+  std::vector<Disturbance> shaken;     // the same of the accelerometers' noise alone, beside `axes`
   // Of the variance of an interval whose middle is at `time_s`.
   double inflation(double time_s) const;
+  double shaking(double time_s) const;
 };
 
 // 1 sigma before any data. The navigation part is wide enough to say nothing.

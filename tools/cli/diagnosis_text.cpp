@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
@@ -158,6 +159,29 @@ std::string suspected_text(const Diagnosis& d, Detail detail) {
   return text + "\n";
 }
 
+// What people, wind or a lost count did, where nothing was concluded from it.
+std::string disturbed_text(const Diagnosis& d, Detail detail) {
+  std::string text;
+  if (d.loudest > 1.0) {
+    text += fmt::format("the base is shaken: noise of the accelerometers {} times the usual in the loudest tenth\n",
+                        number_text(d.loudest));
+  }
+  if (!d.jumps.empty()) {
+    text += "the velocity jumps, by a count that was lost or a knock (mm/s along x, y, z):\n";
+  }
+  constexpr double milli = 1e3;
+  const std::size_t shown = detail == Detail::full ? d.jumps.size() : std::min(most_places_in_brief, d.jumps.size());
+  for (const diagnosis::VelocityJump& jump : std::span(d.jumps).first(shown)) {
+    text += fmt::format("  {:>6.0f} s ", jump.start_s);
+    for (const int axis : {0, 1, 2}) {
+      text += fmt::format("  {:>5.2f} +- {:.2f}", milli * jump.size_b(axis), milli * jump.sigma_b(axis));
+    }
+    text += '\n';
+  }
+  text += shown < d.jumps.size() ? fmt::format("  and {} more\n", d.jumps.size() - shown) : "";
+  return text.empty() ? text : text + "\n";
+}
+
 std::string undetectable_text(const Diagnosis& d) {
   if (d.undetectable.empty()) {
     return {};
@@ -189,6 +213,7 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
   if (!d.calibration.left_out.empty()) {
     text += left_out_text(d.calibration) + "\n";
   }
+  text += disturbed_text(d, detail);
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
   text += remainder_text(d);

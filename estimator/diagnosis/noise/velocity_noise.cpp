@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/diagnosis/noise/loudness.hpp"
 #include "estimator/statistics/climb.hpp"
 
 namespace selfcal::diagnosis {
@@ -37,11 +38,42 @@ NoiseModel with_sizes(NoiseModel noise, const Sizes& s) {
   return noise;
 }
 
+using LogLikelihood = std::function<double(const NoiseModel&)>;
+
 // Densities trade against each other along ridges: that takes many moves and rounds. What does not matter any more is not followed to zero.
-Summit<10> top_of(const Sizes& start, std::vector<double> factors,
-                  const std::function<double(const Sizes&)>& log_likelihood) {
-  const Climb how{.factors = std::move(factors), .most_rounds = 20, .most_moves = 4, .enough = 0.1, .farthest = 30.0};
-  return climb<10>(start, how, log_likelihood);
+const Climb to_the_top = {
+    .factors = {2.0, 1.25, 1.06}, .most_rounds = 20, .most_moves = 4, .enough = 0.1, .farthest = 30.0};
+
+NoiseModel top_of(const NoiseModel& start, const LogLikelihood& log_likelihood) {
+  const auto of = [&](const Sizes& s) { return log_likelihood(with_sizes(start, s)); };
+  return with_sizes(start, climb<10>(sizes_of(start), to_the_top, of).at);
+}
+
+// Where the base changes its loudness the accelerometers' noise follows it: variances as 1 + (power / knee)^slope.
+NoiseModel shaken_by(const std::vector<Loudness>& loudness, NoiseModel noise, double knee, double slope) {
+  noise.shaken.clear();
+  for (const Loudness& l : loudness) {
+    noise.shaken.push_back({l.start_s, l.end_s, 1.0 + std::pow(l.power / knee, slope)});
+  }
+  return noise;
+}
+
+NoiseModel top_beside(const std::vector<Loudness>& loudness, const NoiseModel& start,
+                      const LogLikelihood& log_likelihood) {
+  // A variance that follows the power of the shaking goes with slope 1; a knee far above the median leaves the quiet as it is.
+  constexpr double knee = 10.0, slope = 0.75;
+  using More = std::array<double, 12>;
+  const auto noise_of = [&](const More& x) {
+    Sizes s{};
+    std::copy_n(x.begin(), s.size(), s.begin());
+    return shaken_by(loudness, with_sizes(start, s), x[10], x[11]);
+  };
+  More from{};
+  const Sizes sizes = sizes_of(start);
+  std::copy(sizes.begin(), sizes.end(), from.begin());
+  from[10] = knee;
+  from[11] = slope;
+  return noise_of(climb<12>(from, to_the_top, [&](const More& x) { return log_likelihood(noise_of(x)); }).at);
 }
 
 double integral_density(const NoiseCheck& noise, std::size_t axis, double rate_hz) {
@@ -82,12 +114,13 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& check, const std::ve
     trial.navigated = &navigated;
     return run_pass(trial).log_likelihood;
   };
-  const Summit<10> top =
-      top_of(sizes_of(start), {2.0, 1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(start, s)); });
-  if (top.log_likelihood < log_likelihood(given) + least_log_gain) {
+  const std::vector<Loudness> loudness = loudness_of(*input.data, segments, input.interval_s);
+  const NoiseModel best =
+      changes_its_loudness(loudness) ? top_beside(loudness, start, log_likelihood) : top_of(start, log_likelihood);
+  if (log_likelihood(best) < log_likelihood(given) + least_log_gain) {
     return false;
   }
-  input.noise = with_sizes(start, top.at);
+  input.noise = best;
   return true;
 }
 
@@ -96,13 +129,11 @@ std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
   if (!noise.axes) {
     return std::nullopt;
   }
-  const Sizes before = sizes_of(noise);
-  const Sizes best =
-      top_of(before, {2.0, 1.25, 1.06}, [&](const Sizes& s) { return log_likelihood(with_sizes(noise, s)); }).at;
-  if (best == before) {
+  const NoiseModel best = top_of(noise, log_likelihood);
+  if (sizes_of(best) == sizes_of(noise)) {
     return std::nullopt;
   }
-  return with_sizes(noise, best);
+  return best;
 }
 
 }  // namespace selfcal::diagnosis

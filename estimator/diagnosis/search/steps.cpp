@@ -56,6 +56,22 @@ bool immaterial(const Stage& stage, const Candidate& candidate, const GroupTest&
   return shift.cwiseAbs().cwiseQuotient(sigma).maxCoeff() < noticed_sigma;
 }
 
+// The p-values of coloured noise rest on a spectrum that was estimated from the same recording: a name must be worth its
+// coefficients by BIC too, when it is taken and beside all that came after it.
+bool dear(const SearchGround& ground, const GroupTest& test) {
+  return !is_white(ground.context.colour()) && test.delta_chi2 < test.rank * std::log(ground.significance.rows);
+}
+
+std::optional<std::size_t> dear_term(const SearchGround& ground, const Stage& stage) {
+  const std::vector<Candidate>& terms = stage.model.terms();
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (dear(ground, test_group(stage.given_forms(), columns_of(terms[i]), columns_of(terms, i)))) {
+      return i;
+    }
+  }
+  return std::nullopt;
+}
+
 // Whether it may be taken: of the lines of a spectrum each once, of other effects one; and nothing that fell.
 bool is_open(const Selection& s, const Variant& v) {
   const auto takes_its_place = [&](const Variant& x) {
@@ -134,11 +150,8 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
   const auto goes_on = [&](const BiasProcess& process) {
     return goes_on_inside_dwells(ground.context.data(), stage.hypothesis().noise, process);
   };
-  // The p-values of coloured noise rest on a spectrum that was estimated from the same recording: a name must be worth its
-  // coefficients by BIC too.
-  const bool coloured = !is_white(ground.context.colour());
   const auto says_nothing = [&](const Candidate& c, const GroupTest& test) {
-    return immaterial(stage, c, test) || (coloured && test.delta_chi2 < test.rank * std::log(ground.significance.rows));
+    return immaterial(stage, c, test) || dear(ground, test);
   };
   const std::vector<BiasProcess> processes = processes_to_test(stage);
   const auto found = best_addition(stage.given_forms(), stage.columns(), alternatives, processes, ground.significance,
@@ -159,7 +172,8 @@ std::optional<Stage> add_best(const SearchGround& ground, const Stage& stage) {
 }
 
 std::optional<Stage> drop_weak(const SearchGround& ground, const Stage& stage) {
-  const auto weak = weak_term(stage.given_forms(), stage.model.terms(), ground.significance);
+  auto weak = weak_term(stage.given_forms(), stage.model.terms(), ground.significance);
+  weak = weak ? weak : dear_term(ground, stage);
   if (!weak) {
     return std::nullopt;
   }

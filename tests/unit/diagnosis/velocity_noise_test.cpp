@@ -5,49 +5,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "estimator/diagnosis/still_calibration.hpp"
-#include "tests/unit/estimator/simulated.hpp"
+#include "tests/unit/diagnosis/quantised_noise.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
-constexpr double rate_hz = 50.0;
-constexpr std::uint64_t seed = 3;
-
-struct Axes {
-  Vector3 arw, vrw, integral;  // deg/sqrt(h), ug/sqrt(Hz), um/sqrt(s)
-};
-
-// Perfect sensors and this noise.
-Recording recording_with(const Axes& axes) {
-  sim::SimConfig config;
-  config.sample_rate_hz = rate_hz;
-  config.gyro_arw_deg_per_sqrt_h = 0.0;
-  config.accel_vrw_ug_per_sqrt_hz = 0.0;
-  config.gyro_lsb_arcsec = 1e-6;
-  config.accel_lsb_m_per_s = 1e-10;
-  Recording r = *sim::simulate(config, *named_schedule("horizontal", 58.0, 5.0), seed, {});
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> unit;
-  const double root_dt = std::sqrt(1.0 / rate_hz);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<Eigen::Index>(axis);
-    double before = 0.0;
-    for (std::size_t i = 0; i < r.time_s.size(); ++i) {
-      r.delta_theta_rad[i][axis] += axes.arw(k) * units::degree_per_sqrt_hour * root_dt * unit(random);
-      const double now = 1e-6 * axes.integral(k) / root_dt * unit(random);
-      r.delta_v_mps[i][axis] += axes.vrw(k) * units::micro_g_per_sqrt_hz * root_dt * unit(random) + now - before;
-      before = now;
-    }
-  }
-  return r;
-}
-
 TEST(VelocityNoise, OfEachAxisIsFoundAndPredictsTheInnovations) {
-  const Axes axes{{0.001, 0.001, 0.004}, {1.0, 1.0, 3.0}, {40.0, 20.0, 30.0}};
-  const Recording recording = recording_with(axes);
+  const quantised_noise::Axes axes{{0.001, 0.001, 0.004}, {1.0, 1.0, 3.0}, {40.0, 20.0, 30.0}};
+  const Recording recording = quantised_noise::recording_with(axes);
   const ImuData data = test::view_of(recording);
   const CalibrationOutcome calibration = calibrate_still(data, {}, {});
   ASSERT_TRUE(calibration.result);
@@ -74,7 +41,8 @@ TEST(VelocityNoise, OfEachAxisIsFoundAndPredictsTheInnovations) {
 }
 
 TEST(VelocityNoise, WhiteNoiseOfForceAndRateHasNone) {
-  const Recording recording = recording_with({{0.001, 0.001, 0.001}, {5.0, 5.0, 5.0}, {0.0, 0.0, 0.0}});
+  const Recording recording =
+      quantised_noise::recording_with({{0.001, 0.001, 0.001}, {5.0, 5.0, 5.0}, {0.0, 0.0, 0.0}});
   const ImuData data = test::view_of(recording);
   const CalibrationOutcome calibration = calibrate_still(data, {}, {});
   ASSERT_TRUE(calibration.result);
