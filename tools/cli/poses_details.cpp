@@ -45,10 +45,12 @@ std::string parameters_text(const std::vector<diagnosis::PoseParameter>& paramet
       open += p.name;
     } else if (p.unit == "1") {
       text += fmt::format("    {:16} {:+9.4f} +- {:.4f} %\n", p.name, 100.0 * p.value, 100.0 * p.sigma);
+    } else if (gyro) {
+      text += fmt::format("    {:16} {:9.6g} +- {:.2g} {}\n", p.name, p.value, p.sigma, p.unit);
     } else {
-      const double unit = gyro ? shown.gyro : shown.accel;
-      text += fmt::format("    {:16} {:+9.4g} +- {:.2g} {}\n", p.name, p.value / unit, p.sigma / unit,
-                          gyro ? shown.gyro_name : shown.accel_name);
+      const double unit = shown.accel;
+      text +=
+          fmt::format("    {:16} {:+9.4g} +- {:.2g} {}\n", p.name, p.value / unit, p.sigma / unit, shown.accel_name);
     }
   }
   if (!open.empty()) {

@@ -228,6 +228,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"attitude", d.by_attitude ? attitude_json(*d.by_attitude) : Json()},
           {"rest", d.rest ? rest_json(*d.rest) : Json()},
           {"clipped", to_json(d.clipped)},
+          {"clipped_poses", d.clipped_poses},
           {"left_out", to_json(d.left_out)},
           {"accelerometers",
            {{"adequate", d.accel_adequate},
@@ -248,6 +249,8 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"earth_taken_out", d.earth_taken_out},
             {"latitude_seen_deg", d.latitude_seen ? Json(*d.latitude_seen / units::degree) : Json()},
             {"accelerometers_reversed", d.accel_reversed},
+            {"raw_unit_rad_s", d.gyro_raw_unit > 0.0 ? Json(d.gyro_raw_unit) : Json()},
+            {"contradict", d.gyros_contradict},
             {"held_out_rms", d.gyro_held_out_rms},
             {"white_rms", d.gyro_white_rms},
             {"noise_at_rest", noise_json(d.gyro_noise)},
@@ -259,6 +262,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"gravity_direction_deg",
            {{"turns", d.turns},
             {"turns_clipped", d.turns_clipped},
+            {"turns_whole", d.turns_whole},
             {"before", d.direction_before / units::degree},
             {"after", d.direction_after / units::degree},
             {"held_out_before", d.direction_before_held_out / units::degree},
@@ -270,8 +274,8 @@ bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
   const bool nonlinear =
       d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
                                  [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
-  return !d.accel_adequate || !d.accel_named.empty() || !d.gyro_named.empty() || d.settling.has_value() || nonlinear ||
-         (d.rest && drifts(*d.rest));
+  return !d.accel_adequate || !d.gyros_contradict.empty() || !d.accel_named.empty() || !d.gyro_named.empty() ||
+         d.settling.has_value() || nonlinear || (d.rest && drifts(*d.rest));
 }
 
 }  // namespace selfcal::cli

@@ -139,6 +139,9 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
                                       j.time_s, j.size.x() / shown.gyro, j.size.y() / shown.gyro,
                                       j.size.z() / shown.gyro, shown.gyro_name));
   }
+  if (!d.gyros_contradict.empty()) {
+    text += lines_of("misfit:", d.gyros_contradict);
+  }
   if (d.accel_reversed) {
     text += "reversed: all accelerometers, as the Earth's rate shows: they read acceleration\n";
   }
@@ -288,7 +291,11 @@ std::string table(const PoseDiagnosis& d, const Units& shown) {
     rows.push_back(gyro_row(d.earth_taken_out ? "bias" : "mean", d.gyro_bias, d.gyro_bias_sigma,
                             d.earth_taken_out ? of_headings(si) : shown, d.gyro_axes));
   }
-  add_row(d.gyro_parameters, "gyro scale", of_axes("scale"), "%", percent, rows);
+  if (d.gyro_raw_unit > 0.0) {
+    add_row(d.gyro_parameters, "gyro 1 deg/s", of_axes("scale"), "raw", 1.0 / units::degree, rows);
+  } else {
+    add_row(d.gyro_parameters, "gyro scale", of_axes("scale"), "%", percent, rows);
+  }
   return rows.size() > 1 ? text_of(rows) : std::string();
 }
 

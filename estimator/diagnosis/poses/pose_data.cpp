@@ -41,6 +41,7 @@ AccelModel assumed(const PoseInput& input, const std::vector<Pose>& poses) {
       }
     }
   }
+  m.open = m.before;
   m.before = m.held.select(held * m.before, m.before);
   return m;
 }
@@ -150,7 +151,16 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
     m.weight = weights_of(m, poses, noise);
   }
   linearise(poses, m);
+  m.open = m.held.select(m.open, m.sigma);
   return m;
+}
+
+AccelModel AccelModel::moved_by(Eigen::Index parameter, double step) const {
+  AccelModel moved = *this;
+  Nine steps = Nine::Zero();
+  steps(parameter) = step;
+  move(moved, steps);
+  return moved;
 }
 
 std::vector<PoseParameter> parameters_of(const AccelModel& m) {

@@ -39,6 +39,9 @@ FoundPoses find_poses(const PoseInput& input);
 // Axes that stand at the end of their range, which no other value approaches as often.
 std::vector<Clipping> find_clipping(const PoseInput& input);
 
+// Takes out the poses in which an accelerometer stands at the end of its range; how many those are.
+int drop_clipped(const PoseInput& input, const std::vector<Clipping>& clipped, std::vector<Pose>& poses);
+
 constexpr double misalignment_before = 0.03;  // rad, sigma of what an accelerometer's is before
 
 // u = T (a - b), T upper triangular.
@@ -52,6 +55,7 @@ struct AccelModel {
   Eigen::Matrix<double, 9, 1> before;  // sigma of what is assumed before
   Eigen::Array<bool, 9, 1> held =
       Eigen::Array<bool, 9, 1>::Constant(false);  // left as assumed: gravity does not reach them
+  Eigen::Matrix<double, 9, 1> open;  // sigma by which each is not known: of one that is held what it was before
   double raw_per_g = 1.0;
   bool nominal = false;        // whether the unit is known: else raw_per_g is a guess, and scale is raw units per g
   double gravity_sigma = 0.0;  // of gravity at the place, in parts of it: that of all three scale factors together
@@ -59,6 +63,7 @@ struct AccelModel {
   double noise_of_means =
       0.0;  // of |u|, by the halves of the poses: slow noise included, and nothing that differs from pose to pose
   Vector3 direction(const Vector3& raw) const { return T * (raw - bias); }
+  AccelModel moved_by(Eigen::Index parameter, double step) const;  // one of the nine
 };
 // With what any accelerometer is before: misaligned by 0.03, its scale and bias within 0.1 and 0.2 g of the nominal ones.
 AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& poses);

@@ -171,4 +171,20 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   return earth;
 }
 
+// The Earth's rate is fixed in the room, and a sensor that is turned by hand sees it go with the pose: within 15.04 deg/h and its sigma.
+void mark_earth(const PoseInput& input, PoseDiagnosis& d) {
+  if (d.earth_taken_out || !input.gyros_si) {
+    return;
+  }
+  const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;
+  constexpr double sure = 3.0;
+  for (PoseEffect& e : d.gyro_named) {
+    bool within = e.effect->linear_in_force;
+    for (std::size_t k = 0; k < e.value.size(); ++k) {
+      within = within && std::abs(e.value[k]) - sure * e.sigma[k] < omega;
+    }
+    e.may_be_earth = within;
+  }
+}
+
 }  // namespace selfcal::diagnosis

@@ -24,4 +24,7 @@ struct EarthInPoses {
 // Accelerometers that all are reversed turn u over, which no turn shows: where the readings are likelier so by e^6, they are.
 EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried);
 
+// Names of the gyros that it may make (PoseEffect::may_be_earth).
+void mark_earth(const PoseInput& input, PoseDiagnosis& d);
+
 }  // namespace selfcal::diagnosis

@@ -4,6 +4,7 @@
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
+#include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -335,6 +336,11 @@ std::vector<LeftOut> find_left_out(const PoseInput& input) {
     all.push_back({input.time_s[i - 1] - input.time_s.front(), input.time_s[i] - input.time_s.front(), 0,
                    "the log holds no sample"});
   }
+  for (const StuckAxis& s : find_stuck(input)) {
+    if (!s.throughout) {
+      add(s.first, s.last, s.gyro ? "a gyro stands at one value" : "an accelerometer stands at one value");
+    }
+  }
   if (input.sensors != Sensors::both) {  // three axes of a coarse sensor may well stand still in a pose
     return all;
   }
@@ -358,7 +364,7 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
     const auto [low, high] = std::minmax_element(series.begin(), series.end(),
                                                  [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; });
     const double range = (*high)[axis] - (*low)[axis];
-    Clipping c{k < 3, k % 3, 0.0, 0, 0.0, 0.0};
+    Clipping c{.gyro = k < 3, .axis = k % 3};
     for (const double end : {(*low)[axis], (*high)[axis]}) {
       double step = range;  // to the value next to the end: of coarse readings more than a hundredth of the range
       for (const auto& row : series) {
@@ -382,6 +388,7 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
         c.last_s = std::max(c.last_s, to);
         c.samples += there;
         c.limit = std::max(c.limit, std::abs(end));
+        (end == (*low)[axis] ? c.low : c.high) = end;
       }
     }
     if (c.samples > 0) {
@@ -389,6 +396,25 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
     }
   }
   return all;
+}
+
+int drop_clipped(const PoseInput& input, const std::vector<Clipping>& clipped, std::vector<Pose>& poses) {
+  constexpr double most =
+      0.01;  // of a pose's samples; what white noise cuts off moves the mean by less than a tenth of its sigma
+  const auto at_the_end = [&](const Pose& p, const Clipping& c) {
+    double count = 0.0, all = 0.0;
+    for (const auto& [first, last] : p.quiet) {
+      for (std::size_t i = first; i < last; ++i) {
+        const double value = input.accel[i][static_cast<std::size_t>(c.axis)];
+        count += value <= c.low || value >= c.high ? 1.0 : 0.0;
+        all += 1.0;
+      }
+    }
+    return count > most * all;
+  };
+  return static_cast<int>(std::erase_if(poses, [&](const Pose& p) {
+    return std::any_of(clipped.begin(), clipped.end(), [&](const Clipping& c) { return !c.gyro && at_the_end(p, c); });
+  }));
 }
 
 }  // namespace selfcal::diagnosis

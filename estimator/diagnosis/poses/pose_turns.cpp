@@ -1,5 +1,7 @@
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 
+#include "estimator/diagnosis/poses/pose_axes.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -8,6 +10,7 @@
 #include <limits>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -31,6 +34,19 @@ struct TurnFit {
   Eigen::MatrixXd response;  // of S to the directions' errors, [9 x 3 turns]
   Eigen::Matrix<double, 9, 1> sigma = Eigen::Matrix<double, 9, 1>::Zero();
 };
+
+// Of noise that is known by the scatter of so many degrees of freedom: Student's two-sided 95 % in those of a normal distribution. t^2 is
+// distributed as F with one degree of freedom above.
+double wider_by_few(double free) {
+  constexpr double normal = 1.959964;
+  const double tail = std::log(0.05);
+  double low = normal, high = 13.0;  // 12.7 with one
+  while (high - low > 1e-3) {
+    const double t = 0.5 * (low + high);
+    (log_f_tail(t * t, 1.0, free) > tail ? low : high) = t;
+  }
+  return low / normal;
+}
 
 // Fits S to `turns` (numbers of the poses that they begin at) but `without`.
 TurnFit fit_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
@@ -67,12 +83,13 @@ TurnFit fit_turns(const PoseInput& input, const std::vector<Pose>& poses, const 
       model.S(j / 3, j % 3) += step(j);
     }
     fit.response = -solver.solve(J.transpose());
-    // A turn gives two components of a direction.
-    const double free = std::max(1.0, 2.0 * static_cast<double>(turns.size()) - 9.0);
+    // A turn gives two components of a direction, and the nine take what the turns determine of them.
+    const double taken = solver.solve(J.transpose() * J).trace();
+    const double free = std::max(1.0, 2.0 * static_cast<double>(turns.size()) - taken);
     fit.noise = std::max(1e-6, std::sqrt((r + J * step).squaredNorm() / free));
     fit.sigma =
         Eigen::Matrix<double, 9, 1>(solver.solve(Eigen::Matrix<double, 9, 9>::Identity()).diagonal()).cwiseSqrt() *
-        fit.noise;
+        fit.noise * wider_by_few(free);
     if (step.cwiseAbs().maxCoeff() < 1e-5) {
       break;
     }
@@ -107,17 +124,15 @@ GyroModel static_model(const std::vector<Pose>& poses, std::size_t without, bool
   return m;
 }
 
-// Sigma of S by what the poses leave open of the accelerometers' misalignments: directions of gravity are wrong by as much, and
-// gyros that carry them from pose to pose seem misaligned.
+// Sigma of S by what the poses leave open of the accelerometers: directions of gravity are wrong by as much, and gyros that carry them from
+// pose to pose seem misaligned, or of another scale.
 Eigen::Matrix<double, 9, 1> sigma_by_accelerometers(const PoseInput& input, const std::vector<Pose>& poses,
                                                     const std::vector<std::size_t>& turns, const AccelModel& accel,
                                                     const TurnFit& fit, const GyroModel& model) {
   Eigen::Matrix<double, 9, 1> square = Eigen::Matrix<double, 9, 1>::Zero();
-  constexpr std::array<std::pair<int, int>, 3> elements = {{{0, 1}, {0, 2}, {1, 2}}};
-  constexpr double h = 1e-4;  // rad
-  for (std::size_t e = 0; e < elements.size(); ++e) {
-    AccelModel moved = accel;
-    moved.T(elements[e].first, elements[e].second) += h / accel.raw_per_g;
+  constexpr double h = 1e-3;  // of sigma; the directions are linear in so little
+  for (Eigen::Index j = 0; j < 9; ++j) {
+    const AccelModel moved = accel.moved_by(j, h * accel.open(j));
     std::vector<Pose> others = poses;
     for (Pose& p : others) {
       p.u = moved.direction(p.accel);
@@ -128,9 +143,7 @@ Eigen::Matrix<double, 9, 1> sigma_by_accelerometers(const PoseInput& input, cons
       change.segment<3>(3 * static_cast<Eigen::Index>(t)) = direction_error(input, others[k], others[k + 1], model) -
                                                             direction_error(input, poses[k], poses[k + 1], model);
     }
-    const auto j = 6 + static_cast<Eigen::Index>(e);
-    const double sigma = accel.held(j) ? misalignment_before : accel.sigma(j) * accel.raw_per_g;
-    square += (fit.response * change * (sigma / h)).cwiseAbs2();
+    square += (fit.response * change / h).cwiseAbs2();
   }
   return square.cwiseSqrt();
 }
@@ -144,6 +157,68 @@ void add_parameters(const GyroModel& model, const Eigen::Matrix<double, 9, 1>& s
     const double value = M(j / 3, j % 3) - (diagonal ? 1.0 : 0.0);
     d.gyro_parameters.push_back({(diagonal ? "scale_" : "misalignment_") + axes, "1", value,
                                  M(j / 3, j / 3) * M(j % 3, j % 3) * sigma(j), sigma(j) < 0.5 * scale_before});
+  }
+}
+
+// Without those that go round: where a gyro's scale factor of a per cent makes a phase of half a radian, directions are not linear in it, and
+// a wrong one fits as well.
+std::vector<std::size_t> without_rounds(const PoseInput& input, const std::vector<Pose>& poses,
+                                        std::vector<std::size_t> turns) {
+  constexpr double most = 3.0 * M_PI;
+  std::erase_if(turns, [&](std::size_t k) {
+    const Vector3 bias = 0.5 * (poses[k].gyro + poses[k + 1].gyro);
+    double angle = 0.0;
+    for (std::size_t i = poses[k].last; i < poses[k + 1].first; ++i) {
+      angle += (at(input.gyro, i) - bias).norm() * input.gyro_unit * (input.time_s[i] - input.time_s[i - 1]);
+    }
+    return angle > most;
+  });
+  return turns;
+}
+
+void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
+                      const AccelModel& accel, bool linear, PoseDiagnosis& d) {
+  for (const bool with : {false, true}) {
+    GyroModel all = static_model(poses, none, with && linear);
+    const TurnFit fit = fit_turns(input, poses, turns, none, all);
+    double square = 0.0, held_out_square = 0.0;
+    for (const std::size_t k : turns) {
+      square += direction_error(input, poses[k], poses[k + 1], all).squaredNorm();
+      GyroModel rest = static_model(poses, k, with && linear);
+      rest.S = all.S;
+      fit_turns(input, poses, turns, k, rest);
+      held_out_square += direction_error(input, poses[k], poses[k + 1], rest).squaredNorm();
+    }
+    const auto n = static_cast<double>(turns.size());
+    (with ? d.direction_after : d.direction_before) = std::sqrt(square / n);
+    (with ? d.direction_after_held_out : d.direction_before_held_out) = std::sqrt(held_out_square / n);
+    if (with || !linear) {
+      const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
+      add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
+    }
+    if (!with && !linear) {
+      d.direction_after = d.direction_before;
+      d.direction_after_held_out = d.direction_before_held_out;
+      break;
+    }
+  }
+}
+
+void close_parameters(PoseDiagnosis& d) {
+  for (PoseParameter& p : d.gyro_parameters) {
+    p.determined = false;
+  }
+}
+
+// Scale factors of counts are told in counts.
+void tell_in_raw(double unit, PoseDiagnosis& d) {
+  d.gyro_raw_unit = unit;
+  for (PoseParameter& p : d.gyro_parameters) {
+    if (p.name.starts_with("scale_")) {
+      p.value = (1.0 + p.value) / unit;
+      p.sigma /= unit;
+      p.unit = "raw/(rad/s)";
+    }
   }
 }
 
@@ -172,41 +247,38 @@ std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<
 
 void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
                  const AccelModel& accel, bool linear, PoseDiagnosis& d) {
-  d.turns = static_cast<int>(turns.size());
+  const auto judge = [&](const PoseInput& in, bool unit_known) {
+    const std::vector<std::size_t> kept = unit_known ? without_rounds(in, poses, turns) : turns;
+    d.turns = static_cast<int>(kept.size());
+    d.turns_whole = static_cast<int>(turns.size() - kept.size());
+    d.gyro_parameters.clear();
+    d.direction_before = d.direction_after = HUGE_VAL;
+    if (!kept.empty()) {
+      fit_and_hold_out(in, poses, kept, accel, linear, d);
+    }
+  };
   d.turns_clipped = static_cast<int>(poses.size() - 1 - turns.size());
   if (turns.empty()) {
     return;
   }
   // Turns that end this far from where gravity is are carried in another unit, or not by these gyros.
   constexpr double most = 10.0 * units::degree;
-  for (const bool with : {false, true}) {
-    GyroModel all = static_model(poses, none, with && linear);
-    const TurnFit fit = fit_turns(input, poses, turns, none, all);
-    double square = 0.0, held_out_square = 0.0;
-    for (const std::size_t k : turns) {
-      square += direction_error(input, poses[k], poses[k + 1], all).squaredNorm();
-      GyroModel rest = static_model(poses, k, with && linear);
-      rest.S = all.S;
-      fit_turns(input, poses, turns, k, rest);
-      held_out_square += direction_error(input, poses[k], poses[k + 1], rest).squaredNorm();
+  judge(input, input.gyros_si || input.gyro_unit != 1.0);
+  if (d.direction_after > most) {
+    const auto reading = read_gyros_by_turns(input, poses, turns);
+    d.gyros_contradict = reading ? contradiction(input, *reading) : std::string();
+    if (reading && d.gyros_contradict.empty()) {
+      PoseInput in_unit = input;
+      in_unit.gyro_unit = reading->unit;
+      judge(in_unit, true);
+      tell_in_raw(reading->unit, d);
     }
-    const auto n = static_cast<double>(turns.size());
-    (with ? d.direction_after : d.direction_before) = std::sqrt(square / n);
-    (with ? d.direction_after_held_out : d.direction_before_held_out) = std::sqrt(held_out_square / n);
-    if (with || !linear) {
-      const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
-      add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
-    }
-    if ((with ? d.direction_after : d.direction_before) > most) {
-      for (PoseParameter& p : d.gyro_parameters) {
-        p.determined = false;
-      }
-    }
-    if (!with && !linear) {
-      d.direction_after = d.direction_before;
-      d.direction_after_held_out = d.direction_before_held_out;
-      break;
-    }
+  }
+  if (d.direction_after > most) {
+    close_parameters(d);
+  }
+  if (d.turns == 0) {
+    d.direction_before = d.direction_after = 0.0;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
+#include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
 #include "estimator/diagnosis/poses/read_outs.hpp"
@@ -23,6 +24,10 @@ std::string with_numbers(const char* format, double a, double b) {
   std::array<char, 240> text{};
   std::snprintf(text.data(), text.size(), format, a, b);
   return text.data();
+}
+
+std::string counted(int count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
 double span_of(const std::vector<Pose>& poses) {
@@ -165,22 +170,6 @@ bool read_gravity(const PoseInput& input, const std::vector<Pose>& poses, const 
   return false;
 }
 
-// The Earth's rate is fixed in the room, and a sensor that is turned by hand sees it go with the pose: within 15.04 deg/h and its sigma.
-void mark_earth(const PoseInput& input, PoseDiagnosis& d) {
-  if (d.earth_taken_out || !input.gyros_si) {
-    return;
-  }
-  const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;
-  constexpr double sure = 3.0;
-  for (PoseEffect& e : d.gyro_named) {
-    bool within = e.effect->linear_in_force;
-    for (std::size_t k = 0; k < e.value.size(); ++k) {
-      within = within && std::abs(e.value[k]) - sure * e.sigma[k] < omega;
-    }
-    e.may_be_earth = within;
-  }
-}
-
 void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
@@ -193,13 +182,19 @@ void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses,
   mark_earth(input, d);
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
-  judge_turns(input, poses, turns, accel, linear, d);
+  if (d.gyro_axes == input.gyro_axes) {
+    judge_turns(input, poses, turns, accel, linear, d);
+  }
   add_invisible(d);
   if (d.turns > 0 && std::none_of(d.gyro_parameters.begin(), d.gyro_parameters.end(),
                                   [](const PoseParameter& p) { return p.determined; })) {
     d.invisible.push_back(std::string("scale factors of the gyros: they carry gravity's direction wrong by ") +
                           with_numbers("%.0f deg", d.direction_after / units::degree, 0.0) +
                           (input.gyros_si ? "" : ", and nobody says their unit (--gyro-unit)"));
+  }
+  if (d.turns_whole > 0) {
+    d.invisible.push_back("scale factors by " + counted(d.turns_whole, "turn") +
+                          " of more than one and a half rounds: gravity's direction is not carried so far");
   }
 }
 
@@ -229,10 +224,6 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
     d.invisible.push_back("scale factors by " + std::to_string(d.steady_turns) +
                           " stretches that turn steadily: the recording holds no angle of the table");
   }
-}
-
-std::string counted(int count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
 // Few headings, as of a sensor that is turned about the vertical by quarters: where the gyros carry the heading and see the Earth's rate, it
@@ -374,6 +365,9 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
                   "acceleration"
                 : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
   }
+  if (nothing_else && d.clipped_poses > 0) {
+    return "at rest an accelerometer stands at the end of its range: its means are none";
+  }
   constexpr double shortest_s = 20.0;  // find_poses
   if (nothing_else && d.duration_s < shortest_s) {
     return "less than 20 s: too short to tell rest from motion";
@@ -387,6 +381,10 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
 void add_other_forces(PoseDiagnosis& d) {
   if (!d.other_forces.empty()) {
     d.invisible.push_back("what " + other_forces_words(d) + " tell: steady acceleration, no pose");
+  }
+  if (d.clipped_poses > 0) {
+    d.invisible.push_back("what " + counted(d.clipped_poses, "pose") +
+                          " with an accelerometer at the end of its range tell: a mean of what is clipped is none");
   }
 }
 
@@ -413,6 +411,10 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   d.sensors = input.sensors;
   d.duration_s = input.time_s.back() - input.time_s.front();
   d.gyro_axes = input.gyro_axes;
+  add_dead_axes(input, d);
+  if (!d.failure.empty()) {
+    return d;
+  }
   d.clipped = find_clipping(input);
   d.left_out = find_left_out(input);
   FoundPoses found = find_poses(input);
@@ -420,6 +422,7 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   d.steady_turns = found.steady_turns;
   d.moving = found.moving;
   d.other_forces = found.other_forces;
+  d.clipped_poses = input.sensors == Sensors::gyros ? 0 : drop_clipped(input, d.clipped, poses);
   d.failure = why_no_poses(input, poses, d);
   if (!d.failure.empty()) {
     return d;

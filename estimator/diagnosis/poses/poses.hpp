@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -66,7 +67,8 @@ struct Confounded {
 struct Clipping {
   bool gyro = true;
   int axis = 0;
-  double limit = 0.0;  // raw units, the larger of both ends
+  double limit = 0.0;                       // raw units, the larger of both ends
+  double low = -HUGE_VAL, high = HUGE_VAL;  // the ends that it stands at
   std::size_t samples = 0;
   double first_s = 0.0, last_s = 0.0;  // since the start
 };
@@ -174,10 +176,14 @@ struct PoseDiagnosis {
   // Direction of gravity carried from pose to pose: rms, rad; scale and misalignment of the gyros fitted, reading = M rate + bias, M less 1.
   int turns = 0, turns_clipped = 0;
   std::vector<PoseParameter> gyro_parameters;
+  int turns_whole = 0;           // that go round so often that gravity's direction is not carried through them
+  double gyro_raw_unit = 0.0;    // rad/s a raw unit, by the turns, where nobody says it; parameters are then in it
+  std::string gyros_contradict;  // what of the gyros' unit or axes contradicts gravity's turns; empty: nothing
   double direction_before = 0.0, direction_after = 0.0;
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
   int steady_turns = 0;              // stretches that are quiet and turn: no poses
   std::vector<double> other_forces;  // what quiet stretches read that are not at 1 g, g: no poses
+  int clipped_poses = 0;             // in which an accelerometer stands at the end of its range: their means are none
   int moving = 0;                    // stretches as quiet as the log's quietest that move: no poses
   std::optional<ReadOuts> read_outs;
   std::optional<ByAttitude> by_attitude;

@@ -1,0 +1,186 @@
+#include "estimator/diagnosis/poses/pose_axes.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::diagnosis {
+namespace {
+
+// One turn: gravity before and behind it, and between them steps of the gyros' integral, raw units times seconds.
+struct RawTurn {
+  Vector3 from, to;
+  std::vector<Vector3> steps;
+};
+
+std::vector<RawTurn> raw_turns(const PoseInput& input, const std::vector<Pose>& poses,
+                               const std::vector<std::size_t>& turns) {
+  constexpr double step_s = 0.05;  // at 200 deg/s a tenth of the size that matters here
+  constexpr double least = 15.0 * units::degree;
+  std::vector<RawTurn> all;
+  for (const std::size_t k : turns) {
+    const Pose &from = poses[k], &to = poses[k + 1];
+    RawTurn turn{from.u.normalized(), to.u.normalized(), {}};
+    if (std::acos(std::clamp(turn.from.dot(turn.to), -1.0, 1.0)) < least) {
+      continue;
+    }
+    const Vector3 bias = 0.5 * (from.gyro + to.gyro);
+    double begin = input.time_s[from.last - 1];
+    turn.steps.push_back(Vector3::Zero());
+    for (std::size_t i = from.last; i < to.first; ++i) {
+      if (input.time_s[i] - begin > step_s) {
+        turn.steps.push_back(Vector3::Zero());
+        begin = input.time_s[i - 1];
+      }
+      turn.steps.back() += (at(input.gyro, i) - bias) * (input.time_s[i] - input.time_s[i - 1]);
+    }
+    all.push_back(std::move(turn));
+  }
+  return all;
+}
+
+std::vector<Matrix3> signed_permutations() {
+  std::vector<Matrix3> all;
+  std::array<int, 3> order = {0, 1, 2};
+  do {
+    for (unsigned int signs = 0; signs < 8; ++signs) {
+      Matrix3 P = Matrix3::Zero();
+      for (unsigned int i = 0; i < 3; ++i) {
+        P(static_cast<Eigen::Index>(i), order.at(i)) = (signs >> i & 1U) != 0U ? -1.0 : 1.0;
+      }
+      all.push_back(P);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return all;  // the identity first
+}
+
+double middle_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// By how much the usual turn ends beside where gravity is, rad.
+double usual_error(const std::vector<RawTurn>& turns, const Matrix3& axes, double unit) {
+  std::vector<double> errors;
+  for (const RawTurn& turn : turns) {
+    Vector3 u = turn.from;
+    for (const Vector3& step : turn.steps) {
+      u = matrix_from_rotation_vector(-unit * (axes * step)) * u;
+    }
+    errors.push_back(std::acos(std::clamp(u.dot(turn.to), -1.0, 1.0)));
+  }
+  return middle_of(std::move(errors));
+}
+
+struct Candidate {
+  GyroReading reading;
+  double error = HUGE_VAL;
+};
+
+// From the unit at which the gyros go as far as gravity, which turns that also turn about gravity exceed.
+Candidate best_unit(const std::vector<RawTurn>& turns, const Matrix3& axes, double least) {
+  constexpr double from = 0.8, to = 8.0, by = 1.03;
+  Candidate best;
+  for (double unit = from * least; unit < to * least; unit *= by) {
+    const double error = usual_error(turns, axes, unit);
+    if (error < best.error) {
+      best = {{axes, unit}, error};
+    }
+  }
+  double low = best.reading.unit / by, high = best.reading.unit * by;
+  constexpr double golden = 0.618034;
+  for (int k = 0; k < 20; ++k) {
+    const double a = high - golden * (high - low), b = low + golden * (high - low);
+    (usual_error(turns, axes, a) < usual_error(turns, axes, b) ? high : low) =
+        usual_error(turns, axes, a) < usual_error(turns, axes, b) ? b : a;
+  }
+  best.reading.unit = 0.5 * (low + high);
+  best.error = usual_error(turns, axes, best.reading.unit);
+  return best;
+}
+
+std::string axes_words(const Matrix3& axes) {
+  std::string words = "(";
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    Eigen::Index j = 0;
+    axes.row(i).cwiseAbs().maxCoeff(&j);
+    words += (i > 0 ? ", " : "") + std::string(axes(i, j) < 0.0 ? "-" : "") + "xyz"[j];
+  }
+  return words + ")";
+}
+
+}  // namespace
+
+std::optional<GyroReading> read_gyros_by_turns(const PoseInput& input, const std::vector<Pose>& poses,
+                                               const std::vector<std::size_t>& turns) {
+  constexpr std::size_t enough = 5, most = 40;
+  std::vector<RawTurn> raw = raw_turns(input, poses, turns);
+  if (raw.size() < enough) {
+    return {};
+  }
+  raw.resize(std::min(raw.size(), most));
+  std::vector<double> ratios;
+  for (const RawTurn& turn : raw) {
+    double far = 0.0;
+    for (const Vector3& step : turn.steps) {
+      far += step.norm();
+    }
+    if (far > 0.0) {
+      ratios.push_back(std::acos(std::clamp(turn.from.dot(turn.to), -1.0, 1.0)) / far);
+    }
+  }
+  if (ratios.size() < enough) {
+    return {};
+  }
+  const double least = middle_of(std::move(ratios));
+  constexpr double close =
+      4.0 * units::degree;  // misalignments of 2 % and scale factors of 3 % in turns of a right angle
+  constexpr double sure = 3.0;
+  Candidate best, second, as_told;
+  for (const Matrix3& axes : signed_permutations()) {
+    const Candidate one = best_unit(raw, axes, least);
+    as_told = axes.isIdentity() ? one : as_told;
+    if (one.error < best.error) {
+      second = best;
+      best = one;
+    } else if (one.error < second.error) {
+      second = one;
+    }
+  }
+  if (as_told.error < close && as_told.error < sure * best.error) {
+    return as_told.reading;  // other axes are worth asking for only where these fail
+  }
+  return best.error < close && sure * best.error < second.error ? std::optional(best.reading) : std::nullopt;
+}
+
+std::string contradiction(const PoseInput& input, const GyroReading& reading) {
+  std::string words;
+  if (!reading.axes.isIdentity()) {
+    words = "gravity turns as the gyros say once they are taken as " + axes_words(reading.axes);
+    // Accelerometers that are all reversed turn alike: an even number of exchanges and signs can be theirs.
+    if (reading.axes.determinant() > 0.0) {
+      const Matrix3 inverse = reading.axes.transpose();
+      const bool reversed = inverse.diagonal().sum() < 0.0;
+      words += ", or the accelerometers as " + axes_words(reversed ? Matrix3(-inverse) : inverse);
+    }
+    words += ": order or sign of an axis is wrong";
+  }
+  constexpr double another = 1.3;
+  const double ratio = reading.unit / input.gyro_unit;
+  if (input.gyros_si && (ratio > another || ratio < 1.0 / another)) {
+    const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+    std::array<char, 200> text{};
+    constexpr double alike = 0.1;
+    const bool increments = std::abs(ratio / rate - 1.0) < alike;
+    std::snprintf(text.data(), text.size(), "gravity turns %.4g times as far as the gyros say%s", ratio,
+                  increments ? ": they are increments, not rates" : ": another unit, or a time in another one");
+    words += (words.empty() ? "" : "; ") + std::string(text.data());
+  }
+  return words;
+}
+
+}  // namespace selfcal::diagnosis
