@@ -63,7 +63,7 @@ std::string known_unit(std::string_view written) {
   struct Known {
     std::string_view written, unit;
   };
-  static constexpr std::array<Known, 68> known{{
+  static constexpr std::array<Known, 72> known{{
       {"rad/s", "rad/s"},
       {"rads", "rad/s"},
       {"rads-1", "rad/s"},
@@ -85,6 +85,10 @@ std::string known_unit(std::string_view written) {
       {"mdeg/s", "mdeg/s"},
       {"mdps", "mdeg/s"},
       {"rpm", "rpm"},
+      {"rev/s", "rev/s"},
+      {"revs", "rev/s"},
+      {"rps", "rev/s"},
+      {"1/min", "rpm"},
       {"arcsec/s", "arcsec/s"},
       {"rad", "rad"},
       {"deg", "deg"},
@@ -159,6 +163,9 @@ std::string unit_at_end(Words& words) {
       {{"dps"}, "deg/s"},
       {{"degps"}, "deg/s"},
       {{"mdps"}, "mdeg/s"},
+      {{"rpm"}, "rpm"},
+      {{"rev", "s"}, "rev/s"},
+      {{"gal"}, "cm/s^2"},
       {{"deg", "h"}, "deg/h"},
       {{"dph"}, "deg/h"},
       {{"deg", "hr"}, "deg/h"},
@@ -279,10 +286,11 @@ Role single_role(const Words& w) {
     return Role::gimbal;
   }
   if (holds(w, {"time", "stamp", "zeit", "utc", "date", "epoch"}) ||
-      is_one_of(w, {"t", "sec", "seconds", "tow", "sow", "s", "ms", "us", "ns"})) {
+      is_one_of(w, {"t", "ts", "sec", "seconds", "millis", "micros", "tow", "sow", "s", "ms", "us", "ns"})) {
     return Role::time;
   }
-  if (holds(w, {"count", "index", "seq", "sample", "packet", "frame"}) || is_one_of(w, {"n", "i", "id", "nr", "no"})) {
+  if (holds(w, {"count", "index", "seq", "sample", "packet", "frame"}) ||
+      is_one_of(w, {"n", "i", "id", "nr", "no", "cnt", "counter", "idx"})) {
     return Role::counter;
   }
   // Known, and of no use here.
@@ -306,6 +314,21 @@ int take_index(std::string_view& name) {
   }
   name = text.substr(0, text.size() - length);
   return index;
+}
+
+void add_role_by_unit(NamedColumn& column) {
+  const auto unit = find_unit(column.unit);
+  if (!unit) {
+    return;
+  }
+  const bool unsaid = column.role == Role::unknown;
+  if (column.axis < 0 && unit->quantity == Quantity::time && (unsaid || column.role == Role::temperature)) {
+    column.role = Role::time;
+  } else if (column.axis >= 0 && unsaid && unit->quantity == Quantity::angular_rate) {
+    column.role = Role::gyro;
+  } else if (column.axis >= 0 && unsaid && unit->quantity == Quantity::acceleration) {
+    column.role = Role::accelerometer;
+  }
 }
 
 NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
@@ -348,6 +371,8 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   if (column.role == Role::time && thermal && is_one_of(words, {"t"})) {
     column.role = Role::temperature;
   }
+  // "Temps (s)", "Tid [ms]", "Vitesse angulaire X (°/s)": a language that nobody thought of, and a unit that says what it is.
+  add_role_by_unit(column);
   // "axis1_rate_dps": how fast a table turns is no read-out of where it stands.
   const auto unit_said = find_unit(column.unit);
   const bool turns = unit_said && unit_said->quantity == Quantity::angular_rate;
@@ -361,6 +386,8 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     column.unit = unit_among(words, {{"ms", "ms"},
                                      {"us", "us"},
                                      {"ns", "ns"},
+                                     {"millis", "ms"},
+                                     {"micros", "us"},
                                      {"s", "s"},
                                      {"sec", "s"},
                                      {"seconds", "s"},

@@ -23,6 +23,31 @@ std::string_view comment_of(std::string_view line) {
   return {};
 }
 
+// "1.234.567,8": digits in threes with the points that spreadsheets put between them where the decimal mark is a comma. Empty: none.
+std::string without_thousands(std::string_view field) {
+  const std::size_t whole = std::min(field.find(','), field.size());
+  std::string text;
+  std::size_t digits = 0, groups = 0;
+  for (std::size_t k = 0; k < whole; ++k) {
+    const char c = field[k];
+    if (c == '.') {
+      if (digits == 0 || digits > 3 || (groups > 0 && digits != 3)) {
+        return {};
+      }
+      ++groups;
+      digits = 0;
+    } else if (c >= '0' && c <= '9') {
+      ++digits;
+      text += c;
+    } else if (k == 0 && (c == '-' || c == '+')) {
+      text += c == '-' ? "-" : "";
+    } else {
+      return {};
+    }
+  }
+  return groups > 0 && digits == 3 ? text + std::string(field.substr(whole)) : std::string();
+}
+
 template <typename Number>
 std::optional<Number> parsed(std::string_view field, char decimal) {
   std::array<char, 64> buffer{};
@@ -247,8 +272,26 @@ void split_fields(std::string_view line, char separator, std::vector<std::string
 
 std::optional<double> number_of(std::string_view field, char decimal) { return parsed<double>(field, decimal); }
 
-std::optional<long double> long_number_of(std::string_view field, char decimal) {
-  return parsed<long double>(field, decimal);
+namespace {
+
+template <typename Number>
+std::optional<Number> grouped(std::string_view field, const TextDialect& dialect) {
+  const auto plain = parsed<Number>(field, dialect.decimal);
+  if (plain || dialect.decimal != ',' || field.find('.') == std::string_view::npos) {
+    return plain;
+  }
+  const std::string text = without_thousands(field);
+  return text.empty() ? std::nullopt : parsed<Number>(text, dialect.decimal);
+}
+
+}  // namespace
+
+std::optional<double> grouped_number_of(std::string_view field, const TextDialect& dialect) {
+  return grouped<double>(field, dialect);
+}
+
+std::optional<long double> long_number_of(std::string_view field, const TextDialect& dialect) {
+  return grouped<long double>(field, dialect);
 }
 
 std::optional<long double> date_of(std::string_view field) {

@@ -25,7 +25,9 @@ std::string_view trimmed(std::string_view text);
 
 // A finite or infinite number, or none: the whole field is to be one. Sign, decimal comma, exponents with E or D.
 std::optional<double> number_of(std::string_view field, char decimal);
-std::optional<long double> long_number_of(std::string_view field, char decimal);
+// Of a text whose dialect is known: where the decimal mark is a comma, "1.234.567,8" too.
+std::optional<double> grouped_number_of(std::string_view field, const TextDialect& dialect);
+std::optional<long double> long_number_of(std::string_view field, const TextDialect& dialect);
 
 // Seconds since 1970 of an ISO 8601 date and time (a blank for the T, offset or Z optional), or since midnight of a time
 // alone.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "protocol/import/line_reader.hpp"
+#include "protocol/import/rows_in_turns.hpp"
 #include "protocol/toml_file/utf8.hpp"
 
 namespace selfcal::import {
@@ -138,7 +139,7 @@ Expected<void> TextSource::take(const ColumnRequest& request, const std::vector<
   };
   for (std::size_t k = 0; k < request.columns.size(); ++k) {
     const std::size_t column = request.columns[k];
-    const auto value = number_of(field_at(column), dialect_.decimal);
+    const auto value = grouped_number_of(field_at(column), dialect_);
     if (!request.tolerant) {
       if (column >= fields.size()) {
         return bad(line, fmt::format("{} fields; {} is wanted", fields.size(), title(column)));
@@ -151,7 +152,7 @@ Expected<void> TextSource::take(const ColumnRequest& request, const std::vector<
   }
   if (request.stamp) {
     const std::string_view field = field_at(*request.stamp);
-    const auto stamp = request.stamp_is_date ? date_of(field) : long_number_of(field, dialect_.decimal);
+    const auto stamp = request.stamp_is_date ? date_of(field) : long_number_of(field, dialect_);
     if (!request.tolerant && !(stamp && std::isfinite(*stamp))) {
       return wrong(*request.stamp, field, request.stamp_is_date ? "a date and time (ISO 8601)" : "a time, a number");
     }
@@ -290,7 +291,7 @@ std::string ColumnSource::mixed_rows() const {
                          title(column), fmt::join(words, ", "));
     }
   }
-  return {};
+  return numbered_rows(*this);
 }
 
 std::string ColumnSource::title(std::size_t column) const {

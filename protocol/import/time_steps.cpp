@@ -67,6 +67,48 @@ std::string continue_full_clocks(std::vector<long double>& stamps) {
   return places > 1 ? words + fmt::format(", so in {} places", places) : words;
 }
 
+std::vector<int> place_in_stamp(const std::vector<long double>& stamps) {
+  std::vector<int> places(stamps.size(), 0);
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    places[k] = stamps[k] == stamps[k - 1] ? places[k - 1] + 1 : 0;
+  }
+  return places;
+}
+
+std::string spread_coarse_stamps(std::vector<long double>& stamps) {
+  if (stamps.size() < 3 || !std::is_sorted(stamps.begin(), stamps.end()) || !(stamps.back() > stamps.front())) {
+    return {};
+  }
+  // Of a clock that stops nobody knows where its rows belong.
+  constexpr int longest = 64;
+  constexpr long double usual_times = 3.0L;
+  const long double interval = (stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1);
+  const std::vector<int> places = place_in_stamp(stamps);
+  std::size_t still = 0;
+  std::vector<long double> spread = stamps;
+  for (std::size_t first = 0; first < stamps.size();) {
+    std::size_t next = first + 1;
+    while (next < stamps.size() && places[next] > 0) {
+      ++next;
+    }
+    const auto rows = static_cast<long double>(next - first);
+    const long double step = next < stamps.size() ? (stamps[next] - stamps[first]) / rows : interval;
+    if (rows > longest || (rows > 1 && step > usual_times * interval)) {
+      return {};
+    }
+    for (std::size_t k = first; k < next; ++k) {
+      spread[k] = stamps[first] + static_cast<long double>(k - first) * step;
+    }
+    still += next - first - 1;
+    first = next;
+  }
+  if (still == 0) {
+    return {};
+  }
+  stamps = std::move(spread);
+  return fmt::format("{} rows have the time of the row before, of a clock coarser than the rows: spread evenly", still);
+}
+
 std::vector<bool> repeated_rows(const ColumnData& data) {
   std::vector<bool> repeated(data.rows, false);
   std::size_t count = 0;

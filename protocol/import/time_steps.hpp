@@ -16,6 +16,12 @@ long double median_interval(const std::vector<long double>& stamps);
 // so much that with one of these added it is the usual interval behind the one before, it goes on from there. Words on where; empty: nowhere.
 std::string continue_full_clocks(std::vector<long double>& stamps);
 
+// A clock coarser than the rows, or one of blocks of rows: stamps that never fall and stand still for a few rows are spread evenly up to the next
+// one. Words on how many; empty: nothing done, for none stands still, or one does for long.
+std::string spread_coarse_stamps(std::vector<long double>& stamps);
+// For each row the number of rows before it with the same stamp.
+std::vector<int> place_in_stamp(const std::vector<long double>& stamps);
+
 // True for a row that is the one before in its stamp and in all values: written twice. None where more than a tenth of all rows are.
 std::vector<bool> repeated_rows(const ColumnData& data);
 

@@ -14,7 +14,7 @@ using units::hour;
 constexpr double g = units::standard_gravity;
 constexpr double foot = 0.3048;  // m, international
 
-constexpr std::array<Unit, 34> table{{
+constexpr std::array<Unit, 35> table{{
     {"rad/s", Quantity::angular_rate, 1.0},
     {"deg/s", Quantity::angular_rate, degree},
     {"deg/h", Quantity::angular_rate, degree / hour},
@@ -23,6 +23,7 @@ constexpr std::array<Unit, 34> table{{
     {"arcsec/s", Quantity::angular_rate, arcsecond},
     {"mdeg/s", Quantity::angular_rate, 1e-3 * degree},
     {"rpm", Quantity::angular_rate, 6.0 * degree},
+    {"rev/s", Quantity::angular_rate, 360.0 * degree},
     {"rad", Quantity::angle, 1.0},
     {"deg", Quantity::angle, degree},
     {"arcsec", Quantity::angle, arcsecond},

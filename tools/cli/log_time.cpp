@@ -10,6 +10,7 @@
 #include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/rows_in_turns.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
@@ -30,6 +31,22 @@ void take_once(TimedRows& rows) {
     rows.notes = fmt::format("{} rows are the row before once more and are taken once", count);
     import::leave_out(repeated, rows.data);
   }
+}
+
+// Error (bad_input): rows of several sensors have one stamp.
+Expected<void> spread_stamps(TimedRows& rows, const import::ColumnSource& source) {
+  constexpr int most = 8;
+  std::vector<int> places = import::place_in_stamp(rows.data.stamps);
+  const std::string words = import::spread_coarse_stamps(rows.data.stamps);
+  rows.notes += (rows.notes.empty() || words.empty() ? "" : "; ") + words;
+  if (!words.empty() && std::all_of(places.begin(), places.end(), [](int place) { return place < most; }) &&
+      import::rows_take_turns(rows.data.values, places)) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("rows of several sensors, one under another, with one time in {}: a file for each is read "
+                            "(awk makes them)",
+                            source.title(rows.time)));
+  }
+  return {};
 }
 
 bool rises(const std::vector<long double>& stamps) {
@@ -59,6 +76,11 @@ Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std
         const std::string continued = import::continue_full_clocks(rows->data.stamps);
         rows->notes += (rows->notes.empty() || continued.empty() ? "" : "; ") + continued;
         if (rises(rows->data.stamps)) {
+          return rows;
+        }
+        if (const auto spread = spread_stamps(*rows, source); !spread) {
+          return tl::unexpected(spread.error());
+        } else if (rises(rows->data.stamps)) {
           return rows;
         }
       }

@@ -56,8 +56,8 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
                             "are of logs",
                             arguments.files.front()));
   }
-  if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty() || arguments.rate_hz)) {
-    return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers, each with its times");
+  if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty())) {
+    return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers");
   }
   const bool attitude_asked = !arguments.attitude.file.empty() || !arguments.attitude.columns.empty();
   if (attitude_asked && (arguments.files.size() > 1 || arguments.rate_hz)) {

@@ -17,6 +17,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
+#include "tools/cli/log_rows.hpp"
 #include "tools/cli/log_time.hpp"
 
 namespace selfcal::cli {
@@ -102,13 +103,16 @@ Expected<void> check_time(const TimedRows& rows, const import::ColumnSource& sou
   if (named[rows.time].role == import::Role::time) {
     return {};
   }
-  const bool counts = std::all_of(stamps.begin(), stamps.end(), [](long double s) { return s == std::floor(s); }) &&
-                      stamps.size() > 1 && stamps[1] - stamps[0] == 1.0L;
+  const bool whole = std::all_of(stamps.begin(), stamps.end(), [](long double s) { return s == std::floor(s); });
+  const long double step = stamps.size() > 1 ? stamps[1] - stamps[0] : 0.0L;
+  const bool counts = whole && (step == 1.0L || (!source.names()[rows.time].empty() && named[rows.time].unit.empty()));
   if (counts || !import::rises_evenly(stamps)) {
-    return fail(ErrorKind::bad_input, fmt::format("{}: {} {}: {}", file, source.title(rows.time),
-                                                  counts ? "rises by 1, as a counter does, and no name calls it a time"
-                                                         : "does not increase evenly, as a time does",
-                                                  rate_says));
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {} {}: {}", file, source.title(rows.time),
+                            counts ? fmt::format("rises by {:g}, as a counter does, and no name calls it a time",
+                                                 static_cast<double>(step))
+                                   : "does not increase evenly, as a time does",
+                            rate_says));
   }
   return {};
 }
@@ -146,6 +150,27 @@ void add_time(const TimedRows& rows, const std::string& unit, std::optional<doub
   }
 }
 
+// With a time that a name calls so, or else one that rises; where some fields are empty, what the rows of the slower triad hold.
+Expected<TimedRows> rows_of(const import::ColumnSource& source, const std::vector<import::NamedColumn>& named,
+                            const PoseLayout& layout, import::ColumnRequest request, const std::string& file) {
+  Expected<TimedRows> rows = read_with_time(source, layout.times, request);
+  if (!rows) {
+    request.tolerant = true;
+    Expected<TimedRows> parts = read_with_time(source, layout.times, request);
+    if (parts && fill_incomplete(layout, *parts)) {
+      rows = std::move(parts);
+    }
+  }
+  const bool called = std::any_of(layout.times.begin(), layout.times.end(),
+                                  [&](std::size_t k) { return named[k].role == import::Role::time; });
+  if (layout.by_names && !layout.times.empty() && !called &&
+      (!rows || !check_increasing(file, rows->data, {}).has_value())) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: no column is called a time, and none rises as one: {}", file, rate_says));
+  }
+  return rows;
+}
+
 Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const auto source = import::open_columns(path);
   if (!source) {
@@ -166,7 +191,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const std::size_t angle = columns.angle > 0 ? ask(columns.angle) : 0;
   const std::size_t thermal = columns.temperature > 0 ? columns.temperature : named_temperature(named);
   const std::size_t temperature = thermal > 0 ? ask(thermal) : 0;
-  const Expected<TimedRows> rows = read_with_time(**source, layout->times, request);
+  const Expected<TimedRows> rows = rows_of(**source, named, *layout, request, path);
   if (!rows) {
     return tl::unexpected(rows.error());
   }
@@ -289,6 +314,11 @@ Expected<OneLog> read_all(const RawFiles& files, const RawColumns& columns) {
     own.sensors = Sensors::gyros;
     own.angle = own.temperature = 0;
     Expected<OneLog> gyro = read_log(files.gyros, own);
+    if (gyro && columns.rate_hz && gyro->input.time_s.size() != log->input.time_s.size()) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{} and {}: {} and {} rows: of one rate and no times they would be as many",
+                              files.poses.front(), files.gyros, log->input.time_s.size(), gyro->input.time_s.size()));
+    }
     return gyro && gyro->input.time_s.size() > 1 && log->input.time_s.size() > 1 ? joined(*log, std::move(*gyro), files)
                                                                                  : std::move(gyro);
   }

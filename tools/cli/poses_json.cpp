@@ -248,6 +248,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"jumps", to_json(d.gyro_jumps)},
             {"earth_taken_out", d.earth_taken_out},
             {"latitude_seen_deg", d.latitude_seen ? Json(*d.latitude_seen / units::degree) : Json()},
+            {"latitude_seen_sigma_deg", d.latitude_seen ? Json(d.latitude_seen_sigma / units::degree) : Json()},
             {"accelerometers_reversed", d.accel_reversed},
             {"raw_unit_rad_s", d.gyro_raw_unit > 0.0 ? Json(d.gyro_raw_unit) : Json()},
             {"contradict", d.gyros_contradict},

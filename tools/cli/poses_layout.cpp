@@ -20,8 +20,12 @@ struct Triads {
 
 Triads triads_of(const std::vector<NamedColumn>& named, Role role) {
   std::array<std::vector<std::size_t>, 3> found;
+  // Rates where increments of the same sensor stand beside them.
+  const auto is = [&](const NamedColumn& c) { return c.role == role && c.axis >= 0; };
+  const bool rates =
+      std::count_if(named.begin(), named.end(), [&](const NamedColumn& c) { return is(c) && !c.increment; }) >= 3;
   for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k].role == role && named[k].axis >= 0) {
+    if (is(named[k]) && !(rates && named[k].increment)) {
       found.at(static_cast<std::size_t>(named[k].axis)).push_back(k);
     }
   }
@@ -43,6 +47,20 @@ std::vector<std::size_t> columns_from(std::size_t first, std::size_t count) {
   return columns;
 }
 
+// The first column, or the last one where that rises and the first does not: PSINS writes the time behind its sensors.
+std::size_t nameless_time(const import::ColumnSource& source, std::size_t count) {
+  const auto rises = [&](std::size_t column) {
+    import::ColumnRequest request;
+    request.tolerant = true;
+    request.columns = {column};
+    request.most_rows = 1000;
+    const Expected<import::ColumnData> data = source.read(request);
+    const auto falls = [](double a, double b) { return !(b > a); };
+    return data && std::adjacent_find(data->values[0].begin(), data->values[0].end(), falls) == data->values[0].end();
+  };
+  return !rises(0) && rises(count - 1) ? count - 1 : 0;
+}
+
 // Where no name says it: time, three gyros, three accelerometers, or one triad, or one gyro. With a rate the time may lack.
 Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_t count, Sensors sensors,
                                   const RawColumns& columns, const std::string& file) {
@@ -50,9 +68,11 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_
   const std::size_t wanted = both ? 6 : 3;
   PoseLayout layout;
   layout.sensors = sensors;
-  const std::size_t time = columns.rate_hz && (count == wanted || count == 1) ? 0 : 1;
+  std::size_t time = columns.rate_hz && (count == wanted || count == 1) ? 0 : 1;
   if (!columns.rate_hz) {
-    layout.times = {0};
+    const std::size_t where = count == wanted + 1 ? nameless_time(source, count) : 0;
+    layout.times = {where};
+    time = where == 0 ? 1 : 0;
   }
   if (sensors == Sensors::gyros && (count == time + 1 || count == columns.angle) && count < time + wanted) {
     layout.gyro = {time};
@@ -93,8 +113,11 @@ void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
       layout.times.push_back(k);
     }
   }
-  if (layout.times.empty() && named.front().role == Role::unknown && named.front().axis < 0) {
-    layout.times = {0};
+  // Then any of which no name says that it is something else: the first whose stamps rise.
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == Role::unknown && named[k].axis < 0) {
+      layout.times.push_back(k);
+    }
   }
 }
 

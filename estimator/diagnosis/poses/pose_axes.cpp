@@ -57,13 +57,16 @@ std::vector<Matrix3> signed_permutations() {
   return all;  // the identity first
 }
 
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+double quantile(std::vector<double> values, double share) {
+  const auto k = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), k, values.end());
+  return *k;
 }
 
-// By how much the usual turn ends beside where gravity is, rad.
+constexpr double another = 1.3;  // times a unit is another unit
+constexpr double most_turns = 0.8;
+
+// By how much four turns of five end beside where gravity is at most, rad: half a round is as well three halves.
 double usual_error(const std::vector<RawTurn>& turns, const Matrix3& axes, double unit) {
   std::vector<double> errors;
   for (const RawTurn& turn : turns) {
@@ -73,7 +76,7 @@ double usual_error(const std::vector<RawTurn>& turns, const Matrix3& axes, doubl
     }
     errors.push_back(std::acos(std::clamp(u.dot(turn.to), -1.0, 1.0)));
   }
-  return middle_of(std::move(errors));
+  return quantile(std::move(errors), most_turns);
 }
 
 struct Candidate {
@@ -136,7 +139,7 @@ std::optional<GyroReading> read_gyros_by_turns(const PoseInput& input, const std
   if (ratios.size() < enough) {
     return {};
   }
-  const double least = middle_of(std::move(ratios));
+  const double least = quantile(std::move(ratios), 0.5);
   constexpr double close =
       4.0 * units::degree;  // misalignments of 2 % and scale factors of 3 % in turns of a right angle
   constexpr double sure = 3.0;
@@ -157,6 +160,22 @@ std::optional<GyroReading> read_gyros_by_turns(const PoseInput& input, const std
   return best.error < close && sure * best.error < second.error ? std::optional(best.reading) : std::nullopt;
 }
 
+PoseInput with_unit_by_turns(const PoseInput& input, const std::vector<Pose>& poses,
+                             const std::vector<std::size_t>& turns, PoseDiagnosis& d) {
+  PoseInput used = input;
+  const auto reading = knows_gyro_unit(input) ? std::nullopt : read_gyros_by_turns(input, poses, turns);
+  if (!reading) {
+    return used;
+  }
+  d.gyros_contradict = contradiction(input, *reading);
+  if (reading->unit < another && reading->unit > 1.0 / another) {
+    used.gyros_si = true;
+  } else {
+    used.gyro_unit = d.gyro_raw_unit = reading->unit;
+  }
+  return used;
+}
+
 std::string contradiction(const PoseInput& input, const GyroReading& reading) {
   std::string words;
   if (!reading.axes.isIdentity()) {
@@ -169,7 +188,6 @@ std::string contradiction(const PoseInput& input, const GyroReading& reading) {
     }
     words += ": order or sign of an axis is wrong";
   }
-  constexpr double another = 1.3;
   const double ratio = reading.unit / input.gyro_unit;
   if (input.gyros_si && (ratio > another || ratio < 1.0 / another)) {
     const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());

@@ -18,6 +18,11 @@ struct GyroReading {
 std::optional<GyroReading> read_gyros_by_turns(const PoseInput& input, const std::vector<Pose>& poses,
                                                const std::vector<std::size_t>& turns);
 
+// The input with the unit of its gyros by the turns, where nobody says it: into `gyro_raw_unit`, and `gyros_contradict` where their axes are not the
+// accelerometers'. Counts that are rad/s within 30 % are rad/s.
+PoseInput with_unit_by_turns(const PoseInput& input, const std::vector<Pose>& poses,
+                             const std::vector<std::size_t>& turns, PoseDiagnosis& d);
+
 // What contradicts what is said of them: another unit, or other axes; empty: nothing.
 std::string contradiction(const PoseInput& input, const GyroReading& reading);
 

@@ -21,6 +21,9 @@ struct Pose {
   Vector3 u = Vector3::Zero();      // calibrated, g
 };
 
+// Whether a unit of the gyros is said, be it rad/s.
+inline bool knows_gyro_unit(const PoseInput& input) { return input.gyros_si || input.gyro_unit != 1.0; }
+
 Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i);
 
 // Stretches in which the accelerometers give zero, which gravity never does, or all six axes one value for half a second.

@@ -79,6 +79,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
   Heading best;
   double latitude = 0.0;
   std::array<double, 2> of_hemisphere = {HUGE_VAL, HUGE_VAL};
+  std::vector<std::pair<double, double>> tried;  // angle, square that is left
   const auto try_at = [&](double angle) {
     constexpr int headings = 360;
     std::vector<Vector3> reading = plain;
@@ -86,6 +87,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
       reading[i] -= omega * std::sin(angle) * poses[i].u.normalized();
     }
     const Heading found = find_heading(poses, reading, first, second, omega * std::cos(angle), headings);
+    tried.emplace_back(angle, found.with);
     double& hemisphere = of_hemisphere.at(angle < 0.0 ? 1 : 0);
     hemisphere = std::min(hemisphere, found.with);
     if (found.with < best.with) {
@@ -98,6 +100,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
     try_at(k * units::degree);
   }
   const double coarse = latitude;
+  const std::vector<std::pair<double, double>> all = tried;
   for (int k = -tenths; k <= tenths; ++k) {
     try_at(coarse + 0.1 * k * units::degree);
   }
@@ -112,6 +115,15 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
     return earth;
   }
   earth.latitude = latitude;
+  // By the likelihood over the grid, whose step is no finer than this.
+  double weights = 0.0, square = 0.0;
+  for (const auto& [angle, left] : all) {
+    const double weight = std::exp(-likelier(left, best.with));
+    weights += weight;
+    square += weight * (angle - latitude) * (angle - latitude);
+  }
+  constexpr double step = apart * units::degree;
+  earth.latitude_sigma = std::sqrt(square / weights + step * step / 12.0);
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const Vector3 level = std::cos(best.angle) * first[k] + std::sin(best.angle) * second[k];
     earth.rate[k] = omega * (std::sin(latitude) * poses[k].u.normalized() + std::cos(latitude) * level);
@@ -124,7 +136,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
 EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
   EarthInPoses earth;
   earth.rate.assign(poses.size(), Vector3::Zero());
-  if (input.sensors != Sensors::both || (!input.latitude && !input.gyros_si)) {
+  if (input.sensors != Sensors::both || !knows_gyro_unit(input)) {
     return earth;
   }
   constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
@@ -173,7 +185,7 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
 
 // The Earth's rate is fixed in the room, and a sensor that is turned by hand sees it go with the pose: within 15.04 deg/h and its sigma.
 void mark_earth(const PoseInput& input, PoseDiagnosis& d) {
-  if (d.earth_taken_out || !input.gyros_si) {
+  if (d.earth_taken_out || !knows_gyro_unit(input)) {
     return;
   }
   const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;

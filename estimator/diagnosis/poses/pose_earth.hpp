@@ -14,6 +14,7 @@ struct EarthInPoses {
   bool reversed =
       false;  // whether it turns the other way about u: accelerometers that read acceleration, no specific force
   std::optional<double> latitude;  // rad: as the readings show it where nobody says it
+  double latitude_sigma = 0.0;     // rad
   bool heading = false;  // whether the readings show the heading: likelier by e^6 than without a horizontal part
 };
 

@@ -211,12 +211,11 @@ void close_parameters(PoseDiagnosis& d) {
 }
 
 // Scale factors of counts are told in counts.
-void tell_in_raw(double unit, PoseDiagnosis& d) {
-  d.gyro_raw_unit = unit;
+void tell_in_raw(PoseDiagnosis& d) {
   for (PoseParameter& p : d.gyro_parameters) {
     if (p.name.starts_with("scale_")) {
-      p.value = (1.0 + p.value) / unit;
-      p.sigma /= unit;
+      p.value = (1.0 + p.value) / d.gyro_raw_unit;
+      p.sigma /= d.gyro_raw_unit;
       p.unit = "raw/(rad/s)";
     }
   }
@@ -247,38 +246,23 @@ std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<
 
 void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
                  const AccelModel& accel, bool linear, PoseDiagnosis& d) {
-  const auto judge = [&](const PoseInput& in, bool unit_known) {
-    const std::vector<std::size_t> kept = unit_known ? without_rounds(in, poses, turns) : turns;
-    d.turns = static_cast<int>(kept.size());
-    d.turns_whole = static_cast<int>(turns.size() - kept.size());
-    d.gyro_parameters.clear();
-    d.direction_before = d.direction_after = HUGE_VAL;
-    if (!kept.empty()) {
-      fit_and_hold_out(in, poses, kept, accel, linear, d);
-    }
-  };
+  const std::vector<std::size_t> kept = knows_gyro_unit(input) ? without_rounds(input, poses, turns) : turns;
+  d.turns = static_cast<int>(kept.size());
   d.turns_clipped = static_cast<int>(poses.size() - 1 - turns.size());
-  if (turns.empty()) {
+  d.turns_whole = static_cast<int>(turns.size() - kept.size());
+  if (kept.empty()) {
     return;
   }
+  fit_and_hold_out(input, poses, kept, accel, linear, d);
   // Turns that end this far from where gravity is are carried in another unit, or not by these gyros.
   constexpr double most = 10.0 * units::degree;
-  judge(input, input.gyros_si || input.gyro_unit != 1.0);
-  if (d.direction_after > most) {
-    const auto reading = read_gyros_by_turns(input, poses, turns);
-    d.gyros_contradict = reading ? contradiction(input, *reading) : std::string();
-    if (reading && d.gyros_contradict.empty()) {
-      PoseInput in_unit = input;
-      in_unit.gyro_unit = reading->unit;
-      judge(in_unit, true);
-      tell_in_raw(reading->unit, d);
-    }
-  }
   if (d.direction_after > most) {
     close_parameters(d);
-  }
-  if (d.turns == 0) {
-    d.direction_before = d.direction_after = 0.0;
+    if (const auto reading = read_gyros_by_turns(input, poses, turns); reading && d.gyros_contradict.empty()) {
+      d.gyros_contradict = contradiction(input, *reading);
+    }
+  } else if (d.gyro_raw_unit > 0.0) {
+    tell_in_raw(d);
   }
 }
 

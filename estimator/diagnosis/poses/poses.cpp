@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/diagnosis/poses/pose_axes.hpp"
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_earth.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
@@ -141,6 +142,7 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   const EarthInPoses earth = earth_in_poses(input, poses, carried);
   d.earth_taken_out = earth.heading;
   d.latitude_seen = earth.latitude;
+  d.latitude_seen_sigma = earth.latitude_sigma;
   d.accel_reversed = earth.reversed;
   std::vector<Pose> still = poses;
   for (std::size_t k = 0; k < still.size(); ++k) {
@@ -170,13 +172,14 @@ bool read_gravity(const PoseInput& input, const std::vector<Pose>& poses, const 
   return false;
 }
 
-void judge_poses(const PoseInput& input, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
+void judge_poses(const PoseInput& as_told, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
-  const AccelModel accel = calibrate(input, 0.5 * alpha, poses, d);
-  if (!read_gravity(input, poses, accel, d)) {
+  const AccelModel accel = calibrate(as_told, 0.5 * alpha, poses, d);
+  if (!read_gravity(as_told, poses, accel, d)) {
     return;
   }
-  const std::vector<std::size_t> turns = usable_turns(input, poses, d);
+  const std::vector<std::size_t> turns = usable_turns(as_told, poses, d);
+  const PoseInput input = with_unit_by_turns(as_told, poses, turns, d);
   judge_gyros(input, without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(),
               d.has_temperature, 0.5 * alpha, d);
   mark_earth(input, d);

@@ -165,6 +165,7 @@ struct PoseDiagnosis {
   std::array<double, 3> gyro_bias{}, gyro_bias_sigma{};  // raw units
   bool accel_reversed = false;  // whether the Earth's rate shows that all accelerometers are: it turns about their down
   std::optional<double> latitude_seen;  // rad, by the Earth's rate in the poses, where nobody says it
+  double latitude_seen_sigma = 0.0;     // rad
   bool earth_taken_out = false;         // whether the Earth's rate was taken out of the gyros' means, heading included
   std::array<double, 3> gyro_held_out_rms{};  // bias alone, raw units
   std::array<double, 3> gyro_white_rms{};     // what white noise would leave of a pose's mean
