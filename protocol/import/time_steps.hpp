@@ -17,7 +17,7 @@ long double median_interval(const std::vector<long double>& stamps);
 std::string continue_full_clocks(std::vector<long double>& stamps);
 
 // A clock coarser than the rows, or one of blocks of rows: stamps that never fall and stand still for a few rows are spread evenly up to the next
-// one. Words on how many; empty: nothing done, for none stands still, or one does for long.
+// one. Words on how many; empty: nothing done, for fewer than one in a hundred stands still, or one does for long.
 std::string spread_coarse_stamps(std::vector<long double>& stamps);
 // For each row the number of rows before it with the same stamp.
 std::vector<int> place_in_stamp(const std::vector<long double>& stamps);

@@ -77,12 +77,21 @@ Json held(const std::array<double, 3>& values, const std::array<bool, 3>& axes) 
   return all;
 }
 
+// Of a log without gyros, or of a stand whose mean is told under `rest`, there is none.
+std::array<bool, 3> axes_with_bias(const diagnosis::PoseDiagnosis& d) {
+  std::array<bool, 3> axes = d.gyro_axes;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    axes[k] = axes[k] && d.gyro_bias_sigma[k] > 0.0;
+  }
+  return axes;
+}
+
 Json array(const Vector3& v) { return Json{v.x(), v.y(), v.z()}; }
 
 Json to_json(const std::vector<diagnosis::BiasJump>& jumps) {
   Json all = Json::array();
   for (const diagnosis::BiasJump& j : jumps) {
-    all.push_back({{"time_s", j.time_s}, {"size", array(j.size)}, {"sigma", array(j.sigma)}});
+    all.push_back({{"gap", j.gap}, {"time_s", j.time_s}, {"size", array(j.size)}, {"sigma", array(j.sigma)}});
   }
   return all;
 }
@@ -183,7 +192,8 @@ Json verdict_of(const diagnosis::PoseDiagnosis& d) {
     verdict = fmt::format("Named: {}.", fmt::join(named, ", "));
     next = rivals_of(d).empty() ? "" : "The same poses once more in another order, just switched on, tell them apart.";
   } else if (!d.gyro_jumps.empty()) {
-    verdict = "The gyros' bias is another behind a gap of the log.";
+    verdict = d.gyro_jumps.front().gap ? "The gyros' bias is another behind a gap of the log."
+                                       : "The gyros' bias is another from one pose on.";
     next = "Give the parts of the log by themselves.";
   } else if (d.by_poses && !d.accel_adequate) {
     verdict = fmt::format("Bias, scale factor and misalignment leave {:.2g} mg rms of the accelerometers.",
@@ -243,8 +253,8 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"findings", to_json(d.accel_named)},
             {"tried", to_json(d.accel_tried)}}},
           {"gyros",
-           {{"bias", held(d.gyro_bias, d.gyro_axes)},
-            {"bias_sigma", held(d.gyro_bias_sigma, d.gyro_axes)},
+           {{"bias", held(d.gyro_bias, axes_with_bias(d))},
+            {"bias_sigma", held(d.gyro_bias_sigma, axes_with_bias(d))},
             {"jumps", to_json(d.gyro_jumps)},
             {"earth_taken_out", d.earth_taken_out},
             {"latitude_seen_deg", d.latitude_seen ? Json(*d.latitude_seen / units::degree) : Json()},

@@ -133,11 +133,10 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
                                             1e3 * d.accel_rms_g, near));
   }
   for (const diagnosis::BiasJump& j : d.gyro_jumps) {
-    text +=
-        lines_of("jump:", fmt::format("behind the gap at {:.0f} s the gyros' bias is another by {:.3g}/{:.3g}/{:.3g} "
-                                      "{}: give both parts by themselves",
-                                      j.time_s, j.size.x() / shown.gyro, j.size.y() / shown.gyro,
-                                      j.size.z() / shown.gyro, shown.gyro_name));
+    text += lines_of("jump:", fmt::format("{} {:.0f} s the gyros' bias is another by {:.3g}/{:.3g}/{:.3g} "
+                                          "{}: give both parts by themselves",
+                                          j.gap ? "behind the gap at" : "from", j.time_s, j.size.x() / shown.gyro,
+                                          j.size.y() / shown.gyro, j.size.z() / shown.gyro, shown.gyro_name));
   }
   if (!d.gyros_contradict.empty()) {
     text += lines_of("misfit:", d.gyros_contradict);

@@ -34,6 +34,8 @@ class Gyros {
 
   // A bias of its own for each part of the log, where the parts differ by more than chance: beside it a drift is asked.
   void take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& d);
+  // A step between two poses instead of `chosen`, which changes with time, where the step is a hundred times as likely; beside it all else is asked.
+  bool take_step(const PoseInput& input, const PoseEffect& chosen, double log_limit, PoseDiagnosis& d);
   // Every effect given what is known already, best first.
   std::vector<PoseEffect> try_all(const std::vector<PoseEffect>& named) const;
   void keep(const PoseEffect& chosen);
@@ -111,6 +113,63 @@ void Gyros::take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& 
   for (Eigen::MatrixXd& known : known_) {
     known = joined(known, of_parts);
   }
+}
+
+bool Gyros::take_step(const PoseInput& input, const PoseEffect& chosen, double log_limit, PoseDiagnosis& d) {
+  const auto n = static_cast<Eigen::Index>(poses_.size());
+  constexpr Eigen::Index side = 3;  // poses
+  const double tries = static_cast<double>(n - 2 * side + 1);
+  if (tries < 1.0 || !of_time(*chosen.effect)) {
+    return false;
+  }
+  double of_chosen = 0.0;  // log likelihood but for a constant
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const Trial trial = trial_of(*chosen.effect, chosen.constant, poses_, duration_s_, axis);
+    of_chosen -= 0.5 * static_cast<double>(n) * std::log(regress(joined(known_[i], trial.columns), y_[i]).square);
+  }
+  Eigen::Index best = 0;
+  double of_best = -HUGE_VAL;
+  const auto step_at = [n](Eigen::Index first) {
+    Eigen::MatrixXd column = Eigen::MatrixXd::Zero(n, 1);
+    column.bottomRows(n - first).setOnes();
+    return column;
+  };
+  for (Eigen::Index first = side; first + side <= n; ++first) {
+    double likelihood = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      likelihood -= 0.5 * static_cast<double>(n) * std::log(regress(joined(known_[i], step_at(first)), y_[i]).square);
+    }
+    if (likelihood > of_best) {
+      of_best = likelihood;
+      best = first;
+    }
+  }
+  constexpr double odds = 4.605, two_sigma = 2.0;  // ln 100
+  if (of_best - std::log(tries) < of_chosen + odds) {
+    return false;
+  }
+  const Eigen::MatrixXd column = step_at(best);
+  BiasJump jump;
+  jump.gap = false;
+  jump.time_s = input.time_s[poses_[static_cast<std::size_t>(best)].first] - input.time_s.front();
+  double log_p = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const Comparison c = compare(known_[i], column, y_[i], time_s_, true);
+    const double beside = log_p_beside_flicker(poses_, time_s_, axis, known_[i], column, y_[i], two_sigma);
+    log_p = std::min(log_p, std::max(c.log_p, beside));
+    jump.size(axis) = c.with.value(known_[i].cols());
+    jump.sigma(axis) = c.with.sigma(known_[i].cols());
+  }
+  if (log_corrected(log_p, 3.0 * tries) > log_limit) {
+    return false;
+  }
+  d.gyro_jumps.push_back(jump);
+  for (Eigen::MatrixXd& known : known_) {
+    known = joined(known, column);
+  }
+  return true;
 }
 
 PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
@@ -274,6 +333,10 @@ void judge_gyros(const PoseInput& input, const std::vector<Pose>& poses, double 
   std::vector<PoseEffect> left = d.gyro_tried;
   while (!left.empty() && left.front().log_p < limit) {
     PoseEffect chosen = left.front();
+    if (gyros.take_step(input, chosen, limit, d)) {
+      left = gyros.try_all(d.gyro_named);
+      continue;
+    }
     chosen.may_be_flicker = chosen.log_p_beside_flicker > limit;
     gyros.keep(chosen);
     std::vector<PoseEffect> named = d.gyro_named;

@@ -133,8 +133,10 @@ struct RestNoise {
   double freedom = 0.0;  // means that do not overlap
 };
 
-// By how much the gyros' bias differs between the poses behind a gap of the log and those before the first one: switched off meanwhile?
+// By how much the gyros' bias differs between the poses behind a gap of the log and those before the first one: switched off meanwhile? Without
+// a gap: between two poses of which those before and behind explain all better by a step than by what changes steadily: a knock?
 struct BiasJump {
+  bool gap = true;
   double time_s = 0.0;  // of the gap's end, since the start
   Vector3 size, sigma;  // raw
 };

@@ -97,10 +97,16 @@ TEST(BenchPoses, TheEarthsRateIsNoGSensitivity) {
   EXPECT_TRUE(anywhere.earth_taken_out);
   ASSERT_TRUE(anywhere.latitude_seen);
   EXPECT_NEAR(*anywhere.latitude_seen, latitude, 3.0 * units::degree);  // 1 deg/h beside 15
-  b.input.gyros_si = false;  // the negative control: 11 deg/h go with the pose
+  EXPECT_LT(std::abs(*anywhere.latitude_seen - latitude), 5.0 * anywhere.latitude_seen_sigma);
+  b.input.gyros_si = false;  // the turns tell that they are rad/s
+  EXPECT_TRUE(diagnose_poses(b.input, 0.01).earth_taken_out);
+  b.input.gyros_si = true;  // the negative control: 11 deg/h go with the pose, of gyros that read 50 times as much
+  for (std::array<double, 3>& rate : b.input.gyro) {
+    rate = {50.0 * rate[0], 50.0 * rate[1], 50.0 * rate[2]};
+  }
   const PoseDiagnosis unknown = diagnose_poses(b.input, 0.01);
   EXPECT_FALSE(unknown.earth_taken_out);
-  EXPECT_GT(unknown.gyro_bias_sigma[0], 10.0 * d.gyro_bias_sigma[0]);
+  EXPECT_GT(unknown.gyro_bias_sigma[0], 50.0 * 10.0 * d.gyro_bias_sigma[0]);
 }
 
 // One turn was left out, so that no heading is known through it: what depends on the pose within 15 deg/h is told with the Earth's rate as its rival.

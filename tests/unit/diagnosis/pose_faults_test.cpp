@@ -222,6 +222,44 @@ TEST(PoseFaults, AnAxisThatStopsAnsweringCostsWhatFollows) {
   EXPECT_TRUE(diagnose_poses(sound, 0.01).left_out.empty());
 }
 
+// A knock between two poses: the bias is another from there on, and nothing drifts. Beside it what drifts is still named.
+TEST(PoseFaults, AStepOfTheBiasIsNoDrift) {
+  const Vector3 step(0.005, -0.0034, 0.0017);
+  for (const double ramp : {0.0, 2e-5}) {
+    std::mt19937 random(18);
+    PoseInput input = turned(turns_by_hand(23, random), random);
+    const double at = 12 * 8.0 - 1.0;  // in the twelfth turn
+    for (std::size_t k = 0; k < input.gyro.size(); ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        input.gyro[k][axis] += ramp * input.time_s[k] * (axis == 0 ? 1.0 : 0.0);
+        input.gyro[k][axis] += input.time_s[k] > at ? step(static_cast<Eigen::Index>(axis)) : 0.0;
+      }
+    }
+    const PoseDiagnosis d = diagnose_poses(input, 0.01);
+    ASSERT_TRUE(d.failure.empty()) << d.failure;
+    ASSERT_EQ(d.gyro_jumps.size(), 1u) << ramp;
+    EXPECT_FALSE(d.gyro_jumps[0].gap);
+    EXPECT_NEAR(d.gyro_jumps[0].time_s, at + 1.0, 1.5);
+    if (ramp == 0.0) {
+      EXPECT_TRUE(d.gyro_named.empty());
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_NEAR(d.gyro_jumps[0].size(axis), step(axis), 5.0 * d.gyro_jumps[0].sigma(axis));
+      }
+    } else {
+      ASSERT_EQ(d.gyro_named.size(), 1u);
+    }
+  }
+  // What drifts steadily is no step.
+  std::mt19937 random(19);
+  PoseInput input = turned(turns_by_hand(23, random), random);
+  for (std::size_t k = 0; k < input.gyro.size(); ++k) {
+    input.gyro[k][1] += 3e-5 * input.time_s[k];
+  }
+  const PoseDiagnosis d = diagnose_poses(input, 0.01);
+  EXPECT_TRUE(d.gyro_jumps.empty());
+  EXPECT_EQ(d.gyro_named.size(), 1u);
+}
+
 TEST(PoseFaults, ADeadAxisIsTold) {
   std::mt19937 random(17);
   const PoseInput sound = turned(turns_by_hand(16, random), random);
