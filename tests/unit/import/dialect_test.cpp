@@ -85,6 +85,14 @@ TEST(Numbers, OnlyWholeFields) {
   for (const char* wrong : {"", "+-1", "1.2.3", "0x10", "1 2", "1,5"}) {
     EXPECT_FALSE(number_of(wrong, '.')) << wrong;
   }
+  TextDialect german, english;
+  german.decimal = ',';
+  EXPECT_EQ(grouped_number_of("1.234.567,5", german), 1234567.5);
+  EXPECT_EQ(grouped_number_of("-1.000", german), -1000.0);
+  EXPECT_EQ(grouped_number_of("1.000", english), 1.0);
+  for (const char* wrong : {"1.23,5", "1234.567,5", ".123", "1..234", "1.234.56", "12,345.6", "1.234,5.6"}) {
+    EXPECT_FALSE(grouped_number_of(wrong, german)) << wrong;
+  }
   EXPECT_FALSE(number_of("1.234,5", ','));  // points between thousands are refused, not passed over
 }
 

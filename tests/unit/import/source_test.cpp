@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <random>
 
@@ -59,6 +60,23 @@ TEST_F(Source, RowsOfTwoSensorsAreToldFromAFlagThatChanges) {
   const auto rows = open(mixed);
   ASSERT_TRUE(rows);
   EXPECT_THAT((*rows)->mixed_rows(), HasSubstr("column 2 (sensor) tells apart: ACC, GYR"));
+  const auto one = open(flagged);
+  ASSERT_TRUE(one);
+  EXPECT_EQ((*one)->mixed_rows(), "");
+}
+
+// Two sensors with biases of their own take turns; a flag of new data beside one sensor does so too, and tells nothing apart.
+TEST_F(Source, RowsOfNumberedSensorsAreToldByWhatTheyRead) {
+  std::string mixed = "time,I,x,y,z\n", flagged = mixed;
+  for (int k = 0; k < 600; ++k) {
+    const double noise = 1e-3 * std::sin(37.0 * k), x = std::sin(0.01 * k);
+    mixed +=
+        fmt::format("{},{},{},{},{}\n", 0.01 * k, k % 2, x + 0.1 * (k % 2) + noise, 2.0 - 0.2 * (k % 2) - noise, 1.0);
+    flagged += fmt::format("{},{},{},{},{}\n", 0.01 * k, k % 2, x + noise, 2.0 - noise, 1.0);
+  }
+  const auto rows = open(mixed);
+  ASSERT_TRUE(rows);
+  EXPECT_THAT((*rows)->mixed_rows(), HasSubstr("column 2 (I) tells apart: 0, 1"));
   const auto one = open(flagged);
   ASSERT_TRUE(one);
   EXPECT_EQ((*one)->mixed_rows(), "");

@@ -46,6 +46,29 @@ TEST(TimeSteps, AClockThatIsSetBackStaysBack) {
   }
 }
 
+// 128 Hz in stamps of 10 ms; blocks of ten rows with one stamp. A stamp that stands twice is a fault, and of a clock that stops nobody knows.
+TEST(TimeSteps, CoarseStampsAreSpread) {
+  for (const long double unit : {10.0L, 78.125L}) {
+    std::vector<long double> stamps;
+    for (int k = 0; k < 1000; ++k) {
+      stamps.push_back(std::floor(7.8125L * static_cast<long double>(k) / unit) * unit);
+    }
+    EXPECT_NE(spread_coarse_stamps(stamps), "");
+    for (std::size_t k = 1; k < stamps.size(); ++k) {
+      ASSERT_GT(stamps[k], stamps[k - 1]) << k;
+      ASSERT_NEAR(static_cast<double>(stamps[k]), 7.8125 * static_cast<double>(k), static_cast<double>(unit)) << k;
+    }
+  }
+  std::vector<long double> once = clock(0.0L, 10.0L, 1e9L, 1000);
+  once[500] = once[499];
+  EXPECT_EQ(spread_coarse_stamps(once), "");
+  std::vector<long double> stopped = clock(0.0L, 10.0L, 1e9L, 1000);
+  std::fill(stopped.begin() + 500, stopped.begin() + 700, stopped[500]);
+  EXPECT_EQ(spread_coarse_stamps(stopped), "");
+  std::vector<long double> falls = clock(0.0L, 10.0L, 5000.0L, 1000);
+  EXPECT_EQ(spread_coarse_stamps(falls), "");
+}
+
 ColumnData data(std::size_t rows) {
   ColumnData d;
   d.values.resize(2);

@@ -1,6 +1,7 @@
 // Which unit fits the size of gravity and a turn, and what is ambiguous.
 #include <gmock/gmock.h>
 
+#include "protocol/import/guess_names.hpp"
 #include "protocol/import/guess_units.hpp"
 
 namespace selfcal::import {
@@ -40,6 +41,19 @@ TEST(Units, ANameThatGravityContradictsIsNoUnit) {
   EXPECT_FALSE(accelerometer_unit(9.81, 0.01, {"g", false}));
   EXPECT_FALSE(accelerometer_unit(4096.0, 0.01, {}));  // counts
   EXPECT_FALSE(gyro_unit(0.01, 0.01, {"deg/s", false}));
+}
+
+TEST(Units, AUnitSaysWhatANameOfAnotherLanguageIs) {
+  const auto role = [](const char* name) { return read_name(name, "").role; };
+  EXPECT_EQ(role("Temps (s)"), Role::time);
+  EXPECT_EQ(role("Température (°C)"), Role::temperature);
+  EXPECT_EQ(role("Vitesse angulaire X (°/s)"), Role::gyro);
+  EXPECT_EQ(role("Ускорение x (m/s²)"), Role::accelerometer);
+  EXPECT_EQ(role("mag_x [mG]"), Role::other);
+  EXPECT_EQ(role("DATA_CNT"), Role::counter);
+  EXPECT_EQ(role("ts"), Role::time);
+  EXPECT_EQ(read_name("omega_x_rpm", "").unit, "rpm");
+  EXPECT_EQ(read_name("wz [rev/s]", "").unit, "rev/s");
 }
 
 TEST(Units, TurnsTellRatesFromIncrements) {
