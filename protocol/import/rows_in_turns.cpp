@@ -63,6 +63,7 @@ std::vector<int> labels_of(const std::vector<double>& values) {
     return {};
   }
   std::vector<int> labels;
+  labels.reserve(values.size());
   for (const double value : values) {
     labels.push_back(static_cast<int>(std::distance(found.begin(), found.find(value))));
   }

@@ -239,6 +239,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"rest", d.rest ? rest_json(*d.rest) : Json()},
           {"clipped", to_json(d.clipped)},
           {"clipped_poses", d.clipped_poses},
+          {"spikes", d.spikes},
           {"left_out", to_json(d.left_out)},
           {"accelerometers",
            {{"adequate", d.accel_adequate},

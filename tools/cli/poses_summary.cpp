@@ -164,6 +164,9 @@ std::string left_out(const PoseDiagnosis& d) {
     text += lines_of("left out:", fmt::format("{} of {:.1f} s in all, the first at {:.1f} s: {}",
                                               counted(d.left_out.size(), "part"), seconds, first.first_s, first.words));
   }
+  if (d.spikes > 0) {
+    text += fmt::format("spikes: {} that no motion makes, taken out\n", counted(d.spikes, "reading"));
+  }
   std::vector<std::string> axes;
   for (const diagnosis::Clipping& c : d.clipped) {
     axes.push_back(

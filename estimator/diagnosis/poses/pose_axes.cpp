@@ -86,9 +86,11 @@ struct Candidate {
 
 // From the unit at which the gyros go as far as gravity, which turns that also turn about gravity exceed.
 Candidate best_unit(const std::vector<RawTurn>& turns, const Matrix3& axes, double least) {
-  constexpr double from = 0.8, to = 8.0, by = 1.03;
+  constexpr double from = 0.8, by = 1.03;
+  constexpr int steps = 78;  // to eight times as much
   Candidate best;
-  for (double unit = from * least; unit < to * least; unit *= by) {
+  for (int k = 0; k < steps; ++k) {
+    const double unit = from * least * std::pow(by, k);
     const double error = usual_error(turns, axes, unit);
     if (error < best.error) {
       best = {{axes, unit}, error};

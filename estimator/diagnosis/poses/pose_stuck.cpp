@@ -37,6 +37,16 @@ double range_of(const Series& series, std::size_t axis, std::size_t first, std::
   return (*high)[axis] - (*low)[axis];
 }
 
+// Whether the axis takes part in what the triad does: one that a table hardly turns may read one value of a coarse quantum for long.
+bool takes_part(const Series& series, std::size_t axis) {
+  constexpr double share = 0.05;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    largest = std::max(largest, range_of(series, k, 0, series.size()));
+  }
+  return range_of(series, axis, 0, series.size()) > share * largest;
+}
+
 // Whether another axis of the triad moves in the run by at least half of what it does in the whole log.
 bool others_move(const Series& series, std::size_t axis, const LongestRun& run) {
   constexpr double share = 0.5;
@@ -67,7 +77,7 @@ std::vector<StuckAxis> find_stuck(const PoseInput& input) {
     const double elsewhere = static_cast<double>(series.size() - length) + 1.0;
     const double log_repeat = std::log((static_cast<double>(run.repeats_elsewhere) + 1.0) / (elsewhere + 1.0));
     const bool throughout = length == series.size();
-    const bool unlikely = static_cast<double>(length) * log_repeat < by_chance &&
+    const bool unlikely = takes_part(series, axis) && static_cast<double>(length) * log_repeat < by_chance &&
                           input.time_s[run.last - 1] - input.time_s[run.first] > least_s;
     if ((throughout || unlikely) && others_move(series, axis, run)) {
       all.push_back({gyro, k % 3, run.first, run.last, throughout});
@@ -82,7 +92,8 @@ void add_dead_axes(const PoseInput& input, PoseDiagnosis& d) {
         std::string(s.gyro ? "gyro " : "accelerometer ") + "xyz"[s.axis] + " reads one value throughout";
     if (s.throughout && s.gyro) {
       d.gyro_axes[static_cast<std::size_t>(s.axis)] = false;
-      d.invisible.push_back("gyros that turn, since " + words + ": it does not answer");
+      d.invisible.push_back("gyros that turn, since " + words +
+                            ": it does not answer, or its quantum hides all that it senses");
     } else if (s.throughout) {
       d.failure = words + ": it does not answer, and without it gravity is no reference";
     }

@@ -10,6 +10,7 @@
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
+#include "estimator/diagnosis/poses/pose_spikes.hpp"
 #include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/diagnosis/poses/pose_thermal.hpp"
 #include "estimator/diagnosis/poses/pose_turns.hpp"
@@ -476,13 +477,15 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
 }  // namespace
 
 PoseDiagnosis diagnose_poses(const PoseInput& input, double alpha) {
-  if (!wraps(input.outer) && !wraps(input.inner)) {
-    return diagnose_continuous(input, alpha);
+  PoseInput used = input;
+  const std::size_t spikes = take_out_spikes(used);
+  if (wraps(used.outer) || wraps(used.inner)) {
+    used.outer = unwrapped(std::move(used.outer));
+    used.inner = unwrapped(std::move(used.inner));
   }
-  PoseInput continuous = input;
-  continuous.outer = unwrapped(std::move(continuous.outer));
-  continuous.inner = unwrapped(std::move(continuous.inner));
-  return diagnose_continuous(continuous, alpha);
+  PoseDiagnosis d = diagnose_continuous(used, alpha);
+  d.spikes = spikes;
+  return d;
 }
 
 }  // namespace selfcal::diagnosis

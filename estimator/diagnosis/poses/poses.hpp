@@ -151,6 +151,7 @@ struct PoseDiagnosis {
   double duration_s = 0.0;  // of the log
   std::vector<Clipping> clipped;
   std::vector<LeftOut> left_out;
+  std::size_t spikes = 0;  // readings that stand alone, in whose place the mean of their neighbours is used
   // Accelerometers: bias, scale, misalignment fitted to |f| = g. The sensors' own matrix: reading = M force + bias, M less 1; of counts without a
   // nominal scale M_ii in raw/g and M_ij / M_ii.
   double accel_rms_g = 0.0, accel_held_out_rms_g = 0.0;

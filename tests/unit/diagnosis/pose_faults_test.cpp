@@ -222,6 +222,36 @@ TEST(PoseFaults, AnAxisThatStopsAnsweringCostsWhatFollows) {
   EXPECT_TRUE(diagnose_poses(sound, 0.01).left_out.empty());
 }
 
+// Bits that flip in counts of 16 bits, one word in two thousand: poses stay whole, and the turns are carried.
+TEST(PoseFaults, BitsThatFlipAreTakenOut) {
+  std::mt19937 random(20);
+  const PoseInput sound = turned(turns_by_hand(18, random), random);
+  PoseInput input = sound;
+  std::uniform_real_distribution<double> uniform;
+  std::size_t flipped = 0;
+  for (auto* series : {&input.gyro, &input.accel}) {
+    const double unit = series == &input.gyro ? units::degree / 16.4 : g / 8192.0;
+    for (std::array<double, 3>& row : *series) {
+      for (double& value : row) {
+        if (uniform(random) < 5e-4) {
+          const auto count = static_cast<std::int16_t>(std::lround(value / unit));
+          const auto bit = static_cast<unsigned int>(11.0 + 4.0 * uniform(random));
+          value = unit * static_cast<std::int16_t>(static_cast<std::uint16_t>(count) ^ (1U << bit));
+          ++flipped;
+        }
+      }
+    }
+  }
+  const PoseDiagnosis d = diagnose_poses(input, 0.01), whole = diagnose_poses(sound, 0.01);
+  ASSERT_TRUE(d.failure.empty()) << d.failure;
+  EXPECT_GT(static_cast<double>(d.spikes), 0.7 * static_cast<double>(flipped));  // the others in turns, or at the ends
+  EXPECT_LE(d.spikes, flipped);
+  EXPECT_EQ(d.poses, whole.poses);
+  EXPECT_LT(d.direction_after, 2.0 * whole.direction_after);
+  EXPECT_TRUE(d.gyro_named.empty());
+  EXPECT_EQ(whole.spikes, 0u);
+}
+
 // A knock between two poses: the bias is another from there on, and nothing drifts. Beside it what drifts is still named.
 TEST(PoseFaults, AStepOfTheBiasIsNoDrift) {
   const Vector3 step(0.005, -0.0034, 0.0017);
