@@ -250,7 +250,8 @@ int take_axis(Words& words) {
 }
 
 Role triad_role(const Words& w) {
-  if (holds(w, {"mag"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
+  // "Gravity X" of a phone is what its filter makes of all sensors.
+  if (holds(w, {"mag", "gravity"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
     return Role::other;
   }
   const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});

@@ -50,6 +50,7 @@ TEST(Units, AUnitSaysWhatANameOfAnotherLanguageIs) {
   EXPECT_EQ(role("Vitesse angulaire X (°/s)"), Role::gyro);
   EXPECT_EQ(role("Ускорение x (m/s²)"), Role::accelerometer);
   EXPECT_EQ(role("mag_x [mG]"), Role::other);
+  EXPECT_EQ(role("GRAVITY X (m/s²)"), Role::other);
   EXPECT_EQ(role("DATA_CNT"), Role::counter);
   EXPECT_EQ(role("ts"), Role::time);
   EXPECT_EQ(read_name("omega_x_rpm", "").unit, "rpm");
