@@ -88,8 +88,20 @@ std::string heading(const PoseDiagnosis& d) {
 
 double log10_of(double log_p) { return log_p / std::log(10.0); }
 
+// What does half and more of the same over these poses, in their order; empty where nothing does.
+std::string confounded_clause(const PoseDiagnosis& d, const PoseEffect& e) {
+  std::vector<std::string> others;
+  for (const diagnosis::Confounded& c : d.confounded) {
+    const diagnosis::Effect* other = c.effect == e.effect ? c.with : c.with == e.effect ? c.effect : nullptr;
+    if (other != nullptr) {
+      others.push_back(fmt::format("{} does {:.0f} % of the same", other->id, 100.0 * c.shared));
+    }
+  }
+  return others.empty() ? std::string() : fmt::format("; in this order of the poses {}", fmt::join(others, ", "));
+}
+
 // One line an effect: its id, how sure, and its largest coefficient.
-std::string effect_line(const PoseEffect& e, double unit, const std::string& unit_name) {
+std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit, const std::string& unit_name) {
   std::size_t largest = 0;
   for (std::size_t k = 0; k < e.value.size(); ++k) {
     largest = std::abs(e.value[k]) > std::abs(e.value[largest]) ? k : largest;
@@ -109,16 +121,16 @@ std::string effect_line(const PoseEffect& e, double unit, const std::string& uni
   if (!rivals.empty()) {
     words += fmt::format("; or as well {}", fmt::join(rivals, ", "));
   }
-  return lines_of("named:", words);
+  return lines_of("named:", words + confounded_clause(d, e));
 }
 
 std::string findings(const PoseDiagnosis& d, const Units& shown) {
   std::string text;
   for (const PoseEffect& e : d.gyro_named) {
-    text += effect_line(e, shown.gyro, shown.gyro_name);
+    text += effect_line(d, e, shown.gyro, shown.gyro_name);
   }
   for (const PoseEffect& e : d.accel_named) {
-    text += effect_line(e, e.effect->parameters.front().si_per_unit, e.effect->parameters.front().unit);
+    text += effect_line(d, e, e.effect->parameters.front().si_per_unit, e.effect->parameters.front().unit);
   }
   if (d.settling) {
     text += lines_of("named:", fmt::format("accel_relaxation (log10 p {:.1f}): settling after each turn with {:.0f} s",
