@@ -52,8 +52,8 @@ Json amplitude_json(const Rest& rest, const RestAmplitude& a) {
   Json j = {
       {"effect", a.equation.id}, {"value", a.value / unit.raw}, {"sigma", a.sigma / unit.raw}, {"unit", unit.name}};
   if (!std::isnan(a.constant)) {
-    j["tau_s"] = a.constant;
-    j["tau_sigma_s"] = a.constant_sigma;
+    j[a.equation.jumps ? "at_s" : "tau_s"] = a.constant;
+    j[a.equation.jumps ? "at_sigma_s" : "tau_sigma_s"] = a.constant_sigma;
   }
   return j;
 }
@@ -124,7 +124,9 @@ std::string noise_text(const Rest& rest, const RestAxis& a) {
   return text + (a.quantum > 0.0 ? fmt::format("; quantum {:.2g} {}\n", a.quantum / mean.raw, mean.name) : "\n");
 }
 
-std::string label(const RestAmplitude& a) { return a.equation.id + (std::isnan(a.constant) ? "" : " (warming up)"); }
+std::string label(const RestAmplitude& a) {
+  return a.equation.id + (std::isnan(a.constant) || a.equation.jumps ? "" : " (warming up)");
+}
 
 // One equation on the axes that show it, wrapped at 80 columns.
 struct Line {
@@ -152,9 +154,10 @@ void add(const Rest& rest, const RestAxis& axis, const RestAmplitude& a, std::ve
     lines.push_back({name, unit.name, {}});
     line = lines.end() - 1;
   }
-  line->figures.push_back(
-      fmt::format("{} {}{}", "xyz"[axis.axis], figure(a.value, a.sigma, unit.raw),
-                  std::isnan(a.constant) ? "" : fmt::format(" in {} s", figure(a.constant, a.constant_sigma, 1.0))));
+  line->figures.push_back(fmt::format("{} {}{}", "xyz"[axis.axis], figure(a.value, a.sigma, unit.raw),
+                                      std::isnan(a.constant) ? ""
+                                                             : fmt::format(" {} {} s", a.equation.jumps ? "at" : "in",
+                                                                           figure(a.constant, a.constant_sigma, 1.0))));
 }
 
 // What explains the log as well on these axes, by the equation that speaks for it.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <span>
 
 #include "estimator/geometry/units.hpp"
 
@@ -14,15 +15,25 @@ double sample_rate(const PoseInput& input) {
   return static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
 }
 
-// Largest variance of an axis among the means of blocks about that of all.
-double variance_of_means(const std::vector<Vector3>& means) {
+// Variance of each axis among the means of blocks about that of all.
+Vector3 variance_of(std::span<const Vector3> means) {
   Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
   for (const Vector3& m : means) {
     sum += m - means.front();
     square += (m - means.front()).cwiseAbs2();
   }
   const auto n = static_cast<double>(means.size());
-  return (square / n - (sum / n).cwiseAbs2()).maxCoeff();
+  return square / n - (sum / n).cwiseAbs2();
+}
+
+// Largest of an axis about the mean of so many blocks: what drifts for minutes does not move.
+double variance_within(std::span<const Vector3> means, std::size_t blocks) {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t first = 0; first < means.size(); first += blocks) {
+    const std::span<const Vector3> these = means.subspan(first, std::min(blocks, means.size() - first));
+    sum += static_cast<double>(these.size()) * variance_of(these);
+  }
+  return sum.maxCoeff() / static_cast<double>(means.size());
 }
 
 double median(std::vector<double> values) {
@@ -35,6 +46,7 @@ double median(std::vector<double> values) {
 
 bool moves(const PoseInput& input, const Pose& stretch) {
   constexpr double block_s = 0.25, most_rate = units::degree, most_force = 0.05;
+  constexpr std::size_t blocks = 40;  // 10 s
   const auto length = std::max<std::size_t>(2, static_cast<std::size_t>(block_s * sample_rate(input)));
   std::vector<Vector3> gyro, accel;
   for (const auto& [first, last] : stretch.quiet) {
@@ -52,10 +64,10 @@ bool moves(const PoseInput& input, const Pose& stretch) {
     return false;
   }
   const bool turns = input.gyros_si && input.sensors != Sensors::accelerometers &&
-                     variance_of_means(gyro) > most_rate * most_rate / (input.gyro_unit * input.gyro_unit);
+                     variance_within(gyro, blocks) > most_rate * most_rate / (input.gyro_unit * input.gyro_unit);
   // Counts about a middle make the size larger than gravity's, and the limit with it.
   const double size = input.accel_unit > 0.0 ? input.gravity / input.accel_unit : stretch.accel.norm();
-  return turns || (input.sensors != Sensors::gyros && variance_of_means(accel) > std::pow(most_force * size, 2));
+  return turns || (input.sensors != Sensors::gyros && variance_of(accel).maxCoeff() > std::pow(most_force * size, 2));
 }
 
 std::vector<double> drop_other_forces(const PoseInput& input, std::vector<Pose>& stretches) {

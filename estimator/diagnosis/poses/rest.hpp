@@ -19,19 +19,20 @@ struct PoseDiagnosis;
 
 // What a coefficient multiplies. The catalogue's equation where it holds one.
 struct RestEquation {
-  const Effect* effect = nullptr;  // null: temperature squared, and rate of temperature
+  const Effect* effect = nullptr;  // null: temperature squared, rate of temperature, and a jump
   std::string id;
   std::string unit;             // of the coefficient where the sensors' units are SI
   double si_per_unit = 1.0;     // rad/s or m/s^2, per s and degC, in one `unit`
   std::string raw_per;          // where they are not: raw units per this; empty: raw units
   double raw_per_factor = 1.0;  // raw units per s and degC in one raw unit per `raw_per`
   bool of_temperature = false;  // reads the channel
+  bool jumps = false;           // a bias that is another from a time on
 };
 
 struct RestAmplitude {
   RestEquation equation;
   double value = 0.0, sigma = 0.0;              // raw units, per s and degC; all of a warm-up
-  double constant = NAN, constant_sigma = NAN;  // time constant, s; NaN: none
+  double constant = NAN, constant_sigma = NAN;  // time constant, or time of a jump, s; NaN: none
 };
 
 struct RestTerm {

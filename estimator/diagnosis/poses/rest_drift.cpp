@@ -56,6 +56,9 @@ Course::Asked Course::ask(const Candidate& c, const Indices& known) const {
   Asked best{&c, 0, 0.0};
   double most = -HUGE_VAL;
   for (std::size_t k = 0; k < c.at.size(); ++k) {
+    if (std::find(known.begin(), known.end(), c.at[k]) != known.end()) {
+      continue;  // it has jumped there
+    }
     const SlowNoise::Answer a = noise_.ask(with(known, c.at[k]), reading_);
     if (a.log_likelihood > most) {
       most = a.log_likelihood;
@@ -70,16 +73,20 @@ std::vector<Course::Asked> Course::ask_all(double axes, const Indices& known) co
   const bool linear =
       std::any_of(kept_.begin(), kept_.end(), [](const Kept& k) { return k.asked.candidate->is_linear; });
   std::vector<Asked> all;
-  double tests = 0.0;
+  // Of the false alarms that are allowed a jump, which may be anywhere, has a tenth: the others know their course.
+  constexpr double of_jumps = 0.1;
+  double tests = 0.0, jumps = 0.0;
   for (const Candidate& c : equations_) {
-    const bool there = std::any_of(kept_.begin(), kept_.end(), [&c](const Kept& k) { return k.asked.candidate == &c; });
+    const bool there = !c.equation.jumps &&
+                       std::any_of(kept_.begin(), kept_.end(), [&c](const Kept& k) { return k.asked.candidate == &c; });
     if (!there && (!c.after_linear || linear)) {
       all.push_back(ask(c, known));
-      tests += c.tests;
+      (c.equation.jumps ? jumps : tests) += c.tests;
     }
   }
   for (Asked& a : all) {
-    a.log_p = log_corrected(a.log_p, axes * tests);
+    const bool jump = a.candidate->equation.jumps;
+    a.log_p = log_corrected(a.log_p, axes * (jump ? jumps / of_jumps : tests / (jumps > 0.0 ? 1.0 - of_jumps : 1.0)));
   }
   std::stable_sort(all.begin(), all.end(), [](const Asked& a, const Asked& b) { return a.log_p < b.log_p; });
   return all;
@@ -109,7 +116,9 @@ void Course::select(double axes, double log_limit) {
     for (const Asked& rival : before) {
       const auto again =
           std::find_if(after.begin(), after.end(), [&rival](const Asked& a) { return a.candidate == rival.candidate; });
-      if (again != after.end() && rival.log_p < log_limit && rival.log_p < likely && again->log_p > log_limit) {
+      const bool another = rival.candidate != kept_.back().asked.candidate;
+      if (another && again != after.end() && rival.log_p < log_limit && rival.log_p < likely &&
+          again->log_p > log_limit) {
         kept_.back().as_well.push_back(rival);
       }
     }
@@ -120,31 +129,35 @@ void Course::select(double axes, double log_limit) {
 // Over the time constants by their likelihood, so that sigma holds theirs.
 RestAmplitude Course::amplitude(const Candidate& c, const Indices& known) const {
   std::vector<SlowNoise::Answer> answers;
+  std::vector<std::size_t> of;  // columns
   double most = -HUGE_VAL;
-  for (const Eigen::Index column : c.at) {
-    answers.push_back(noise_.ask(with(known, column), reading_));
-    most = std::max(most, answers.back().log_likelihood);
+  for (std::size_t k = 0; k < c.at.size(); ++k) {
+    if (std::find(known.begin(), known.end(), c.at[k]) == known.end()) {
+      answers.push_back(noise_.ask(with(known, c.at[k]), reading_));
+      of.push_back(k);
+      most = std::max(most, answers.back().log_likelihood);
+    }
   }
   RestAmplitude r;
   r.equation = c.equation;
   double sum = 0.0, square = 0.0, constant = 0.0, constant_square = 0.0;
   for (std::size_t k = 0; k < answers.size(); ++k) {
     const double w = std::exp(answers[k].log_likelihood - most);
-    const double value = answers[k].value(answers[k].value.size() - 1) / c.length[k];
-    const double sigma = answers[k].sigma(answers[k].sigma.size() - 1) / c.length[k];
+    const double value = answers[k].value(answers[k].value.size() - 1) / c.length[of[k]];
+    const double sigma = answers[k].sigma(answers[k].sigma.size() - 1) / c.length[of[k]];
     sum += w;
     r.value += w * value;
     square += w * (value * value + sigma * sigma);
-    constant += w * c.constant[k];
-    constant_square += w * c.constant[k] * c.constant[k];
+    constant += w * c.constant[of[k]];
+    constant_square += w * c.constant[of[k]] * c.constant[of[k]];
   }
   r.value /= sum;
   r.sigma = std::sqrt(std::max(0.0, square / sum - r.value * r.value));
   if (answers.size() > 1) {
     r.constant = constant / sum;
     constexpr double of_the_grid = 0.067;  // 26 % apart, even: / sqrt(12)
-    r.constant_sigma = std::sqrt(std::max(0.0, constant_square / sum - r.constant * r.constant) +
-                                 std::pow(of_the_grid * r.constant, 2));
+    const double grid = c.apart_s > 0.0 ? c.apart_s / std::sqrt(12.0) : of_the_grid * r.constant;
+    r.constant_sigma = std::sqrt(std::max(0.0, constant_square / sum - r.constant * r.constant) + grid * grid);
   }
   return r;
 }

@@ -2,7 +2,8 @@
 //
 // Asked are the catalogue's equations that change while nothing turns, found by their columns: steadily in time, warming up with a
 // time constant, with the measured temperature; besides that temperature's rate and, once it is named, its square. What cannot be
-// told from another one as long as nothing turns (bias and scale factor of an axis along gravity) is asked once.
+// told from another one as long as nothing turns (bias and scale factor of an axis along gravity) is asked once. A bias may jump more
+// than once.
 #pragma once
 
 #include <vector>

@@ -17,12 +17,14 @@ class Equations {
       add(effect);
     }
     add_of_temperature();
+    add_jump();
   }
   std::vector<RestCandidate> all;
 
  private:
   void add(const Effect& effect);
   void add_of_temperature();
+  void add_jump();
   // One column, unscaled; empty: none, or several unknowns.
   Eigen::VectorXd column(const Effect& effect, double constant, const Vector3& u) const;
   // Less the means of the poses: of the unit length that `length` says, 0 where nothing changes.
@@ -174,6 +176,44 @@ void Equations::add_of_temperature() {
   if (std::sqrt((rate.array() - rate.mean()).square().mean()) > times * noise) {
     push(rate, {nullptr, id + "_rate", name + "/(degC/h)", unit * units::hour, "/(degC/h)", units::hour, true}, false);
   }
+}
+
+// Between two blocks of one pose that have three beside them on either side: a block alone is no jump.
+void Equations::add_jump() {
+  constexpr Eigen::Index least = 3;
+  const auto pose = [&](Eigen::Index i) { return blocks_.pose[static_cast<std::size_t>(i)]; };
+  RestCandidate c;
+  std::vector<Eigen::VectorXd> columns;
+  for (Eigen::Index i = least; i + least <= blocks_.rows(); ++i) {
+    if (pose(i - least) == pose(i + least - 1)) {
+      Eigen::VectorXd step = Eigen::VectorXd::Zero(blocks_.rows());
+      for (Eigen::Index k = i; k < blocks_.rows(); ++k) {
+        step(k) = pose(k) == pose(i) ? 1.0 : 0.0;
+      }
+      double length = 0.0;
+      columns.push_back(centred(step, length));
+      c.length.push_back(length);
+      c.constant.push_back(0.5 * (blocks_.times.middle_s(i - 1) + blocks_.times.middle_s(i)));
+    }
+  }
+  if (columns.empty()) {
+    return;
+  }
+  c.columns.resize(blocks_.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    c.columns.col(static_cast<Eigen::Index>(k)) = columns[k];
+  }
+  c.equation = {nullptr,
+                gyro_ ? "gyro_bias_jump" : "accel_bias_jump",
+                gyro_ ? "deg/h" : "ug",
+                gyro_ ? units::degree_per_hour : units::micro_g,
+                "",
+                1.0,
+                false,
+                true};
+  c.apart_s = blocks_.times.block_s;
+  c.tests = worth(c.columns);
+  all.push_back(std::move(c));
 }
 
 }  // namespace

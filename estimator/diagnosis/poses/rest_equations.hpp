@@ -19,6 +19,7 @@ struct RestCandidate {
   bool is_linear = false;
   std::vector<std::string> twins;  // where gravity acts along the axis
   double tests = 1.0;              // that the constants are worth
+  double apart_s = 0.0;            // of the times of a jump; 0: time constants, 26 % apart
   std::vector<Eigen::Index> at;    // columns of a table that holds them: whoever makes it
 };
 

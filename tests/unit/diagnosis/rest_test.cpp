@@ -116,6 +116,56 @@ TEST(Rest, ARampWithoutAChannelHasItsRate) {
   EXPECT_NEAR(gyro_x(d).terms.front().found.value, truth, 4.0 * gyro_x(d).terms.front().found.sigma);
 }
 
+// A cheap gyro's bias may go by degrees a second with the temperature; what changes within seconds only moves.
+TEST(Rest, ABiasThatGoesFarIsNoMotion) {
+  Log log;
+  const auto temperature = [](double t) { return 20.0 + 80.0 * (1.0 - std::abs(2.0 * t / 1800.0 - 1.0)); };
+  constexpr double truth = 1.5e-3;  // rad/s per degC: 0.12 rad/s, 7 deg/s in all
+  log.stand(
+      1800.0, Vector3::UnitZ(), [&](double t) { return truth * (temperature(t) - 60.0); }, temperature);
+  const PoseDiagnosis d = diagnose_poses(log.input, 0.01);
+  ASSERT_TRUE(d.rest) << d.failure;
+  ASSERT_FALSE(gyro_x(d).terms.empty());
+  EXPECT_EQ(gyro_x(d).terms.front().found.equation.id, "gyro_temperature");
+  EXPECT_NEAR(gyro_x(d).terms.front().found.value, truth, 0.01 * truth);
+}
+
+// Sigma of the difference of two means of 900 s of white noise is sqrt(2 / 9000) of a sample's.
+constexpr double jump_sigma = 1.49e-2 * gyro_sigma;
+
+TEST(Rest, ABiasThatJumpsIsNoDrift) {
+  Log log;
+  constexpr double truth = 30.0 * jump_sigma, at_s = 700.0;  // 5 sigma of a block of 15 s: less may be a walk
+  log.stand(1800.0, Vector3::UnitZ(), [](double t) { return t > at_s ? truth : 0.0; });
+  const PoseDiagnosis d = diagnose_poses(log.input, 0.01);
+  ASSERT_TRUE(d.rest);
+  ASSERT_EQ(gyro_x(d).terms.size(), 1u);
+  const RestAmplitude& found = gyro_x(d).terms.front().found;
+  EXPECT_EQ(found.equation.id, "gyro_bias_jump");
+  EXPECT_NEAR(found.value, truth, 4.0 * found.sigma);
+  EXPECT_LT(found.sigma, 2.5 * jump_sigma);  // slow noise that may be there besides
+  EXPECT_NEAR(found.constant, at_s, 4.0 * found.constant_sigma);
+  EXPECT_LT(found.constant_sigma, 60.0);
+  for (std::size_t k = 1; k < 6; ++k) {
+    EXPECT_TRUE(d.rest->axes[k].terms.empty());
+  }
+}
+
+TEST(Rest, ABiasMayJumpTwice) {
+  Log log;
+  constexpr double first = 30.0 * jump_sigma, second = -20.0 * jump_sigma;
+  log.stand(1800.0, Vector3::UnitZ(), [](double t) { return (t > 500.0 ? first : 0.0) + (t > 1300.0 ? second : 0.0); });
+  const PoseDiagnosis d = diagnose_poses(log.input, 0.01);
+  ASSERT_TRUE(d.rest);
+  ASSERT_EQ(gyro_x(d).terms.size(), 2u);
+  for (const RestTerm& t : gyro_x(d).terms) {
+    const bool early = t.found.constant < 900.0;
+    EXPECT_EQ(t.found.equation.id, "gyro_bias_jump");
+    EXPECT_NEAR(t.found.value, early ? first : second, 4.0 * t.found.sigma);
+    EXPECT_NEAR(t.found.constant, early ? 500.0 : 1300.0, 4.0 * t.found.constant_sigma);
+  }
+}
+
 // The control: the same size as a ramp's, but a walk's. An equation named of it were a false alarm.
 TEST(Rest, AWalkIsNoDrift) {
   Log log;
