@@ -176,10 +176,10 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
   if (beyond != nullptr && explains(beyond)) {
     return discovered_figures(*beyond) + ".";
   }
-  std::string text;
   if (!most_of_it(beyond).empty()) {
     return law_figures(*beyond) + described_clause(*beyond) + ".";
   }
+  std::string text;
   // The mean over all hides what few places hold.
   const bool hidden = std::abs(d.after.nis - 1.0) < 0.1;
   if (!d.remaining.empty()) {
@@ -195,7 +195,7 @@ std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* be
     text +=
         fmt::format("; the best of the catalogue, {} ({}), leaves it", best.effect, figures_with_significance(best));
   }
-  if (beyond != nullptr && explained_share(*beyond) > 0.0 && most_of_it(beyond).empty()) {
+  if (beyond != nullptr && explained_share(*beyond) > 0.0) {
     text += fmt::format("; found beyond it: {}, {:.0f} % of the misfit", discovered_words(*beyond),
                         100.0 * explained_share(*beyond));
   }
@@ -264,6 +264,21 @@ Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate,
   return s;
 }
 
+// Of values beside which nothing of the catalogue explains the recording.
+std::string unexplained_values(const discovery::Discovery* beyond) {
+  if (explains(beyond)) {
+    return fmt::format("These 24 values are biased by {}: {}.", beyond_what(*beyond), discovered_words(*beyond));
+  }
+  const std::string most = most_of_it(beyond);
+  return most.empty()
+             ? std::string(
+                   "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values.")
+             : fmt::format(
+                   "Recording and model disagree: {}; nothing that was tried explains the rest: do not use these 24 "
+                   "values.",
+                   most);
+}
+
 Summary summary_of_inconsistency(const CalibrationResult& result, const Subject& subject, const Diagnosis* d,
                                  const discovery::Discovery* beyond) {
   Summary s{SummaryStanding::bad, {}, {}, {}};
@@ -276,15 +291,7 @@ Summary summary_of_inconsistency(const CalibrationResult& result, const Subject&
     s.cause = named_cause(*d, beyond);
     s.next = subject.run > 0 ? fmt::format("selfcal amend {}", subject.run) : command("diagnose", subject);
   } else if (d != nullptr && d->unexplained) {
-    s.verdict =
-        explains(beyond)
-            ? fmt::format("These 24 values are biased by {}: {}.", beyond_what(*beyond), discovered_words(*beyond))
-        : most_of_it(beyond).empty()
-            ? "Recording and model disagree and nothing in the catalogue explains it: do not use these 24 values."
-            : fmt::format(
-                  "Recording and model disagree: {}; nothing that was tried explains the rest: do not use these 24 "
-                  "values.",
-                  most_of_it(beyond));
+    s.verdict = unexplained_values(beyond);
     s.cause = unexplained_cause(*d, beyond);
     s.next = command("diagnose", subject);
   } else {

@@ -7,6 +7,7 @@
 
 #include "estimator/fleet/jumps.hpp"
 #include "estimator/statistics/climb.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::fleet {
 namespace {
@@ -114,14 +115,7 @@ MatrixXd normal_equations(std::span<const UnitHistory> units, int sets, const Ag
   return normal.selfadjointView<Eigen::Lower>();
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double median_or_zero(std::vector<double> values) { return values.empty() ? 0.0 : median(std::move(values)); }
 
 struct Effects {
   VectorXd value;
@@ -145,15 +139,15 @@ double spread_of_sets(const Effects& wide) {
   for (Eigen::Index s = 0; s < sets; ++s) {
     offsets.push_back(wide.value(wide.fixed + s));
   }
-  const double middle = median(offsets);
+  const double middle = median_or_zero(offsets);
   for (Eigen::Index s = 0; s < sets; ++s) {
     departures.push_back(std::abs(offsets[static_cast<std::size_t>(s)] - middle));
     // The mean of all sets cannot be told from the type's: what counts is how well one is known against the others.
     variances.push_back(wide.covariance(wide.fixed + s, wide.fixed + s) -
                         wide.covariance.bottomRightCorner(sets, sets).mean());
   }
-  const double seen = mad_to_sd * median(departures);
-  return std::sqrt(std::max(0.0, seen * seen - median(variances)));
+  const double seen = mad_to_sd * median_or_zero(departures);
+  return std::sqrt(std::max(0.0, seen * seen - median_or_zero(variances)));
 }
 
 struct Extent {
@@ -182,7 +176,7 @@ Extent extent(std::span<const UnitHistory> units) {
     }
   }
   found.sd = std::sqrt(squares / static_cast<double>(found.count));
-  found.sigma = median(sigmas);
+  found.sigma = median_or_zero(sigmas);
   return found;
 }
 
@@ -255,7 +249,7 @@ Span tellable_years(Sample sample) {
       steps.push_back((*unit)[k].year - (*unit)[k - 1].year);
     }
   }
-  return {median(std::move(steps)), longest};
+  return {median_or_zero(std::move(steps)), longest};
 }
 
 // v where it raises the likelihood by more than its figures; the walk has to give to it what it had to stand for.

@@ -7,15 +7,10 @@
 #include <limits>
 
 #include "estimator/geometry/angles.hpp"
+#include "protocol/import/median.hpp"
 
 namespace selfcal::import {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double quantile(std::vector<double>& values, double part) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));

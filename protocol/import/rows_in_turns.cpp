@@ -8,16 +8,12 @@
 #include <cmath>
 #include <set>
 
+#include "protocol/import/median.hpp"
+
 namespace selfcal::import {
 namespace {
 
 constexpr int most_labels = 8;
-
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Whether the usual step to a row of another label is several times that to the last row of the same one. A clock rises with both.
 bool tells_apart(const std::vector<double>& values, const std::vector<int>& labels) {
@@ -41,7 +37,7 @@ bool tells_apart(const std::vector<double>& values, const std::vector<int>& labe
     seen.at(label) = true;
   }
   return within.size() > enough && between.size() > enough &&
-         middle_of(std::move(between)) > several * middle_of(std::move(within));
+         median(std::move(between)) > several * median(std::move(within));
 }
 
 // Small whole numbers of which two to eight take turns, numbered from 0; empty: none.

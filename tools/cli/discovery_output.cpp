@@ -107,12 +107,15 @@ std::string rivals_text(const DiscoveredLaw& law) {
                      more > 0 ? fmt::format(", and {} more", more) : std::string());
 }
 
+// Its equation, how sure, and its share.
+std::string law_head(const DiscoveredLaw& law) {
+  return fmt::format("  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit", name_of_axis(law.term.axis),
+                     with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,
+                     law.significance, 100.0 * law.share);
+}
+
 std::string brief_law_text(const DiscoveredLaw& law) {
-  return fmt::format(
-             "  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit; holds on another plan with a probability of "
-             "{:.2f}\n",
-             name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
-             law.expression, law.significance, 100.0 * law.share, law.carries_over) +
+  return law_head(law) + fmt::format("; holds on another plan with a probability of {:.2f}\n", law.carries_over) +
          constants_text(law.constants) + rivals_text(law);
 }
 
@@ -120,10 +123,7 @@ std::string law_text(const DiscoveredLaw& law, Detail detail) {
   if (detail == Detail::brief) {
     return brief_law_text(law);
   }
-  std::string text =
-      fmt::format("  {} = ({}) * {}\n    {:.1f} sigma, {:.0f} % of the misfit, held-out gain {:.0f}\n",
-                  name_of_axis(law.term.axis), with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)),
-                  law.expression, law.significance, 100.0 * law.share, law.held_out_gain);
+  std::string text = law_head(law) + fmt::format(", held-out gain {:.0f}\n", law.held_out_gain);
   text += law.effect.empty() ? std::string()
                              : fmt::format("    as the catalogue's {}, which alone leaves too much\n", law.effect);
   text += constants_text(law.constants) + class_text(law);

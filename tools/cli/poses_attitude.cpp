@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 #include "protocol/import/column_source.hpp"
 #include "protocol/import/guess_attitude.hpp"
 #include "protocol/import/guess_names.hpp"
@@ -107,12 +108,6 @@ bool is_lost(const Values& values, std::size_t row) {
          (values.size() > 3 && std::all_of(values.begin(), values.end(), zero));
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double length_at(const Values& values, std::size_t row) {
   double square = 0.0;
   for (const auto& column : values) {
@@ -132,7 +127,7 @@ Expected<double> usual_length(const Values& values, const import::ColumnData& da
   if (lengths.empty()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: 0 or no number throughout: no attitude", what));
   }
-  const double usual = median_of(lengths);
+  const double usual = median(lengths);
   constexpr double near_one = 0.02, off = 0.02;
   const double expected = std::abs(usual - 1.0) < near_one ? 1.0 : usual;
   std::size_t wrong = 0, first = 0;

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/statistics/median.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -41,12 +43,6 @@ Loudness loudness(Increments x, std::size_t first, std::size_t n) {
   l.fast /= 3.0 * static_cast<double>(n - 4) * fast_of_white;
   l.slow /= 3.0 * static_cast<double>((parts - 1) * part) * slow_of_white;
   return l;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Smallest step of the increments, 0 where they are continuous: its rounding comes and goes with the rate.

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -75,12 +76,7 @@ double median_power(const std::vector<Loudness>& all) {
       told.push_back(l.power);
     }
   }
-  if (told.size() < enough) {
-    return 0.0;
-  }
-  const auto middle = told.begin() + static_cast<std::ptrdiff_t>(told.size() / 2);
-  std::nth_element(told.begin(), middle, told.end());
-  return *middle;
+  return told.size() < enough ? 0.0 : median(std::move(told));
 }
 
 }  // namespace

@@ -44,9 +44,15 @@ using LogLikelihood = std::function<double(const NoiseModel&)>;
 const Climb to_the_top = {
     .factors = {2.0, 1.25, 1.06}, .most_rounds = 20, .most_moves = 4, .enough = 0.1, .farthest = 30.0};
 
-NoiseModel top_of(const NoiseModel& start, const LogLikelihood& log_likelihood) {
+struct Fitted {
+  NoiseModel noise;
+  double log_likelihood = 0.0;
+};
+
+Fitted top_of(const NoiseModel& start, const LogLikelihood& log_likelihood) {
   const auto of = [&](const Sizes& s) { return log_likelihood(with_sizes(start, s)); };
-  return with_sizes(start, climb<10>(sizes_of(start), to_the_top, of).at);
+  const Summit<10> top = climb<10>(sizes_of(start), to_the_top, of);
+  return {with_sizes(start, top.at), top.log_likelihood};
 }
 
 // Where the base changes its loudness the accelerometers' noise follows it: variances as 1 + (power / knee)^slope.
@@ -58,8 +64,7 @@ NoiseModel shaken_by(const std::vector<Loudness>& loudness, NoiseModel noise, do
   return noise;
 }
 
-NoiseModel top_beside(const std::vector<Loudness>& loudness, const NoiseModel& start,
-                      const LogLikelihood& log_likelihood) {
+Fitted top_beside(const std::vector<Loudness>& loudness, const NoiseModel& start, const LogLikelihood& log_likelihood) {
   // A variance that follows the power of the shaking goes with slope 1; a knee far above the median leaves the quiet as it is.
   constexpr double knee = 10.0, slope = 0.75;
   using More = std::array<double, 12>;
@@ -73,7 +78,8 @@ NoiseModel top_beside(const std::vector<Loudness>& loudness, const NoiseModel& s
   std::copy(sizes.begin(), sizes.end(), from.begin());
   from[10] = knee;
   from[11] = slope;
-  return noise_of(climb<12>(from, to_the_top, [&](const More& x) { return log_likelihood(noise_of(x)); }).at);
+  const Summit<12> top = climb<12>(from, to_the_top, [&](const More& x) { return log_likelihood(noise_of(x)); });
+  return {noise_of(top.at), top.log_likelihood};
 }
 
 double integral_density(const NoiseCheck& noise, std::size_t axis, double rate_hz) {
@@ -115,12 +121,12 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& check, const std::ve
     return run_pass(trial).log_likelihood;
   };
   const std::vector<Loudness> loudness = loudness_of(*input.data, segments, input.interval_s);
-  const NoiseModel best =
+  const Fitted best =
       changes_its_loudness(loudness) ? top_beside(loudness, start, log_likelihood) : top_of(start, log_likelihood);
-  if (log_likelihood(best) < log_likelihood(given) + least_log_gain) {
+  if (best.log_likelihood < log_likelihood(given) + least_log_gain) {
     return false;
   }
-  input.noise = best;
+  input.noise = best.noise;
   return true;
 }
 
@@ -129,7 +135,7 @@ std::optional<NoiseModel> refit_velocity_noise(const NoiseModel& noise,
   if (!noise.axes) {
     return std::nullopt;
   }
-  const NoiseModel best = top_of(noise, log_likelihood);
+  const NoiseModel best = top_of(noise, log_likelihood).noise;
   if (sizes_of(best) == sizes_of(noise)) {
     return std::nullopt;
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/median.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -11,12 +13,6 @@ using Quaternions = std::vector<Eigen::Quaterniond>;
 // q and -q are one attitude.
 bool alike(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return a.coeffs() == b.coeffs() || a.coeffs() == -b.coeffs();
-}
-
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<double> steps_of(const std::vector<double>& times) {
@@ -192,7 +188,7 @@ Knots find_knots(const ReferenceAttitude& attitude) {
   }
   const bool held = attitude.in_rows_of_log && values_are_held(valid, attitude);
   const std::vector<Run> runs = runs_of(valid, q);
-  const double row = middle_of(steps_of(attitude.time_s));
+  const double row = median(steps_of(attitude.time_s));
   std::vector<double> begin;
   begin.reserve(runs.size());
   for (const Run& run : runs) {
@@ -201,10 +197,10 @@ Knots find_knots(const ReferenceAttitude& attitude) {
   if (runs.size() < fewest) {
     return knots;
   }
-  knots.interval_s = held ? middle_of(steps_of(begin)) : row;
+  knots.interval_s = held ? median(steps_of(begin)) : row;
   if (held) {
     make_even(begin, knots.interval_s, row);
-    knots.interval_s = middle_of(steps_of(begin));
+    knots.interval_s = median(steps_of(begin));
   }
   constexpr double longer = 3.5;
   const double most = held ? longer * knots.interval_s : std::max(0.1, 5.0 * row);

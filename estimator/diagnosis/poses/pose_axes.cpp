@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -55,12 +56,6 @@ std::vector<Matrix3> signed_permutations() {
     }
   } while (std::next_permutation(order.begin(), order.end()));
   return all;  // the identity first
-}
-
-double quantile(std::vector<double> values, double share) {
-  const auto k = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), k, values.end());
-  return *k;
 }
 
 constexpr double another = 1.3;  // times a unit is another unit
@@ -192,10 +187,9 @@ std::string contradiction(const PoseInput& input, const GyroReading& reading) {
   }
   const double ratio = reading.unit / input.gyro_unit;
   if (input.gyros_si && (ratio > another || ratio < 1.0 / another)) {
-    const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
     std::array<char, 200> text{};
     constexpr double alike = 0.1;
-    const bool increments = std::abs(ratio / rate - 1.0) < alike;
+    const bool increments = std::abs(ratio / sample_rate(input) - 1.0) < alike;
     std::snprintf(text.data(), text.size(), "gravity turns %.4g times as far as the gyros say%s", ratio,
                   increments ? ": they are increments, not rates" : ": another unit, or a time in another one");
     words += (words.empty() ? "" : "; ") + std::string(text.data());

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/diagnosis/poses/poses.hpp"
 
 namespace selfcal::diagnosis {
@@ -24,20 +25,26 @@ struct Pose {
 // Whether a unit of the gyros is said, be it rad/s.
 inline bool knows_gyro_unit(const PoseInput& input) { return input.gyros_si || input.gyro_unit != 1.0; }
 
+// Mean over the log, Hz.
+inline double sample_rate(const PoseInput& input) {
+  return static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+}
+
 Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i);
 
-// Stretches in which the accelerometers give zero, which gravity never does, or all six axes one value for half a second.
-std::vector<LeftOut> find_left_out(const PoseInput& input);
+// Gaps, stretches in which an axis is stuck, in which the accelerometers give zero, which gravity never does, or all six axes one value for
+// half a second.
+std::vector<LeftOut> find_left_out(const PoseInput& input, const std::vector<StuckAxis>& stuck);
 
 // Poses by the motion: stretches of 1 s and more in which both triads scatter little, put together where neither gravity nor
-// the gyros show a turn between them, and without those in which the sensor turns steadily.
+// the gyros show a turn between them, and without those in which the sensor turns steadily. None holds what is left out.
 struct FoundPoses {
   std::vector<Pose> poses;
   int steady_turns = 0;              // stretches as quiet as a pose that turn
   int moving = 0;                    // that move
   std::vector<double> other_forces;  // that read another force than gravity, g
 };
-FoundPoses find_poses(const PoseInput& input);
+FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_out);
 
 // Axes that stand at the end of their range, which no other value approaches as often.
 std::vector<Clipping> find_clipping(const PoseInput& input);

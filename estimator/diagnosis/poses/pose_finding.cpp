@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -30,12 +31,6 @@ std::vector<double> scatter(const Series& series, std::size_t window) {
     }
   }
   return result;
-}
-
-double quantile(std::vector<double> values, double share) {
-  const auto k = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), k, values.end());
-  return *k;
 }
 
 // Means over the quiet stretches, and over their halves.
@@ -94,9 +89,10 @@ double quiet_limit(const std::vector<double>& scatters, double share) {
 }
 
 // Of windows that hold a sample of a stretch left out it is beyond any limit.
-void spoil(const PoseInput& input, std::size_t window, std::vector<double>& scatters) {
-  for (const LeftOut& out : find_left_out(input)) {
-    const double start = input.time_s.front();
+void spoil(const PoseInput& input, const std::vector<LeftOut>& left_out, std::size_t window,
+           std::vector<double>& scatters) {
+  const double start = input.time_s.front();
+  for (const LeftOut& out : left_out) {
     for (std::size_t k = 0; k < scatters.size(); ++k) {
       if (input.time_s[k] - start <= out.last_s && input.time_s[k + window - 1] - start >= out.first_s) {
         scatters[k] = HUGE_VAL;
@@ -105,10 +101,11 @@ void spoil(const PoseInput& input, std::size_t window, std::vector<double>& scat
   }
 }
 
-std::vector<Pose> quiet_stretches(const PoseInput& input, std::size_t window, double share) {
+std::vector<Pose> quiet_stretches(const PoseInput& input, const std::vector<LeftOut>& left_out, std::size_t window,
+                                  double share) {
   std::vector<double> gyro = scatter(input.gyro, window), accel = scatter(input.accel, window);
-  spoil(input, window, gyro);
-  spoil(input, window, accel);
+  spoil(input, left_out, window, gyro);
+  spoil(input, left_out, window, accel);
   const double gyro_limit = quiet_limit(gyro, share), accel_limit = quiet_limit(accel, share);
   const std::vector<std::size_t> gaps = find_gaps(input);
   std::vector<Pose> found;
@@ -283,8 +280,8 @@ Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i) {
   return Eigen::Map<const Vector3>(series[i].data());
 }
 
-FoundPoses find_poses(const PoseInput& input) {
-  const double rate = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_out) {
+  const double rate = sample_rate(input);
   const auto window = std::max<std::size_t>(4, static_cast<std::size_t>(std::lround(rate)));  // 1 s, or four samples
   if (input.time_s.size() < 20 * window) {
     return {};
@@ -293,7 +290,7 @@ FoundPoses find_poses(const PoseInput& input) {
   // Where the quietest twentieth of a log moves, as that of a vehicle which stood for a while, less than it rests.
   const auto is_moving = [&input](const Pose& p) { return moves(input, p); };
   for (const double share : {0.05, 0.02, 0.005}) {
-    found.poses = put_together(input, quiet_stretches(input, window, share));
+    found.poses = put_together(input, quiet_stretches(input, left_out, window, share));
     if (std::none_of(found.poses.begin(), found.poses.end(), is_moving)) {
       break;
     }
@@ -311,7 +308,7 @@ FoundPoses find_poses(const PoseInput& input) {
   return found;
 }
 
-std::vector<LeftOut> find_left_out(const PoseInput& input) {
+std::vector<LeftOut> find_left_out(const PoseInput& input, const std::vector<StuckAxis>& stuck) {
   constexpr double least_s = 0.5;
   constexpr std::array<double, 3> zero{};
   std::vector<LeftOut> all;
@@ -336,7 +333,7 @@ std::vector<LeftOut> find_left_out(const PoseInput& input) {
     all.push_back({input.time_s[i - 1] - input.time_s.front(), input.time_s[i] - input.time_s.front(), 0,
                    "the log holds no sample"});
   }
-  for (const StuckAxis& s : find_stuck(input)) {
+  for (const StuckAxis& s : stuck) {
     if (!s.throughout) {
       add(s.first, s.last, s.gyro ? "a gyro stands at one value" : "an accelerometer stands at one value");
     }

@@ -7,13 +7,10 @@
 #include <span>
 
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
-
-double sample_rate(const PoseInput& input) {
-  return static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
-}
 
 // Variance of each axis among the means of blocks about that of all.
 Vector3 variance_of(std::span<const Vector3> means) {
@@ -34,12 +31,6 @@ double variance_within(std::span<const Vector3> means, std::size_t blocks) {
     sum += static_cast<double>(these.size()) * variance_of(these);
   }
   return sum.maxCoeff() / static_cast<double>(means.size());
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

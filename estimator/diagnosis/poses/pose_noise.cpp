@@ -7,7 +7,7 @@ namespace selfcal::diagnosis {
 
 std::vector<RestNoise> noise_at_rest(const PoseInput& input, const std::vector<std::array<double, 3>>& series,
                                      const std::vector<Pose>& poses) {
-  const double rate_hz = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+  const double rate_hz = sample_rate(input);
   std::size_t longest = 0;
   for (const Pose& p : poses) {
     for (const auto& [first, last] : p.quiet) {

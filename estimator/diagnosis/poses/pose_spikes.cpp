@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/median.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -20,12 +22,7 @@ double usual_step(const Series& series, std::size_t axis) {
       steps.push_back(std::abs(series[i][axis] - series[i - 1][axis]));
     }
   }
-  if (steps.empty()) {
-    return 0.0;
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? 0.0 : median(std::move(steps));
 }
 
 bool stands_alone(const Series& series, std::size_t axis, std::size_t i, double usual) {

@@ -86,8 +86,8 @@ std::vector<StuckAxis> find_stuck(const PoseInput& input) {
   return all;
 }
 
-void add_dead_axes(const PoseInput& input, PoseDiagnosis& d) {
-  for (const StuckAxis& s : find_stuck(input)) {
+void add_dead_axes(const std::vector<StuckAxis>& stuck, PoseDiagnosis& d) {
+  for (const StuckAxis& s : stuck) {
     const std::string words =
         std::string(s.gyro ? "gyro " : "accelerometer ") + "xyz"[s.axis] + " reads one value throughout";
     if (s.throughout && s.gyro) {

@@ -17,6 +17,6 @@ struct StuckAxis {
 std::vector<StuckAxis> find_stuck(const PoseInput& input);
 
 // Of an axis that reads one value in the whole log nothing is told, and gravity needs all three: into `gyro_axes`, `invisible`, `failure`.
-void add_dead_axes(const PoseInput& input, PoseDiagnosis& d);
+void add_dead_axes(const std::vector<StuckAxis>& stuck, PoseDiagnosis& d);
 
 }  // namespace selfcal::diagnosis

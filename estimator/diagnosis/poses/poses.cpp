@@ -415,13 +415,14 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   d.sensors = input.sensors;
   d.duration_s = input.time_s.back() - input.time_s.front();
   d.gyro_axes = input.gyro_axes;
-  add_dead_axes(input, d);
+  const std::vector<StuckAxis> stuck = find_stuck(input);
+  add_dead_axes(stuck, d);
   if (!d.failure.empty()) {
     return d;
   }
   d.clipped = find_clipping(input);
-  d.left_out = find_left_out(input);
-  FoundPoses found = find_poses(input);
+  d.left_out = find_left_out(input, stuck);
+  FoundPoses found = find_poses(input, d.left_out);
   std::vector<Pose>& poses = found.poses;
   d.steady_turns = found.steady_turns;
   d.moving = found.moving;

@@ -10,10 +10,6 @@ namespace {
 
 double interval(const PoseInput& input, std::size_t i) { return input.time_s[i] - input.time_s[i - 1]; }
 
-double sample_rate(const PoseInput& input) {
-  return static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
-}
-
 // Noise of a read-out by its second differences: a steady turn has none.
 double noise_of(const std::vector<double>& angle) {
   std::vector<double> bend;

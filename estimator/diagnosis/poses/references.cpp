@@ -8,6 +8,7 @@
 
 #include "estimator/geometry/rotation.hpp"
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -16,12 +17,6 @@ std::string sentence(const char* format, double a, double b) {
   char text[200];
   std::snprintf(text, sizeof text, format, a, b);
   return text;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Sigma of the mean rate over the recording, rad/s, were a sample's noise white: by the second differences, which hold no

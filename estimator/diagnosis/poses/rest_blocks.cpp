@@ -57,7 +57,7 @@ bool moves(const Eigen::VectorXd& temperature) {
 }  // namespace
 
 RestBlocks rest_blocks(const PoseInput& input, const std::vector<Pose>& poses) {
-  const double rate_hz = static_cast<double>(input.time_s.size() - 1) / (input.time_s.back() - input.time_s.front());
+  const double rate_hz = sample_rate(input);
   double whole = 0.0;
   RestBlocks r;
   for (std::size_t k = 0; k < poses.size(); ++k) {

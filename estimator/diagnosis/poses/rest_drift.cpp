@@ -47,6 +47,8 @@ class Course {
   std::vector<Kept> kept_;
 };
 
+bool holds(const Indices& known, Eigen::Index one) { return std::find(known.begin(), known.end(), one) != known.end(); }
+
 Indices with(Indices known, Eigen::Index one) {
   known.push_back(one);
   return known;
@@ -56,7 +58,7 @@ Course::Asked Course::ask(const Candidate& c, const Indices& known) const {
   Asked best{&c, 0, 0.0};
   double most = -HUGE_VAL;
   for (std::size_t k = 0; k < c.at.size(); ++k) {
-    if (std::find(known.begin(), known.end(), c.at[k]) != known.end()) {
+    if (holds(known, c.at[k])) {
       continue;  // it has jumped there
     }
     const SlowNoise::Answer a = noise_.ask(with(known, c.at[k]), reading_);
@@ -132,7 +134,7 @@ RestAmplitude Course::amplitude(const Candidate& c, const Indices& known) const 
   std::vector<std::size_t> of;  // columns
   double most = -HUGE_VAL;
   for (std::size_t k = 0; k < c.at.size(); ++k) {
-    if (std::find(known.begin(), known.end(), c.at[k]) == known.end()) {
+    if (!holds(known, c.at[k])) {
       answers.push_back(noise_.ask(with(known, c.at[k]), reading_));
       of.push_back(k);
       most = std::max(most, answers.back().log_likelihood);

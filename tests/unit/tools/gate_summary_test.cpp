@@ -146,13 +146,18 @@ TEST(Summary, EveryVerdictOfTheDiagnosisHasASentence) {
   EXPECT_THAT(summary_of(d, {"r.h5", 0}).cause, HasSubstr("3 gaps"));
 }
 
-// Accelerometers y and z with a new offset at each turn: what discovery finds stands where "nothing explains it" stood.
-TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
+diagnosis::Diagnosis rejected_creep() {
   diagnosis::Diagnosis d = creep();
   d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
   d.unexplained = true;
   d.rejected = d.findings;
   d.findings.clear();
+  return d;
+}
+
+// Accelerometers y and z with a new offset at each turn: what discovery finds stands where "nothing explains it" stood.
+TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
+  const diagnosis::Diagnosis d = rejected_creep();
   discovery::Discovery found;
   found.rows = 5000.0;
   found.misfit_before = 24000.0;  // NIS 5.8
@@ -180,11 +185,7 @@ TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
 
 // An equation that makes most of the misfit beside an axis that follows none is no explanation; the verdict says both.
 TEST(Summary, AnEquationBesideWhatIsOnlyDescribedIsSaid) {
-  diagnosis::Diagnosis d = creep();
-  d.verdict = diagnosis::DiagnosisVerdict::none_of_the_above;
-  d.unexplained = true;
-  d.rejected = d.findings;
-  d.findings.clear();
+  const diagnosis::Diagnosis d = rejected_creep();
   discovery::Discovery found;
   found.rows = 5000.0;
   found.misfit_before = 1000.0;
