@@ -23,6 +23,11 @@ constexpr std::size_t most_told = 3;  // equations in a sentence
 constexpr double worth_a_word = 0.1;  // odds of another explanation, in a verdict
 constexpr double sure = 0.9;          // that an equation holds on another plan; below it the verdict counts its rivals
 
+// By laws and processes that are told.
+double misfit_left(const Discovery& found) {
+  return found.described.empty() ? found.misfit_after : (1.0 - explained_share(found)) * found.misfit_before;
+}
+
 bool leaves_noise(const Discovery& found) { return found.misfit_after < 3.0 * std::sqrt(2.0 * found.rows); }
 
 std::string process_unit(const DiscoveredProcess& p) {
@@ -136,8 +141,11 @@ double explained_share(const Discovery& found) {
 
 bool explains(const Discovery* found) {
   constexpr double most = 0.9;
-  const bool any = found != nullptr && !(found->laws.empty() && found->processes.empty()) && found->described.empty();
-  return any && (leaves_noise(*found) || explained_share(*found) >= most);
+  if (found == nullptr || (found->laws.empty() && found->processes.empty())) {
+    return false;
+  }
+  const bool whole = found->described.empty();
+  return (whole && leaves_noise(*found)) || ((whole || found->processes.empty()) && explained_share(*found) >= most);
 }
 
 bool confirmed(const Discovery* found) {
@@ -150,7 +158,8 @@ bool may_be_a_law(const diagnosis::Diagnosis& d) {
 }
 
 bool replaces_process(const Discovery& found, const diagnosis::Diagnosis& d) {
-  return may_be_a_law(d) && !found.laws.empty() && found.processes.empty() && explains(&found);
+  return may_be_a_law(d) && !found.laws.empty() && found.processes.empty() && found.described.empty() &&
+         explains(&found);
 }
 
 void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {
@@ -179,6 +188,15 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* 
     diagnosis.remaining_by = found->left->by_quantity;
   }
   return diagnosis;
+}
+
+std::string left_words(const Discovery& found) {
+  if (found.described.empty() && leaves_noise(found)) {
+    return {};
+  }
+  const double percent = 100.0 * (1.0 - explained_share(found));
+  return fmt::format("; {} of the misfit is left",
+                     percent < 1.0 ? std::string("less than 1 %") : fmt::format("{:.0f} %", percent));
 }
 
 std::string discovered_words(const Discovery& found) {
@@ -231,7 +249,7 @@ std::string law_figures(const Discovery& found) {
 std::string discovered_figures(const Discovery& found) {
   const auto nis = [&](double misfit) { return 1.0 + misfit / std::max(1.0, found.rows); };
   return fmt::format("{}; NIS {:.3g} becomes {:.3g}", law_figures(found), nis(found.misfit_before),
-                     nis(found.misfit_after));
+                     nis(misfit_left(found)));
 }
 
 void add_discovery(ordered_json& document, const Discovery& found) {

@@ -10,10 +10,13 @@
 
 namespace selfcal {
 
-// Of the misfit that the catalogue leaves, the share that laws and processes take away; 0 where none was found.
+// Of the misfit that the catalogue leaves, the share that laws and processes take away; 0 where none was found. What is only described
+// takes nothing away.
 double explained_share(const discovery::Discovery& found);
-// Laws or processes were found that take away all but a tenth of the misfit, or leave noise; and no axis is only described.
+// Laws or processes were found that take away all but a tenth of the misfit, or leave noise. Beside a process no axis is only described.
 bool explains(const discovery::Discovery* found);
+// "; 7 % of the misfit is left" where what explains leaves more than noise, else empty.
+std::string left_words(const discovery::Discovery& found);
 
 // Laws that hold in two recordings and more of a unit, with one coefficient and one set of constants, and leave noise: what may
 // stand behind a set that is written.

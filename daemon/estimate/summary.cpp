@@ -118,7 +118,7 @@ std::string named(const Diagnosis& d, const discovery::Discovery* beyond) {
     text += fmt::format("; and {} more", kinds.size() - most);
   }
   if (d.unexplained && explains(beyond)) {
-    return text + "; and that " + discovered_words(*beyond);
+    return text + "; and that " + discovered_words(*beyond) + left_words(*beyond);
   }
   return text + (d.unexplained ? "; and what none of these explains" : "");
 }
@@ -174,7 +174,7 @@ std::string most_of_it(const discovery::Discovery* beyond) {
 
 std::string unexplained_cause(const Diagnosis& d, const discovery::Discovery* beyond) {
   if (beyond != nullptr && explains(beyond)) {
-    return discovered_figures(*beyond) + ".";
+    return discovered_figures(*beyond) + described_clause(*beyond) + ".";
   }
   if (!most_of_it(beyond).empty()) {
     return law_figures(*beyond) + described_clause(*beyond) + ".";
@@ -267,7 +267,8 @@ Summary summary_of_parameters(const CalibrationResult& result, const Gate& gate,
 // Of values beside which nothing of the catalogue explains the recording.
 std::string unexplained_values(const discovery::Discovery* beyond) {
   if (explains(beyond)) {
-    return fmt::format("These 24 values are biased by {}: {}.", beyond_what(*beyond), discovered_words(*beyond));
+    return fmt::format("These 24 values are biased by {}: {}{}.", beyond_what(*beyond), discovered_words(*beyond),
+                       left_words(*beyond));
   }
   const std::string most = most_of_it(beyond);
   return most.empty()
@@ -317,7 +318,8 @@ Summary summary_beyond(const Diagnosis& d, const Subject& subject, const discove
   const bool ambiguous = std::any_of(beyond->laws.begin(), beyond->laws.end(),
                                      [](const discovery::DiscoveredLaw& law) { return law.ambiguous.size() > 1; });
   return {SummaryStanding::bad,
-          fmt::format("The model leaves out {}: {}.", beyond_what(*beyond), discovered_words(*beyond)),
+          fmt::format("The model leaves out {}: {}{}.", beyond_what(*beyond), discovered_words(*beyond),
+                      left_words(*beyond)),
           unexplained_cause(d, beyond),
           command("diagnose", subject, ambiguous ? "--next-experiment next.toml" : "--amended amended")};
 }

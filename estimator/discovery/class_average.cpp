@@ -51,9 +51,16 @@ std::size_t place_of(const DiscoveredLaw& law, const std::vector<LawTerm>& terms
 }  // namespace
 
 ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
-                                  std::size_t members, const std::stop_token& stop) {
+                                  const LawFit& told_alone, std::size_t members, const std::stop_token& stop) {
   const SharedParameters as_found = share_parameters(found.fit);
   ClassAverage average{as_found.parameters, as_found.covariance};
+  if (!found.described.empty()) {
+    const SharedParameters without = share_parameters(told_alone);
+    for (std::size_t r = 0; r < recordings.size(); ++r) {
+      const ParameterVector moved = without.parameters[r] - as_found.parameters[r];
+      average.covariance[r] += moved * moved.transpose();
+    }
+  }
   const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
   for (const auto& scene : scenes) {
     scene->table = collect_nodes(scene->motion, scene->input);

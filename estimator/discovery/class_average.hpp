@@ -1,7 +1,8 @@
 // The 24 of each recording over all equations that the recordings leave open.
 //
 // Where a class has several members, each of them in the law's place leads to its own 24. Their mean, weighted by the odds, and
-// their spread are the answer; that of several laws adds up, as if the choices were independent.
+// their spread are the answer; that of several laws adds up, as if the choices were independent. What is only described is in
+// all of these fits, and its true form may move the 24 as far again as this one does.
 #pragma once
 
 #include <span>
@@ -13,8 +14,9 @@
 
 namespace selfcal::discovery {
 
-// `found` of these recordings. `members` of a class at most, the most probable ones: one pass over each recording for each.
+// `found` of these recordings, `told_alone` the fit of its `laws` without what is described (laws_leave.hpp). `members` of a class
+// at most, the most probable ones: one pass over each recording for each.
 ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
-                                  std::size_t members = 8, const std::stop_token& stop = {});
+                                  const LawFit& told_alone, std::size_t members = 8, const std::stop_token& stop = {});
 
 }  // namespace selfcal::discovery

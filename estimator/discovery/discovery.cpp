@@ -484,10 +484,9 @@ Discovery LawSearch::told() {
   const DiscoveryOptions options = search_->options();
   search_.reset();  // what follows has passes and memory of its own
   if (!found.laws.empty() && found.processes.empty()) {
-    found.average = average_over_classes(recordings, found, members_averaged, options.stop);
-    if (found.described.empty()) {
-      found.left = left_by_laws(recordings.front(), found.fit, options.coloured);
-    }
+    const LawFit told = fit_of_told(recordings, found, options.stop);
+    found.average = average_over_classes(recordings, found, told, members_averaged, options.stop);
+    found.left = left_by_laws(recordings.front(), told, options.coloured);
   }
   return found;
 }

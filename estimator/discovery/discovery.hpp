@@ -92,7 +92,7 @@ struct ClassAverage {
   std::vector<ParameterMatrix> covariance;  // [recordings], with the spread between the members
 };
 
-// What a recording shows without its laws.
+// What a recording shows without the laws that are told.
 struct Left {
   diagnosis::Adequacy adequacy;
   std::vector<diagnosis::Located> places, by_quantity;  // largest first
@@ -113,7 +113,7 @@ struct Discovery {
   std::size_t functions_tried = 0;  // functions times axes
   LawFit fit;                       // of the laws in the order in which they were found, with the 24 of each recording
   ClassAverage average;             // empty where no law is told, and where a process is
-  std::optional<Left> left;  // of the first recording, where equations alone are told; none where some are described
+  std::optional<Left> left;         // of the first recording, where equations are told and no process
 };
 
 // One recording of the unit that is looked at. Both must outlive it.

@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/search/quantities.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/scene.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::discovery {
@@ -15,6 +16,22 @@ diagnosis::CorrectedRecording less_laws(const UnitRecording& recording, const La
   const LawMotion motion(context);
   const PassInput input = diagnosis::forward_pass(recording.data, recording.calibration);
   return without_laws(motion, collect_nodes(motion, input), input, fit.terms, fit.coefficient);
+}
+
+LawFit fit_of_told(std::span<const UnitRecording> recordings, const Discovery& found, const std::stop_token& stop) {
+  if (found.described.empty()) {
+    return found.fit;
+  }
+  const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
+  for (const auto& scene : scenes) {
+    scene->table = collect_nodes(scene->motion, scene->input);
+  }
+  std::vector<LawTerm> told;
+  told.reserve(found.laws.size());
+  for (const DiscoveredLaw& law : found.laws) {
+    told.push_back(law.term);
+  }
+  return fit_laws(laws_on(scenes), std::move(told), 0, stop);
 }
 
 Left left_by_laws(const UnitRecording& recording, const LawFit& fit, bool coloured) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/judged_result.hpp"
 #include "daemon/estimate/quantity_text.hpp"
@@ -183,7 +184,8 @@ TEST(Summary, WhatIsFoundBeyondTheCatalogueIsSaid) {
   EXPECT_THAT(part.cause, HasSubstr("50 % of the misfit"));
 }
 
-// An equation that makes most of the misfit beside an axis that follows none is no explanation; the verdict says both.
+// An equation that makes nearly all of the misfit is the answer, and what it leaves is said with it. One that makes most of it beside an
+// axis that follows none is no explanation; the verdict says both.
 TEST(Summary, AnEquationBesideWhatIsOnlyDescribedIsSaid) {
   const diagnosis::Diagnosis d = rejected_creep();
   discovery::Discovery found;
@@ -199,10 +201,18 @@ TEST(Summary, AnEquationBesideWhatIsOnlyDescribedIsSaid) {
   law.expression = "exp(-since/70)*fx";
   law.gain = 60.0;
   found.described = {law};
+  const Summary nearly_all = summary_of(d, {"r.h5", 0}, &found);
+  EXPECT_EQ(nearly_all.standing, SummaryStanding::bad);
+  EXPECT_EQ(nearly_all.verdict,
+            "The model leaves out what no catalogue holds: gyro_x follows fz*wo; 7 % of the misfit is left.");
+  EXPECT_THAT(nearly_all.cause, HasSubstr("NIS 1.2 becomes 1.01; accel_y follows no equation that was tried"));
+  EXPECT_EQ(nearly_all.next, "selfcal diagnose r.h5 --amended amended");
+  EXPECT_FALSE(confirmed(&found));  // nothing is written on it
+  found.laws.front().gain = 830.0;
   const Summary s = summary_of(d, {"r.h5", 0}, &found);
   EXPECT_EQ(s.standing, SummaryStanding::bad);
   EXPECT_EQ(s.verdict,
-            "Recording and model differ: 93 % of the misfit is that gyro_x follows fz*wo; nothing that was tried "
+            "Recording and model differ: 83 % of the misfit is that gyro_x follows fz*wo; nothing that was tried "
             "explains the rest.");
   EXPECT_THAT(s.cause, HasSubstr("accel_y follows no equation that was tried, exp(-since/70)*fx comes nearest"));
   found.laws.front().gain = 400.0;
