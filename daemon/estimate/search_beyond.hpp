@@ -22,7 +22,7 @@ struct BeyondSearch {
 // `unit`: recordings of one unit with their diagnoses; what they refer to must outlive the result. `first` is the diagnosis of the first of
 // them, and may change: a walk or an instability is rejected where equations explain what it was named for; of one
 // recording a name that was rejected stands where the search finds nothing better, or beside laws where both together say less than
-// laws alone. The failure is that of a calibration, or "stopped".
+// laws alone, and a name is rejected where laws alone say less than both. The failure is that of a calibration, or "stopped".
 tl::expected<BeyondSearch, std::string> search_beyond(std::span<const discovery::DiagnosedRecording> unit,
                                                       const diagnosis::DiagnosisOptions& of_catalogue,
                                                       const discovery::DiscoveryOptions& of_laws,

@@ -74,6 +74,26 @@ double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
          of_a_law * static_cast<double>(found.processes.size()) + cost_of_names(names, found.rows);
 }
 
+// Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
+constexpr double least_share_of_laws = 0.3;
+
+// The diagnosis without its names of sensor effects.
+Diagnosis without_names(Diagnosis d) {
+  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
+    return f.source == nullptr || f.source->sensor == nullptr;
+  });
+  d.rejected.insert(d.rejected.begin(), kept, d.findings.end());
+  d.findings.erase(kept, d.findings.end());
+  const auto modelled = std::stable_partition(d.model.begin(), d.model.end(),
+                                              [](const ModelEffect& m) { return m.effect->sensor == nullptr; });
+  d.rejected_model.insert(d.rejected_model.begin(), modelled, d.model.end());
+  d.model.erase(modelled, d.model.end());
+  d.rejected_by_remains_alone = false;
+  d.remainder.reset();
+  d.verdict = d.model.empty() ? diagnosis::DiagnosisVerdict::none_of_the_above : diagnosis::DiagnosisVerdict::named;
+  return d;
+}
+
 class Together {
  public:
   Together(const ImuData& data, const Diagnosis& diagnosis, const diagnosis::DiagnosisOptions& of_catalogue,
@@ -204,9 +224,6 @@ class Guesses {
   const std::vector<std::function<std::optional<Laws>()>>& all() const { return all_; }
 
  private:
-  // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
-  static constexpr double least_share = 0.3;
-
   const CatalogueReach& reach() {
     if (!reach_) {
       reach_.emplace(recording_, alone_.terms, alone_.coefficient, stop_);
@@ -219,7 +236,7 @@ class Guesses {
     return any ? std::optional(alone_.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
   }
   std::optional<Laws> beside(const ModelEffect& name) {
-    return reach().largest_share(*name.effect) < least_share ? std::nullopt : together_.laws_beside(name);
+    return reach().largest_share(*name.effect) < least_share_of_laws ? std::nullopt : together_.laws_beside(name);
   }
   template <typename Kept>
   std::optional<Laws> where(Kept kept) {
@@ -227,7 +244,7 @@ class Guesses {
     for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
       in_place_of.push_back(!kept(k));
     }
-    return reach().share(in_place_of) < least_share ? std::nullopt : std::optional(alone_.where(kept));
+    return reach().share(in_place_of) < least_share_of_laws ? std::nullopt : std::optional(alone_.where(kept));
   }
 
   const Together& together_;
@@ -278,6 +295,39 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
     }
   }
   return std::nullopt;
+}
+
+std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const Diagnosis& d,
+                                                      const UnitRecording& searched, const Discovery& beside,
+                                                      const DiscoveryOptions& of_laws, const Progress& progress) {
+  const Laws found = Laws::fitted(beside.fit);
+  if (!d.unexplained || d.model.empty() || found.terms.empty()) {
+    return std::nullopt;
+  }
+  CatalogueReach reach(searched, found.terms, found.coefficient, of_laws.stop);
+  const bool in_reach = std::any_of(d.model.begin(), d.model.end(), [&](const ModelEffect& m) {
+    return m.effect->sensor != nullptr && reach.largest_share(*m.effect) >= least_share_of_laws;
+  });
+  if (!in_reach || of_laws.stop.stop_requested()) {
+    return std::nullopt;
+  }
+  Diagnosis unnamed = without_names(d);
+  const DiagnosedRecording recording{data, unnamed};
+  auto rest = UnexplainedRest::of({&recording, 1}, of_laws.stop);
+  if (!rest) {
+    return std::nullopt;
+  }
+  LawSearch search(rest->recordings(), of_laws, progress);
+  const double most = cost_of(beside, d.model);
+  const auto say_less = [&](const Discovery& laws) { return cost_of(laws, unnamed.model) < most; };
+  if (search.fitted().fit.terms.empty() || !say_less(search.fitted())) {
+    return std::nullopt;
+  }
+  Discovery laws = search.told();
+  if (!say_less(laws)) {
+    return std::nullopt;
+  }
+  return NamesBesideLaws{std::move(unnamed), std::move(*rest), std::move(laws)};
 }
 
 }  // namespace selfcal::discovery

@@ -32,7 +32,8 @@ def form_of(expression):
 
 def answer_of(programs, way, case, recording, folder):
     """The answer to a case's recording, with what its laws leave elsewhere. Of a case the answering program knows nothing."""
-    words = [] if case["kind"] in ("effect", "beside") and way == "discover" else [f"--{way}"]
+    whole = way == "diagnose" or (case["kind"] in ("effect", "beside") and way == "discover")   # the catalogue first
+    words = [] if whole else [f"--{way}"]
     if way == "form":
         if not case["laws"] or any(law["process"] for law in case["laws"]):
             return {"seconds": 0.0}
