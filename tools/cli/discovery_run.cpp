@@ -48,13 +48,10 @@ Expected<LawsToTry> read_terms(const std::string& file) {
   return laws;
 }
 
-// Beside what was named, all of it fitted anew.
-Expected<void> try_them(const std::string& file, const discovery::UnexplainedRest& rest, BeyondCatalogue& result) {
-  const Expected<LawsToTry> laws = read_terms(file);
-  if (!laws) {
-    return tl::unexpected(laws.error());
-  }
-  auto tried = discovery::try_laws(rest.recordings(), laws->terms, laws->stated);
+// Beside what stands named, all of it fitted anew.
+Expected<void> try_them(const std::string& file, const LawsToTry& laws, const discovery::UnexplainedRest& rest,
+                        BeyondCatalogue& result) {
+  auto tried = discovery::try_laws(rest.recordings(), laws.terms, laws.stated);
   if (!tried) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: law {}: expression: {}", file, tried.error().law + 1, tried.error().words));
@@ -131,17 +128,26 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
       std::any_of(recordings.begin(), recordings.end(), [](const DiagnosedFile& r) { return r.diagnosis.unexplained; });
   const bool asked = arguments.discover || unexplained || recordings.size() > 1 || !arguments.next_experiment.empty();
   const std::vector<discovery::DiagnosedRecording> unit = recordings_of(recordings);
+  LawsToTry laws;
   if (!arguments.laws.empty()) {
+    Expected<LawsToTry> read = read_terms(arguments.laws);
+    if (!read) {
+      return tl::unexpected(read.error());
+    }
+    laws = std::move(*read);
+  }
+  const auto try_on = [&](const discovery::UnexplainedRest& rest) {
+    return laws.terms.empty() ? Expected<void>() : try_them(arguments.laws, laws, rest, result);
+  };
+  if (!asked && !may_be_a_law(first)) {
+    if (laws.terms.empty()) {
+      return result;
+    }
     const auto rest = discovery::UnexplainedRest::of(unit);
     if (!rest) {
       return fail(ErrorKind::bad_input, rest.error());
     }
-    if (const auto tried = try_them(arguments.laws, *rest, result); !tried) {
-      return tl::unexpected(tried.error());
-    }
-  }
-  if (!asked && !may_be_a_law(first)) {
-    return result;
+    return try_on(*rest).map([&] { return std::move(result); });
   }
   ProgressLine line;
   const discovery::Progress progress = [&line](const std::string& words) { line.show(words); };
@@ -150,6 +156,10 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   auto search = search_beyond(unit, of_catalogue, options, first, progress);
   if (!search) {
     return fail(ErrorKind::bad_input, search.error());
+  }
+  // What the search withdrew is not taken out: a name that takes up a part of a law leaves another one.
+  if (const auto tried = try_on(search->rest); !tried) {
+    return tl::unexpected(tried.error());
   }
   if ((!asked && !first.unexplained) || (search->said_by_catalogue && arguments.next_experiment.empty())) {
     return result;
