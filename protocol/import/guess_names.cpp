@@ -339,7 +339,15 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     return column;
   }
   std::string_view bare = name;
-  const int index = take_index(bare);
+  int index = take_index(bare);
+  if (const std::size_t unit_at = bare.rfind('('); index < 0 && unit_at != std::string_view::npos) {
+    std::string_view head = bare.substr(0, unit_at);  // "gyroADC[0] (deg/s)"
+    index = take_index(head);
+    if (index >= 0) {
+      column.unit = known_unit(bare.substr(unit_at + 1, bare.find(')', unit_at) - unit_at - 1));
+      bare = head;
+    }
+  }
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}, std::pair{'{', '}'}}) {
     const std::size_t begin = bare.find(open);
     const std::size_t end = begin == std::string_view::npos ? begin : bare.find(close, begin);
@@ -366,8 +374,13 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     column.axis = -1;
     column.role = single_role(words);
   }
-  // "T_C", "T [K]": a t with a unit of temperature is no time.
-  const bool thermal = column.unit.empty() ? words.size() == 2 && is_one_of(words, {"c", "k", "f"})
+  // LabVIEW's measurement files.
+  if (bare == "X_Value") {
+    column.axis = -1;
+    column.role = Role::time;
+  }
+  // "T_C", "T_chamber_C", "T [K]": a t with a unit of temperature is no time.
+  const bool thermal = column.unit.empty() ? words.size() > 1 && is_one_of(Words{words.back()}, {"c", "k", "f"})
                                            : column.unit == "C" || column.unit == "K" || column.unit == "F";
   if (column.role == Role::time && thermal && is_one_of(words, {"t"})) {
     column.role = Role::temperature;

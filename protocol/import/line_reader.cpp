@@ -59,11 +59,31 @@ Expected<bool> LineReader::refill() {
   buffer_.resize(held + static_cast<std::size_t>(count));
   if (const void* nul = std::memchr(buffer_.data() + held, '\0', buffer_.size() - held); nul != nullptr) {
     const bool wide = buffer_.starts_with("\xFF\xFE") || buffer_.starts_with("\xFE\xFF");
+    const auto first = static_cast<std::size_t>(static_cast<const char*>(nul) - buffer_.data());
+    if (!wide && first > 0 && only_zeros_behind(first)) {
+      return true;
+    }
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: line {}: {}", name_, number_ + 1,
                             wide ? "UTF-16; text in UTF-8 is expected" : "holds a byte 0; a text is expected"));
   }
   return count > 0;
+}
+
+// A card's last block is filled up with zeros: where nothing else follows the text ends there.
+bool LineReader::only_zeros_behind(std::size_t first) {
+  if (buffer_.find_first_not_of('\0', first) != std::string::npos) {
+    return false;
+  }
+  std::string rest(block, '\0');
+  for (int count = 1; count > 0;) {
+    count = gzread(input_->file, rest.data(), static_cast<unsigned>(block));
+    if (count < 0 || rest.substr(0, static_cast<std::size_t>(count)).find_first_not_of('\0') != std::string::npos) {
+      return false;
+    }
+  }
+  buffer_.resize(first);
+  return true;
 }
 
 Expected<bool> LineReader::next(std::string_view& line) {

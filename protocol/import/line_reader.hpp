@@ -18,8 +18,8 @@ class LineReader {
   ~LineReader();
 
   // The next line without its end and, in the first, without a byte order mark; false at the end of the file. LINE
-  // lives until the next call. An error (bad_input) where the file cannot be read, is damaged, holds a NUL, or a line is
-  // longer than 1 MiB.
+  // lives until the next call. An error (bad_input) where the file cannot be read, is damaged, holds a NUL with anything but NULs
+  // behind it, or a line is longer than 1 MiB.
   Expected<bool> next(std::string_view& line);
   std::size_t number() const { return number_; }  // of the line that next() gave, counted from 1
 
@@ -27,6 +27,7 @@ class LineReader {
   struct Input;
   LineReader(std::unique_ptr<Input> input, std::string name);
   Expected<bool> refill();
+  bool only_zeros_behind(std::size_t first);
 
   std::unique_ptr<Input> input_;
   std::string name_;

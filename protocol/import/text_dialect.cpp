@@ -59,6 +59,13 @@ std::optional<Number> parsed(std::string_view field, char decimal) {
   }
   // As written, where it can be: most fields need no copy.
   Number value{};
+  if (field.size() > 2 && field[0] == '0' && (field[1] == 'x' || field[1] == 'X')) {
+    unsigned long word = 0;
+    const auto [stopped, error] = std::from_chars(field.data() + 2, field.data() + field.size(), word, 16);
+    return error == std::errc{} && stopped == field.data() + field.size()
+               ? std::optional<Number>(static_cast<Number>(word))
+               : std::nullopt;
+  }
   const auto whole = [&value](const char* begin, const char* end) {
     const auto [stopped, error] = std::from_chars(begin, end, value);
     return begin != end && error == std::errc{} && stopped == end;
@@ -146,8 +153,15 @@ Field kind_of(std::string_view field, char decimal) {
   if (date_of(field)) {
     return Field::date;
   }
-  // What holds a separator is a sign that the text is split in the wrong way.
-  return field.find_first_of(",;\t ") == std::string_view::npos ? Field::word : Field::wrong;
+  // Numbers with a separator between them are a sign that the text is split in the wrong way; "2023-4-11 10:12:00" and "GPS fix" are none.
+  std::size_t parts = 0, numbers = 0;
+  for (std::string_view rest = field; !rest.empty();) {
+    const std::size_t end = std::min(rest.find_first_of(",;\t "), rest.size());
+    ++parts;
+    numbers += number_of(rest.substr(0, end), '.') ? 1 : 0;
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return parts < 2 || numbers == 0 ? Field::word : Field::wrong;
 }
 
 // Number of fields of a line of numbers (a date and a few words may be among them), 0 for any other.
@@ -170,6 +184,7 @@ struct Run {
   std::size_t first = 0;  // index of the line
   std::size_t lines = 0;
   std::size_t fields = 0;
+  bool open = false;  // the last field is empty
 };
 
 // The longest run of lines with the same number of numeric fields.
@@ -183,7 +198,7 @@ Run longest_run(const std::vector<std::string_view>& lines, char separator, char
     }
     const std::size_t count = numeric_fields(lines[k], separator, decimal, fields);
     if (count != run.fields) {
-      run = {k, 0, count};
+      run = {k, 0, count, count > 0 && fields.back().empty()};
     }
     ++run.lines;
     if (run.fields >= fewest && run.lines > best.lines) {
@@ -209,9 +224,12 @@ bool is_unit(std::string_view field) {
 void find_header(const std::vector<std::string_view>& lines, const Run& run, TextDialect& dialect) {
   const auto count = [&](std::size_t k) { return header_fields(lines[k], dialect); };
   const auto fits = [&](const std::vector<std::string>& fields) {
-    return fields.size() == run.fields && std::none_of(fields.begin(), fields.end(), [&](const std::string& f) {
-             return number_of(f, dialect.decimal).has_value();
-           });
+    // Where each row of numbers has a separator behind its last field, that of the names may have none, and the other way round.
+    const bool one_off =
+        (run.open && fields.size() + 1 == run.fields) || (fields.size() == run.fields + 1 && fields.back().empty());
+    return (fields.size() == run.fields || one_off) &&
+           std::none_of(fields.begin(), fields.end(),
+                        [&](const std::string& f) { return number_of(f, dialect.decimal).has_value(); });
   };
   std::size_t k = run.first;
   while (k > 0 && trimmed(lines[k - 1]).empty()) {
@@ -327,7 +345,8 @@ std::optional<long double> date_of(std::string_view field) {
 
 std::vector<std::string> header_fields(std::string_view line, const TextDialect& dialect) {
   const std::string_view mark = comment_of(line);
-  line = trimmed(line);
+  // A tab at the end is behind a field, as in the rows of numbers.
+  line = dialect.separator == '\t' ? line.substr(std::min(line.find_first_not_of(" \r"), line.size())) : trimmed(line);
   line.remove_prefix(mark.size());
   std::vector<std::string_view> fields;
   split_fields(line, dialect.separator, fields);
@@ -353,7 +372,9 @@ std::optional<TextDialect> detect_dialect(const std::vector<std::string_view>& l
   TextDialect dialect;
   for (const Way& way : ways) {
     const Run run = longest_run(lines, way.separator, way.decimal);
-    if (run.lines > best.lines || (run.lines == best.lines && run.fields > best.fields)) {
+    // Blanks may stand in a field, as between a date and a time.
+    const bool finer = run.lines == best.lines && run.fields > best.fields && (way.separator != ' ' || best.fields < 2);
+    if (run.lines > best.lines || finer) {
       best = run;
       dialect.separator = way.separator;
       dialect.decimal = way.decimal;

@@ -59,7 +59,9 @@ class Reader {
 
 Expected<Handle> Reader::open_scalar(const char* attribute) const {
   if (!has_attribute(attribute)) {
-    return bad("attribute {} missing", attribute);
+    constexpr std::string_view no_recording =
+        ": no recording of this program; of other HDF5 files the arrays are wanted as .npz, .mat or CSV";
+    return bad("attribute {} missing{}", attribute, std::string_view(attribute) == "format" ? no_recording : "");
   }
   Handle opened(H5Aopen(file_, attribute, H5P_DEFAULT), H5Aclose);
   const Handle space(opened ? H5Aget_space(opened.get()) : H5I_INVALID_HID, H5Sclose);

@@ -82,7 +82,8 @@ TEST(Dialect, OneLongColumnOfNumbersIsOne) {
 TEST(Numbers, OnlyWholeFields) {
   EXPECT_EQ(number_of("+1.5e3", '.'), 1500.0);
   EXPECT_EQ(number_of("1.5D-3", '.'), 1.5e-3);  // Fortran
-  for (const char* wrong : {"", "+-1", "1.2.3", "0x10", "1 2", "1,5"}) {
+  EXPECT_EQ(number_of("0x1F", '.'), 31.0);      // a register
+  for (const char* wrong : {"", "+-1", "1.2.3", "0x", "0xG1", "-0x10", "0x1.8", "1 2", "1,5"}) {
     EXPECT_FALSE(number_of(wrong, '.')) << wrong;
   }
   TextDialect german, english;
