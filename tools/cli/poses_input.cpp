@@ -1,6 +1,7 @@
 #include "tools/cli/poses_input.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +18,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
+#include "tools/cli/log_counts.hpp"
 #include "tools/cli/log_rows.hpp"
 #include "tools/cli/log_time.hpp"
 
@@ -124,6 +126,31 @@ std::size_t named_temperature(const std::vector<import::NamedColumn>& named) {
   return std::count_if(named.begin(), named.end(), is) == 1 ? static_cast<std::size_t>(found - named.begin()) + 1 : 0;
 }
 
+// The only column that is called a counter, from 1; 0: none.
+std::size_t named_counter(const std::vector<import::NamedColumn>& named) {
+  const auto is = [](const import::NamedColumn& c) { return c.role == import::Role::counter; };
+  const auto found = std::find_if(named.begin(), named.end(), is);
+  return std::count_if(named.begin(), named.end(), is) == 1 ? static_cast<std::size_t>(found - named.begin()) + 1 : 0;
+}
+
+// rad per unit of a read-out: of degrees, unless its name says another unit of angles.
+double unit_of_angle(const import::NamedColumn& column) {
+  const auto unit = import::find_unit(column.unit);
+  return unit && unit->quantity == import::Quantity::angle ? unit->si : units::degree;
+}
+
+// Fewer rows are no log: a table of means, say, of which nothing says how far each is known.
+Expected<void> check_length(const TimedRows& rows, const std::string& file) {
+  constexpr std::size_t least = 100;
+  return rows.data.rows >= least
+             ? Expected<void>()
+             : fail(ErrorKind::bad_input,
+                    fmt::format(
+                        "{}: {} rows: a log of samples is wanted, 100 and more; of a table of means, a row a position "
+                        "or a rate, nothing says how far each is known",
+                        file, rows.data.rows));
+}
+
 // A log as its file has it: SI where its names say units.
 struct OneLog {
   PoseInput input;
@@ -150,9 +177,27 @@ void add_time(const TimedRows& rows, const std::string& unit, std::optional<doub
   }
 }
 
+// Where a counter says that rows were lost the others keep their time.
+void take_lost_rows(const std::vector<double>& counter, const std::string& title, double rate_hz, OneLog& log) {
+  const auto rows = rows_by_counter(counter);
+  if (!rows || rows->back() + 1.0 == static_cast<double>(rows->size())) {
+    return;
+  }
+  for (std::size_t i = 0; i < rows->size(); ++i) {
+    log.input.time_s[i] = ((*rows)[i] + 1.0) / rate_hz;
+  }
+  log.notes = and_also(log.notes, fmt::format("{} counts {:.0f} rows that the log has lost", title,
+                                              rows->back() + 1.0 - static_cast<double>(rows->size())));
+}
+
 // With a time that a name calls so, or else one that rises; where some fields are empty, what the rows of the slower triad hold.
 Expected<TimedRows> rows_of(const import::ColumnSource& source, const std::vector<import::NamedColumn>& named,
                             const PoseLayout& layout, import::ColumnRequest request, const std::string& file) {
+  if (!layout.times.empty() &&
+      std::none_of(layout.times.begin(), layout.times.end(), [&](std::size_t k) { return holds_stamps(source, k); })) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {} holds no time: {}", file, source.title(layout.times.front()), rate_says));
+  }
   Expected<TimedRows> rows = read_with_time(source, layout.times, request);
   if (!rows) {
     request.tolerant = true;
@@ -191,9 +236,14 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const std::size_t angle = columns.angle > 0 ? ask(columns.angle) : 0;
   const std::size_t thermal = columns.temperature > 0 ? columns.temperature : named_temperature(named);
   const std::size_t temperature = thermal > 0 ? ask(thermal) : 0;
-  const Expected<TimedRows> rows = rows_of(**source, named, *layout, request, path);
+  const std::size_t counter = columns.rate_hz ? named_counter(named) : 0;
+  const std::size_t counted = counter > 0 ? ask(counter) : 0;
+  Expected<TimedRows> rows = rows_of(**source, named, *layout, request, path);
   if (!rows) {
     return tl::unexpected(rows.error());
+  }
+  if (const auto enough = check_length(*rows, path); !enough) {
+    return tl::unexpected(enough.error());
   }
   std::string unit = "s";
   if (!layout->times.empty()) {
@@ -210,9 +260,25 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   PoseInput& input = log.input;
   input.sensors = layout->sensors;
   add_time(*rows, unit, columns.rate_hz, log);
+  if (counter > 0) {
+    take_lost_rows(rows->data.values[counted], (*source)->title(counter - 1), *columns.rate_hz, log);
+  }
+  const double angle_unit = columns.angle > 0 ? unit_of_angle(named[columns.angle - 1]) : 0.0;
   log.gyro_si = columns.raw_gyros ? 0.0 : unit_of(named, layout->gyro, import::Quantity::angular_rate);
   log.accel_si = unit_of(named, layout->accel, import::Quantity::acceleration);
-  log.notes = and_also(rows->notes, layout_words(*layout, rows->time, unit, columns));
+  std::vector<std::size_t> full;
+  for (std::size_t k = 0; k < layout->gyro.size() + layout->accel.size(); ++k) {
+    const bool raw = k < layout->gyro.size() ? log.gyro_si == 0.0 : log.accel_si == 0.0;
+    if (raw && continue_full_words(rows->data.values[k])) {
+      full.push_back(request.columns[k] + 1);
+    }
+  }
+  if (!full.empty()) {
+    log.notes = and_also(log.notes, fmt::format("words of 16 bits, full at 65536, are continued in column{} {}",
+                                                full.size() > 1 ? "s" : "", fmt::join(full, ", ")));
+  }
+  log.notes = and_also(log.notes, rows->notes);
+  log.notes = and_also(log.notes, layout_words(*layout, rows->time, unit, columns));
   const std::vector<std::vector<double>>& values = rows->data.values;
   if (layout->only_axis >= 0) {
     input.gyro_axes = {layout->only_axis == 0, layout->only_axis == 1, layout->only_axis == 2};
@@ -232,7 +298,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
       input.temperature_c.push_back(values[temperature][i]);
     }
     if (columns.angle > 0) {
-      input.outer.push_back(values[angle][i] * units::degree);
+      input.outer.push_back(values[angle][i] * angle_unit);
       input.inner.push_back(0.0);
     }
   }

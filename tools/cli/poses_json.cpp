@@ -231,6 +231,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"duration_s", d.duration_s},
           {"moving", d.moving},
           {"other_forces_g", d.other_forces},
+          {"forces_of_another_zero_g", d.forces_of_another_zero},
           {"by_poses", d.by_poses},
           {"supports", d.supports},
           {"not_by_position", d.not_by_position},

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
+
+#include "tools/cli/log_time.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -107,7 +110,10 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_
 }
 
 // Columns that are called a time; else the first one, where it is nothing else.
-void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
+void add_times(const import::ColumnSource& source, const std::vector<NamedColumn>& named, PoseLayout& layout) {
+  if (const auto split = split_time(source)) {
+    layout.times.push_back(split->seconds);
+  }
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k].role == Role::time) {
       layout.times.push_back(k);
@@ -121,8 +127,8 @@ void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
   }
 }
 
-Expected<PoseLayout> layout_by_names(const std::vector<NamedColumn>& named, Triads gyro, Triads accel,
-                                     const RawColumns& columns, const std::string& file) {
+Expected<PoseLayout> layout_by_names(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
+                                     Triads gyro, Triads accel, const RawColumns& columns, const std::string& file) {
   PoseLayout layout;
   layout.by_names = true;
   // Of one sensor alone, if nothing else in the file may be the other one.
@@ -152,13 +158,32 @@ Expected<PoseLayout> layout_by_names(const std::vector<NamedColumn>& named, Tria
   layout.gyro = gyros ? std::move(gyro.first) : std::vector<std::size_t>{};
   layout.accel = accels ? std::move(accel.first) : std::vector<std::size_t>{};
   if (!columns.rate_hz) {
-    add_times(named, layout);
+    add_times(source, named, layout);
     if (layout.times.empty()) {
       return fail(ErrorKind::bad_input,
                   fmt::format("{}: no column is called a time: --rate says how many rows a second it holds", file));
     }
   }
   return layout;
+}
+
+// The only column that is called a gyro, whatever stands beside it: a table's angle, a temperature.
+std::optional<PoseLayout> one_named_gyro(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
+                                         const RawColumns& columns) {
+  const auto is = [](const NamedColumn& c) { return c.role == Role::gyro; };
+  const auto found = std::find_if(named.begin(), named.end(), is);
+  if (found == named.end() || std::count_if(named.begin(), named.end(), is) != 1 || found->axis < 0) {
+    return std::nullopt;
+  }
+  PoseLayout layout;
+  layout.sensors = Sensors::gyros;
+  layout.by_names = true;
+  layout.gyro = {static_cast<std::size_t>(found - named.begin())};
+  layout.only_axis = found->axis;
+  if (!columns.rate_hz) {
+    add_times(source, named, layout);
+  }
+  return columns.rate_hz || !layout.times.empty() ? std::optional(std::move(layout)) : std::nullopt;
 }
 
 }  // namespace
@@ -180,7 +205,12 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
     (sensors == Sensors::gyros ? gyro : accel) = triads_of(named, Role::unknown);
   }
   if (!gyro.first.empty() || !accel.first.empty()) {
-    return layout_by_names(named, std::move(gyro), std::move(accel), columns, file);
+    return layout_by_names(source, named, std::move(gyro), std::move(accel), columns, file);
+  }
+  if (sensors == Sensors::gyros) {
+    if (std::optional<PoseLayout> one = one_named_gyro(source, named, columns)) {
+      return std::move(*one);
+    }
   }
   Expected<PoseLayout> layout = plain_layout(source, named.size(), sensors, columns, file);
   if (layout && layout->only_axis >= 0) {

@@ -150,6 +150,13 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
                                           j.gap ? "behind the gap at" : "from", j.time_s, j.size.x() / shown.gyro,
                                           j.size.y() / shown.gyro, j.size.z() / shown.gyro, shown.gyro_name));
   }
+  if (!d.forces_of_another_zero.empty()) {
+    const auto [least, most] = std::minmax_element(d.forces_of_another_zero.begin(), d.forces_of_another_zero.end());
+    text += lines_of("zero:",
+                     fmt::format("at rest the accelerometers read {:.2f} to {:.2f} g, as if set to zero in a pose: "
+                                 "their bias is told from there",
+                                 *least, *most));
+  }
   if (!d.gyros_contradict.empty()) {
     text += lines_of("misfit:", d.gyros_contradict);
   }
@@ -202,6 +209,18 @@ struct Row {
   std::array<std::string, 3> cells;
 };
 
+// Without the blanks beside "+-".
+std::vector<Row> narrower(std::vector<Row> rows) {
+  for (Row& r : rows) {
+    for (std::string& c : r.cells) {
+      if (const std::size_t at = c.find(" +- "); at != std::string::npos) {
+        c.replace(at, 4, "+-");
+      }
+    }
+  }
+  return rows;
+}
+
 std::string text_of(const std::vector<Row>& rows) {
   std::size_t label = 0;
   std::array<std::size_t, 3> cell{};
@@ -212,6 +231,13 @@ std::string text_of(const std::vector<Row>& rows) {
     }
   }
   constexpr std::size_t indent = 2, wide = 2;
+  const bool spread = std::any_of(rows.begin(), rows.end(), [](const Row& r) {
+    return std::any_of(r.cells.begin(), r.cells.end(),
+                       [](const std::string& c) { return c.find(" +- ") != std::string::npos; });
+  });
+  if (spread && indent + label + cell[0] + cell[1] + cell[2] + 3 > columns) {
+    return text_of(narrower(rows));
+  }
   const std::size_t gap = indent + label + cell[0] + cell[1] + cell[2] + 3 * wide > columns ? 1 : wide;
   std::string text;
   for (const Row& r : rows) {

@@ -106,15 +106,15 @@ std::string figure(double value, double sigma, double raw) {
 std::string heading(const Rest& rest, bool gyro) {
   const bool walks = std::any_of(rest.axes.begin(), rest.axes.end(),
                                  [gyro](const RestAxis& a) { return a.gyro == gyro && !std::isnan(a.walk); });
-  return fmt::format("{:<14} {:>11} {:>20}  least Allan dev., {}{}\n", gyro ? "gyros" : "accelerometers",
+  return fmt::format("{:<14} {:>11} {:>18}  least Allan{}, {}{}\n", gyro ? "gyros" : "accelerometers",
                      fmt::format("mean, {}", of_mean(rest, gyro).name),
-                     fmt::format("white, {}", of_density(rest, gyro).name), of_deviation(rest, gyro).name,
-                     walks ? "; walk, /sqrt(h)" : "");
+                     fmt::format("white, {}", of_density(rest, gyro).name), walks ? "" : " dev.",
+                     of_deviation(rest, gyro).name, walks ? "; walk /sqrt(h)" : "");
 }
 
 std::string noise_text(const Rest& rest, const RestAxis& a) {
   const Unit mean = of_mean(rest, a.gyro), white = of_density(rest, a.gyro), least = of_deviation(rest, a.gyro);
-  std::string text = fmt::format("  {} {:>22} {:>20.3g}  {}{:.3g} at {:.3g} s", "xyz"[a.axis],
+  std::string text = fmt::format("  {} {:>22} {:>18.3g}  {}{:.3g} at {:.3g} s", "xyz"[a.axis],
                                  figure(a.mean, a.mean_sigma, mean.raw), a.white_asd / white.raw,
                                  a.instability_is_bound ? "<" : "", a.instability / least.raw, a.instability_tau_s);
   if (!std::isnan(a.walk)) {

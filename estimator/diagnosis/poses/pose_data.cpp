@@ -24,9 +24,10 @@ AccelModel assumed(const PoseInput& input, const std::vector<Pose>& poses) {
   m.gravity_sigma = nominal ? input.gravity_sigma / input.gravity : 0.0;
   m.raw_per_g = nominal ? input.gravity / input.accel_unit : 0.5 * (high - low).maxCoeff();
   m.T = Matrix3::Identity() / m.raw_per_g;
-  m.bias = nominal ? Vector3(Vector3::Zero()) : Vector3(0.5 * (low + high));
+  const bool about_zero = nominal && input.accel_zero_known;
+  m.bias = about_zero ? Vector3(Vector3::Zero()) : Vector3(0.5 * (low + high));
   constexpr double nominal_bias = 0.2, nominal_scale = 0.1, raw_bias = 0.3, raw_scale = 0.3;
-  m.before << Vector3::Constant((nominal ? nominal_bias : raw_bias) * m.raw_per_g),
+  m.before << Vector3::Constant((about_zero ? nominal_bias : raw_bias) * m.raw_per_g),
       Vector3::Constant((nominal ? nominal_scale : raw_scale) / m.raw_per_g),
       Vector3::Constant(misalignment_before / m.raw_per_g);
   // An axis along which gravity hardly moves shows in |f| by its square alone, and would take on what is anything else's: its
@@ -109,6 +110,15 @@ double noise_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
   return std::sqrt(square / static_cast<double>(poses.size()));
 }
 
+// Of |u|, by what the quantum hides of the poses' means.
+double hidden_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
+  double square = 0.0;
+  for (const Pose& p : poses) {
+    square += (m.T.transpose() * m.direction(p.accel).normalized()).cwiseProduct(p.accel_hidden).squaredNorm();
+  }
+  return std::sqrt(square / static_cast<double>(poses.size()));
+}
+
 // Variance of a pose's |u|: what the poses scatter by, and the white noise of its own mean. Both beside those of a usual pose.
 Eigen::VectorXd weights_of(const AccelModel& m, const std::vector<Pose>& poses, double noise) {
   Eigen::VectorXd white(static_cast<Eigen::Index>(poses.size()));  // variances
@@ -146,7 +156,7 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
     descend(poses, start, noise, step.cwiseProduct(m.before), m);
     const double seen = std::sqrt(m.residual.squaredNorm() / std::max(1.0, m.free));
     constexpr double enough = 3.0, least = 1e-7;  // of g
-    m.noise_of_means = noise_of_means(m, poses);
+    m.noise_of_means = std::hypot(noise_of_means(m, poses), hidden_of_means(m, poses));
     noise = std::max(least, std::max(m.noise_of_means, m.free >= enough ? seen : 0.0));
     m.weight = weights_of(m, poses, noise);
   }

@@ -19,7 +19,8 @@ struct Pose {
   Vector3 gyro, accel;              // means, raw
   Vector3 gyro_white, accel_white;  // sigma of the mean by white noise, raw
   Vector3 gyro_half, accel_half;    // half the difference between the means of both halves, raw
-  Vector3 u = Vector3::Zero();      // calibrated, g
+  Vector3 gyro_hidden = Vector3::Zero(), accel_hidden = Vector3::Zero();  // sigma of the mean by the quantum, raw
+  Vector3 u = Vector3::Zero();                                            // calibrated, g
 };
 
 // Whether a unit of the gyros is said, be it rad/s.
@@ -43,6 +44,8 @@ struct FoundPoses {
   int steady_turns = 0;              // stretches as quiet as a pose that turn
   int moving = 0;                    // that move
   std::vector<double> other_forces;  // that read another force than gravity, g
+  std::vector<double>
+      zero_elsewhere;  // forces at rest, g, where a third and more are not gravity's though the gyros rest in them
 };
 FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_out);
 

@@ -4,6 +4,7 @@
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
+#include "estimator/diagnosis/poses/pose_quantum.hpp"
 #include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/statistics/median.hpp"
@@ -88,6 +89,16 @@ double quiet_limit(const std::vector<double>& scatters, double share) {
   return factor * quantile(still, 0.5);
 }
 
+// Scatter of a sensor whose quantum hides its noise: where it rests each axis stands at one count, or between two of them.
+double between_two_counts(const Series& series) {
+  double square = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    square += std::pow(0.5 * quantum_of(series, axis, 0, series.size()), 2);
+  }
+  constexpr double rounding = 1e-9;
+  return (1.0 + rounding) * std::sqrt(square);
+}
+
 // Of windows that hold a sample of a stretch left out it is beyond any limit.
 void spoil(const PoseInput& input, const std::vector<LeftOut>& left_out, std::size_t window,
            std::vector<double>& scatters) {
@@ -101,18 +112,29 @@ void spoil(const PoseInput& input, const std::vector<LeftOut>& left_out, std::si
   }
 }
 
+// Gyros alone, which may all lie across the axis that a table turns about: its read-out says that it turns.
+bool turns_unseen(const PoseInput& input, std::size_t first, std::size_t last) {
+  constexpr double still = 0.1 * units::degree;
+  const auto turned = [&](const std::vector<double>& angle) {
+    return !angle.empty() && std::abs(angle[last - 1] - angle[first]) > still;
+  };
+  return input.sensors == Sensors::gyros && (turned(input.outer) || turned(input.inner));
+}
+
 std::vector<Pose> quiet_stretches(const PoseInput& input, const std::vector<LeftOut>& left_out, std::size_t window,
                                   double share) {
   std::vector<double> gyro = scatter(input.gyro, window), accel = scatter(input.accel, window);
   spoil(input, left_out, window, gyro);
   spoil(input, left_out, window, accel);
-  const double gyro_limit = quiet_limit(gyro, share), accel_limit = quiet_limit(accel, share);
+  const double gyro_limit = std::max(quiet_limit(gyro, share), between_two_counts(input.gyro));
+  const double accel_limit = std::max(quiet_limit(accel, share), between_two_counts(input.accel));
   const std::vector<std::size_t> gaps = find_gaps(input);
   std::vector<Pose> found;
   std::size_t begin = 0;
   bool inside = false;
   for (std::size_t k = 0; k <= gyro.size(); ++k) {
-    const bool quiet = k < gyro.size() && gyro[k] <= gyro_limit && accel[k] <= accel_limit;
+    const bool quiet =
+        k < gyro.size() && gyro[k] <= gyro_limit && accel[k] <= accel_limit && !turns_unseen(input, k, k + window);
     if (quiet && !inside) {
       begin = k;
     } else if (!quiet && inside && k - begin >= window) {
@@ -296,6 +318,9 @@ FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_o
     }
   }
   found.moving = static_cast<int>(std::erase_if(found.poses, is_moving));
+  if (input.accel_zero_known) {
+    found.zero_elsewhere = forces_of_another_zero(input, found.poses);
+  }
   found.other_forces = drop_other_forces(input, found.poses);
   if (!found.poses.empty()) {
     const std::size_t before = found.poses.size();
@@ -305,6 +330,7 @@ FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_o
   if (input.sensors == Sensors::gyros) {
     drop_what_turns(input, found.poses);
   }
+  add_hidden(input, found.poses);
   return found;
 }
 

@@ -50,7 +50,11 @@ class Gyros {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const Regression r = regress(Eigen::MatrixXd::Ones(y_[axis].size(), 1), y_[axis]);
       d.gyro_bias[axis] = r.value(0);
-      d.gyro_bias_sigma[axis] = r.sigma(0);
+      double hidden = 0.0;  // square, of the mean of all
+      for (const Pose& p : poses_) {
+        hidden += std::pow(p.gyro_hidden(static_cast<Eigen::Index>(axis)) / static_cast<double>(poses_.size()), 2);
+      }
+      d.gyro_bias_sigma[axis] = std::sqrt(r.sigma(0) * r.sigma(0) + hidden);
     }
   }
   // Share of `a` that `b` makes too, over the axes.

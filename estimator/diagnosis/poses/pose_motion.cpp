@@ -61,15 +61,46 @@ bool moves(const PoseInput& input, const Pose& stretch) {
   return turns || (input.sensors != Sensors::gyros && variance_of(accel).maxCoeff() > std::pow(most_force * size, 2));
 }
 
+namespace {
+
+constexpr double most_off = 0.3;  // g: 1.5 sigma of what a bias is before
+
+double force_of(const PoseInput& input, const Pose& p) { return p.accel.norm() * input.accel_unit / input.gravity; }
+
+}  // namespace
+
+std::vector<double> forces_of_another_zero(const PoseInput& input, const std::vector<Pose>& stretches) {
+  constexpr std::size_t least = 6;
+  if (!(input.accel_unit > 0.0) || !input.gyros_si || input.sensors != Sensors::both || stretches.size() < least) {
+    return {};
+  }
+  std::vector<double> forces;
+  Vector3 usual;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> rates;
+    for (const Pose& p : stretches) {
+      rates.push_back(p.gyro(axis));
+    }
+    usual(axis) = median(std::move(rates));
+  }
+  std::size_t rests = 0, others = 0;
+  for (const Pose& p : stretches) {
+    forces.push_back(force_of(input, p));
+    rests += (p.gyro - usual).cwiseAbs().maxCoeff() * input.gyro_unit < units::degree ? 1 : 0;  // a centrifuge turns
+    others += std::abs(forces.back() - 1.0) > most_off ? 1 : 0;
+  }
+  const bool elsewhere = 10 * rests >= 9 * stretches.size() && 3 * others >= stretches.size();
+  return elsewhere ? forces : std::vector<double>{};
+}
+
 std::vector<double> drop_other_forces(const PoseInput& input, std::vector<Pose>& stretches) {
   std::vector<double> read;
-  if (!(input.accel_unit > 0.0) || input.sensors == Sensors::gyros) {
+  if (!(input.accel_unit > 0.0) || !input.accel_zero_known || input.sensors == Sensors::gyros) {
     return read;
   }
-  constexpr double most = 0.3;  // g: 1.5 sigma of what a bias is before
   std::erase_if(stretches, [&](const Pose& p) {
-    const double force = p.accel.norm() * input.accel_unit / input.gravity;
-    const bool other = std::abs(force - 1.0) > most;
+    const double force = force_of(input, p);
+    const bool other = std::abs(force - 1.0) > most_off;
     if (other) {
       read.push_back(force);
     }

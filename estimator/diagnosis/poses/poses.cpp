@@ -279,7 +279,7 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
 
 // Gyros alone: nothing says where down is, so that only rest and a table's angles are left to hold them against.
 void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
-  d.read_outs = judge_read_outs(input, poses, alpha);
+  d.read_outs = read_outs_of(input, poses, alpha, d.invisible);
   d.accel_adequate = true;
   if (poses.empty() && !d.read_outs && !has_attitude(d)) {
     d.failure = about_attitude(d) +
@@ -423,6 +423,13 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   d.clipped = find_clipping(input);
   d.left_out = find_left_out(input, stuck);
   FoundPoses found = find_poses(input, d.left_out);
+  if (!found.zero_elsewhere.empty()) {
+    PoseInput about = input;
+    about.accel_zero_known = false;
+    d = diagnose_continuous(about, alpha);
+    d.forces_of_another_zero = std::move(found.zero_elsewhere);
+    return d;
+  }
   std::vector<Pose>& poses = found.poses;
   d.steady_turns = found.steady_turns;
   d.moving = found.moving;
@@ -451,7 +458,7 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     return d;
   }
   constexpr double of_read_outs = 0.2;
-  d.read_outs = judge_read_outs(input, poses, of_read_outs * alpha);
+  d.read_outs = read_outs_of(input, poses, of_read_outs * alpha, d.invisible);
   const double left = (d.read_outs ? 1.0 - of_read_outs : 1.0) * alpha;
   if (!d.by_poses) {
     add_rest(input, left, poses, d);

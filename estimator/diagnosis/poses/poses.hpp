@@ -33,11 +33,13 @@ struct PoseInput {
   bool gyros_si = true;                             // rad/s
   double gyro_unit = 1.0;                           // nominal rad/s per raw unit
   double accel_unit = 0.0;                          // nominal m/s^2 per raw unit; 0: not known
-  double gravity = 9.80665;                         // m/s^2 where it was recorded
-  double gravity_sigma = 0.0;                       // of it, where nobody says the place
-  std::optional<double> latitude;                   // rad where it was recorded; none: not known
-  std::vector<double> outer, inner;                 // angle read-outs, rad, of any whole turns; empty: none
-  std::vector<double> temperature_c;                // empty: no channel
+  bool accel_zero_known =
+      true;                    // false: readings are about another zero, as of a sensor that was set to zero in a pose
+  double gravity = 9.80665;    // m/s^2 where it was recorded
+  double gravity_sigma = 0.0;  // of it, where nobody says the place
+  std::optional<double> latitude;     // rad where it was recorded; none: not known
+  std::vector<double> outer, inner;   // angle read-outs, rad, of any whole turns; empty: none
+  std::vector<double> temperature_c;  // empty: no channel
   std::optional<ReferenceAttitude> attitude;
 };
 
@@ -187,8 +189,10 @@ struct PoseDiagnosis {
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
   int steady_turns = 0;              // stretches that are quiet and turn: no poses
   std::vector<double> other_forces;  // what quiet stretches read that are not at 1 g, g: no poses
-  int clipped_poses = 0;             // in which an accelerometer stands at the end of its range: their means are none
-  int moving = 0;                    // stretches as quiet as the log's quietest that move: no poses
+  // At rest the accelerometers read these forces, g, by the gyros' rest no others than gravity: their zero is elsewhere, and follows from the poses.
+  std::vector<double> forces_of_another_zero;
+  int clipped_poses = 0;  // in which an accelerometer stands at the end of its range: their means are none
+  int moving = 0;         // stretches as quiet as the log's quietest that move: no poses
   std::optional<ReadOuts> read_outs;
   std::optional<ByAttitude> by_attitude;
   std::optional<Rest> rest;                        // of fewer poses than calibrate

@@ -1,7 +1,9 @@
 #include "estimator/diagnosis/poses/read_outs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "estimator/diagnosis/poses/pose_regression.hpp"
 #include "estimator/diagnosis/poses/read_out_oscillation.hpp"
@@ -345,6 +347,26 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
       raw_per_g += p.accel.norm() / static_cast<double>(poses.size());
     }
     answer.tilt = tilt_of(stops, poses, input.accel_unit > 0.0 ? 9.80665 / input.accel_unit : raw_per_g);
+  }
+  return answer;
+}
+
+std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses, double alpha,
+                                     std::vector<std::string>& invisible) {
+  constexpr double another = 1.5, deviations = 5.0;
+  std::optional<ReadOuts> answer = judge_read_outs(input, poses, alpha);
+  for (const ReadOutAxis& axis : answer&& input.gyros_si ? answer->axes : std::vector<ReadOutAxis>{}) {
+    const double gain = axis.response.norm();
+    if ((gain > another || gain < 1.0 / another) && std::abs(gain - 1.0) > deviations * axis.sigma.norm()) {
+      std::array<char, 200> text{};
+      std::snprintf(
+          text.data(), text.size(),
+          "what angle read-outs tell that turn %.3g times as far as the gyros (another unit than degrees, or a "
+          "table that does not carry the sensor)",
+          1.0 / gain);
+      invisible.emplace_back(text.data());
+      return std::nullopt;
+    }
   }
   return answer;
 }

@@ -19,4 +19,8 @@ namespace selfcal::diagnosis {
 // nullopt: there are no read-outs, or no turn that they and the gyros show.
 std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses, double alpha);
 
+// None where the gyros, whose unit is known, turn by another size than the read-outs: nothing follows from them then, and `invisible` tells it.
+std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses, double alpha,
+                                     std::vector<std::string>& invisible);
+
 }  // namespace selfcal::diagnosis

@@ -4,38 +4,34 @@
 #include <cmath>
 #include <cstdio>
 
+#include "estimator/diagnosis/poses/pose_quantum.hpp"
 #include "estimator/diagnosis/poses/rest_drift.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
 
-// Quantum of an axis: the smallest step of what steps at all. Noise that it hides leaves the mean off by
-// q / pi exp(-2 pi^2 (sigma/q)^2) at most (Widrow and Kollar 2008, the first term), any part of which is as likely as another.
+// Quantum of an axis, and what it hides of the mean. A pose in which nothing steps has the quantum of the log.
 void add_quantum(const PoseInput& input, const std::vector<Pose>& poses, RestAxis& a) {
   const auto& series = a.gyro ? input.gyro : input.accel;
   const auto axis = static_cast<std::size_t>(a.axis);
-  std::vector<double> steps;
+  double least = HUGE_VAL, square = 0.0, count = 0.0;
   for (const Pose& p : poses) {
     for (const auto& [first, last] : p.quiet) {
+      const double quantum = quantum_of(series, axis, first, last);
+      least = quantum > 0.0 ? std::min(least, quantum) : least;
       for (std::size_t i = first + 1; i < last; ++i) {
-        steps.push_back(std::abs(series[i][axis] - series[i - 1][axis]));
+        square += 0.5 * std::pow(series[i][axis] - series[i - 1][axis], 2);
+        count += 1.0;
       }
     }
   }
-  const double most = steps.empty() ? 0.0 : *std::max_element(steps.begin(), steps.end());
-  constexpr double rounding = 1e-6;
-  double least = HUGE_VAL, square = 0.0;
-  for (const double step : steps) {
-    square += 0.5 * step * step / static_cast<double>(steps.size());
-    least = step > rounding * most ? std::min(least, step) : least;
-  }
-  if (most <= 0.0) {
+  least = std::isfinite(least) ? least : quantum_of(series, axis, 0, series.size());
+  if (least <= 0.0 || count <= 0.0) {
     return;
   }
-  constexpr double of_rounding = 1.0 / 12.0, visible = 0.01;
-  const double noise = std::max(0.0, square / (least * least) - of_rounding);  // variance, quanta
-  const double off = std::min(std::sqrt(of_rounding), std::exp(-2.0 * M_PI * M_PI * noise) / M_PI / M_SQRT2);
+  constexpr double visible = 0.01;
+  const double off = hidden_by_quantum(square / count / (least * least));
   a.mean_sigma = std::hypot(a.mean_sigma, off * least);
   a.quantum = off > visible ? least : 0.0;
 }
