@@ -205,6 +205,9 @@ std::string axis_text(const diagnosis::ReadOutAxis& a) {
     }
   }
   text += " of the turn\n";
+  if (a.turns_alike > 0.0) {
+    text += "    " + turns_alike_words(a) + "\n";
+  }
   if (a.nonlinearity) {
     text += fmt::format("    gyro_scale_nonlinearity {}: {:+.2g} +- {:.2g} % at {:.0f} deg/s\n",
                         a.nonlinearity->determined ? "named" : "not seen",

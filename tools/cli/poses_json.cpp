@@ -111,6 +111,10 @@ Json axis_json(const diagnosis::ReadOutAxis& a) {
             {"of_a_positive_turn", array(across(a))},
             {"gain", std::abs(a.response(k))},
             {"gain_sigma", a.sigma(k)}};
+  if (!a.steady && !a.oscillates) {
+    j["turn_scatter"] = a.turn_scatter;
+    j["turns_alike"] = a.turns_alike;
+  }
   if (a.nonlinearity) {
     j["nonlinearity"] = {{"value", a.nonlinearity->value},
                          {"sigma", a.nonlinearity->sigma},

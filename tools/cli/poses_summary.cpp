@@ -388,6 +388,9 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
     if (a.nonlinearity) {
       words += fmt::format("; nonlinearity {}", a.nonlinearity->determined ? "named" : "not seen");
     }
+    if (a.turns_alike > 0.0) {
+      words += "; " + turns_alike_words(a);
+    }
     text += lines_of(a.name + " axis,", words);
   }
   if (r.clock) {

@@ -1,6 +1,8 @@
 // What the texts of an answer by poses share.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <string>
 
 #include "estimator/diagnosis/poses/poses.hpp"
@@ -27,6 +29,12 @@ inline Eigen::Index main_axis(const diagnosis::ReadOutAxis& a) {
 // What the gyros read of a turn that is positive about their main axis.
 inline Vector3 across(const diagnosis::ReadOutAxis& a) {
   return a.response(main_axis(a)) < 0.0 ? Vector3(-a.response) : a.response;
+}
+
+// Of turns whose neighbours are off alike.
+inline std::string turns_alike_words(const diagnosis::ReadOutAxis& a) {
+  return fmt::format("single turns differ by {:.1f} %, neighbours alike ({:.2f}): no mean of these is better known",
+                     100.0 * a.turn_scatter, a.turns_alike);
 }
 
 }  // namespace selfcal::cli

@@ -102,6 +102,9 @@ struct ReadOutAxis {
   Vector3 response, sigma;                                  // of the gyros in nominal rad/s per rad/s of the read-out
   std::optional<PoseParameter> nonlinearity;                // part of the response that grows with the rate, per rad/s
   double log_p_nonlinear = 0.0;
+  // Of turns from stop to stop along the main axis: what one is off by, over the mean turn, and the correlation of turns that follow one
+  // another where it is beyond chance; `sigma` holds it.
+  double turn_scatter = 0.0, turns_alike = 0.0;
 };
 
 // The read-outs' clock against the sensors': a read-out that is late has a positive delay.

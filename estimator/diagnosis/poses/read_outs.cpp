@@ -83,6 +83,38 @@ void keep_one_inner_angle(std::vector<const TurnRow*>& rows) {
   std::erase_if(rows, [&](const TurnRow* row) { return std::abs(row->inner_angle - angle) >= alike; });
 }
 
+// What turns are off by, and whether neighbours are off alike.
+struct Residuals {
+  double scatter = 0.0, alike = 0.0;
+  double widening = 1.0;  // of the sigma of their mean
+};
+
+// Long-run variance over the variance (Newey and West 1987, Bartlett weights), where neighbours correlate beyond two sigma of chance.
+// Turns that are off to and fro are the table's, which the sums hold.
+Residuals residuals_of(const Eigen::VectorXd& off) {
+  const auto n = off.size();
+  const Eigen::VectorXd e = off.array() - off.mean();
+  const double square = e.squaredNorm();
+  Residuals r;
+  constexpr Eigen::Index enough = 12;
+  if (n < 2 || !(square > 0.0)) {
+    return r;
+  }
+  r.scatter = std::sqrt(square / static_cast<double>(n - 1));
+  const auto correlation = [&](Eigen::Index lag) { return e.head(n - lag).dot(e.tail(n - lag)) / square; };
+  if (n < enough || correlation(1) < 2.0 / std::sqrt(static_cast<double>(n))) {
+    return r;
+  }
+  const auto lags = static_cast<Eigen::Index>(std::ceil(std::cbrt(static_cast<double>(n))));
+  double variance = 1.0;
+  for (Eigen::Index lag = 1; lag <= lags; ++lag) {
+    variance += 2.0 * (1.0 - static_cast<double>(lag) / static_cast<double>(lags + 1)) * correlation(lag);
+  }
+  r.alike = correlation(1);
+  r.widening = std::sqrt(std::max(1.0, variance));
+  return r;
+}
+
 // (R1) Sums over the turns, for a table that stops short once goes further the next time: what a stop's angle is off by is
 // white in the sums, what the gyros add turn by turn is a walk in them.
 void fit_sums(const PoseInput& input, const std::vector<const TurnRow*>& rows, bool outer, ReadOutAxis& axis) {
@@ -99,12 +131,20 @@ void fit_sums(const PoseInput& input, const std::vector<const TurnRow*>& rows, b
     number.push_back(static_cast<double>(k + 1));
     axis.turned_deg += std::abs(turn) / units::degree;
   }
+  std::array<Residuals, 3> off;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Whitener white(X, y.col(i), number);
     const Regression r = regress(white(X), white(y.col(i)));
+    const Eigen::VectorXd left = y.col(i) - r.value(1) * X.col(1);
+    off[static_cast<std::size_t>(i)] = residuals_of(left.tail(n) - left.head(n));
     axis.response(i) = r.value(1) * input.gyro_unit;
-    axis.sigma(i) = r.sigma(1) * input.gyro_unit;
+    axis.sigma(i) = r.sigma(1) * input.gyro_unit * off[static_cast<std::size_t>(i)].widening;
   }
+  Eigen::Index along = 0;
+  axis.response.cwiseAbs().maxCoeff(&along);
+  const double mean_turn = axis.turned_deg * units::degree / static_cast<double>(n);
+  axis.turn_scatter = off[static_cast<std::size_t>(along)].scatter * input.gyro_unit / mean_turn;
+  axis.turns_alike = off[static_cast<std::size_t>(along)].alike;
 }
 
 // (R1), axes that turn by themselves.

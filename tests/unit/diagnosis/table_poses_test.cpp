@@ -90,6 +90,42 @@ TEST(TablePoses, GainAndClockFromStops) {
   EXPECT_FALSE(d.accel_tested);  // gravity moves in one plane
 }
 
+// 36 turns of 10 deg, each 3 % off: white, or with a correlation of neighbours of 0.7.
+Table uneven_turns(double alike) {
+  Table t(4);
+  double at = 0.0, off = 0.0;
+  const auto rest = [&] {
+    for (int k = 0; k < 400; ++k) {
+      t.turn_about_y(at, 0.0);
+    }
+  };
+  rest();
+  for (int turn = 0; turn < 36; ++turn) {
+    off = alike * off + std::sqrt(1.0 - alike * alike) * 0.03 * t.normal(t.random);
+    t.gain = 0.9 * (1.0 + off);
+    for (int k = 0; k < 100; ++k) {
+      t.turn_about_y(at, 10.0 * units::degree);
+    }
+    rest();
+  }
+  t.write_read_outs();
+  return t;
+}
+
+// A mean of 36 such turns is known to 0.5 % of 0.9 where they are white, and to sqrt((1 + 0.7) / (1 - 0.7)) = 2.4 times as much where they are not; by
+// four lags of as few turns half of that and more is seen.
+TEST(TablePoses, TurnsThatAreOffAlikeTellLess) {
+  const PoseDiagnosis white = diagnose_poses(uneven_turns(0.0).input, 0.01),
+                      alike = diagnose_poses(uneven_turns(0.7).input, 0.01);
+  ASSERT_TRUE(white.read_outs && !white.read_outs->axes.empty() && alike.read_outs && !alike.read_outs->axes.empty());
+  const ReadOutAxis &w = white.read_outs->axes.front(), &a = alike.read_outs->axes.front();
+  EXPECT_EQ(w.turns_alike, 0.0);
+  EXPECT_NEAR(w.turn_scatter, 0.027, 0.01);  // 12 % by 36 turns
+  EXPECT_NEAR(w.sigma.y(), 0.0045, 0.0015);
+  EXPECT_GT(a.turns_alike, 0.33);
+  EXPECT_GT(a.sigma.y(), 1.4 * a.turn_scatter / 6.0);
+}
+
 // A gyro that is read at the end of its interval gives no mean over it: half an interval more, which the log does not show.
 TEST(TablePoses, AClockIsKnownToHalfASample) {
   Table t = stops();
