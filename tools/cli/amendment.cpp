@@ -230,10 +230,12 @@ std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& a
           key_value("gyro_lsb_arcsec", (spectra ? gyro_count(d, assumed) : assumed.gyro_quantum) / units::arcsecond) +
           key_value("accel_lsb_m_per_s", spectra ? accel_count(d, assumed) : assumed.accel_quantum);
   text += "\n[gimbal]\npositioning_error_deg = 0\n";
+  // Values that nothing determines are of per cents: a gyro's scale factor of 4 % would part the tilt that it feels from gravity's.
   text += "\n[parameters]\n";
+  text += d.nothing_turned ? "# Nothing turned: the recording tells none of these.\n" : "";
   for (int k = 0; k < sensor_parameter_count; ++k) {
     const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
-    text += key_value(p.name, d.value_as_named(k) / p.si_per_unit);
+    text += key_value(p.name, d.nothing_turned ? 0.0 : d.value_as_named(k) / p.si_per_unit);
   }
   return text;
 }

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
+#include "estimator/models/segments.hpp"
+#include "estimator/statistics/median.hpp"
 #include "tools/report/overlay_innovations.hpp"
 #include "tools/report/overlay_noise.hpp"
 
@@ -70,6 +73,33 @@ OverlayJudgement judge(OverlayKind kind, const std::vector<OverlayCurve>& curves
   return j;
 }
 
+// Why innovations differ, where seconds of the recording were disturbed: they count for less in it, and a spectrum is the mean of all times.
+std::optional<std::string> spread_over_all_times(const std::vector<OverlayCurve>& curves, const ImuData& recording,
+                                                 const CalibrationResult& of_recording) {
+  const std::vector<Segment> segments = find_segments(recording);
+  const auto sizes = std::find_if(curves.begin(), curves.end(), [](const OverlayCurve& c) { return c.id == "sizes"; });
+  if (sizes == curves.end() || of_recording.noise.disturbed.empty() ||
+      std::any_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; })) {
+    return std::nullopt;
+  }
+  std::vector<double> ratio;
+  double disturbed_s = 0.0;
+  for (const OverlayPoint& p : sizes->points) {
+    ratio.push_back(p.simulation / p.recording);
+  }
+  for (const Disturbance& d : of_recording.noise.disturbed) {
+    disturbed_s += d.end_s - d.start_s;
+  }
+  if (ratio.empty() || !(median(ratio) > 1.0)) {
+    return std::nullopt;
+  }
+  return fmt::format(
+      "{:.0f} s of the recording were disturbed and count for less; spectra spread what shook it over all times: in "
+      "the "
+      "middle minute the simulation's innovations have {:.1f} times the mean square",
+      disturbed_s, median(ratio));
+}
+
 }  // namespace
 
 const char* name_of(OverlayKind kind) {
@@ -95,7 +125,12 @@ Overlay lay_over(const ImuData& recording, const CalibrationResult& of_recording
     overlay.curves.insert(overlay.curves.end(), more.begin(), more.end());
   }
   for (int kind = 0; kind < overlay_kind_count; ++kind) {
-    const OverlayJudgement j = judge(static_cast<OverlayKind>(kind), overlay.curves);
+    OverlayJudgement j = judge(static_cast<OverlayKind>(kind), overlay.curves);
+    if (j.kind == OverlayKind::innovations && !j.agrees()) {
+      if (const auto why = spread_over_all_times(overlay.curves, recording, of_recording)) {
+        j.worst.push_back(*why);
+      }
+    }
     if (j.points > 0) {
       overlay.judgements.push_back(j);
     }

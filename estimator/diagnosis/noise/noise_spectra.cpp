@@ -319,11 +319,10 @@ Base base_of(const ImuData& data, const Stretch& stretch) {
   for (std::size_t i = stretch.first; i < stretch.last; ++i) {
     f += Vector3(data.delta_v[i].data()) * data.sample_rate_hz / static_cast<double>(stretch.size());
   }
-  const Vector3 level = f.cross(Vector3::UnitX()).normalized();
-  // A turn by a small angle about a changes f by -a x f.
+  // x of b made level, and across it. A turn by a small angle about a changes f by -a x f.
+  const Vector3 up = f.normalized(), forward = (Vector3::UnitX() - up.x() * up).normalized(), level = up.cross(forward);
   constexpr double sine_of_11_deg = 0.2;
-  return {
-      f.norm(), std::abs(f.x()) < sine_of_11_deg * f.norm(), {{{Vector3::UnitX(), level}, {level, -Vector3::UnitX()}}}};
+  return {f.norm(), std::abs(up.x()) < sine_of_11_deg, {{{forward, level}, {level, -forward}}}};
 }
 
 // Of one sensor axis: what is neither tilt nor its count.
@@ -331,18 +330,21 @@ DensityTable sensor_table(const std::vector<Bin>& bins, const Base& base, const 
                           Eigen::Index axis, double quantum, double rate_hz) {
   std::vector<Value> values;
   for (std::size_t k = 0; k < bins.size(); ++k) {
-    // Tilt is left to the base: nothing of the gyros' rate about its axis, of the force across it what is beside it.
-    double own = bins[k].density(axis, axis).real();
+    // Tilt is left to the base: of the gyros' rate and of the force what is across its axes, and of the force what is beside it. Axes of
+    // a base that leans are not quite the sensors': what a sensor has of another's is not taken for its own.
+    Vector3 kept = Vector3::Unit(axis % 3);
+    double own = 0.0;
     for (std::size_t a = 0; a < tilt.size(); ++a) {
-      if (k >= tilt[a].bins.size()) {
-        continue;
+      if (k < tilt[a].bins.size()) {
+        const Vector3& felt = axis < 3 ? base.axes[a].about : base.axes[a].across;
+        const double along = felt(axis % 3);
+        kept -= along * felt;
+        own += axis < 3 ? 0.0 : along * along * tilt[a].bins[k].beside;
       }
-      Line felt = Line::Zero();
-      (axis < 3 ? felt.head<3>() : felt.segment<3>(3)) =
-          (axis < 3 ? base.axes[a].about : base.axes[a].across).cast<Complex>();
-      const double along = std::real(felt(axis));
-      own -= along * along * (std::real(felt.dot(bins[k].density * felt)) - (axis < 3 ? 0.0 : tilt[a].bins[k].beside));
     }
+    Line line = Line::Zero();
+    (axis < 3 ? line.head<3>() : line.segment<3>(3)) = kept.cast<Complex>();
+    own += std::real(line.dot(bins[k].density * line));
     // Increments of a count whose remainder is carried on differ by white noise of quantum^2/12 at either end.
     const double sine = std::sin(0.5 * std::numbers::pi * (bins[k].low_hz + bins[k].high_hz) / rate_hz);
     const double counted = 8.0 * rate_hz * quantum * quantum / 12.0 * sine * sine;

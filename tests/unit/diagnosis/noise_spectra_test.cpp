@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -98,6 +99,26 @@ TEST(NoiseSpectra, WhatBothTriadsFeelIsTilt) {
   EXPECT_LT(power(spectra->sensors[5], 0.0, 0.01), 0.1 * g * g * power(spectra->roll.table, 0.0, 0.01));
   // Nothing tilts about z.
   EXPECT_LT(power(spectra->pitch.table, 0.0, 1.0), 1e-3 * power(spectra->roll.table, 0.0, 1.0));
+}
+
+// A sensor mounted 2 and 1 deg off level: of the tilt its other axes feel 3 %, and of the noise about the vertical its level ones. What one
+// triad's axis has of another's motion is not its own noise.
+TEST(NoiseSpectra, ALeaningBaseLeavesNoTiltToTheSensors) {
+  Parked p = parked(4);
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(0.035, Vector3::UnitZ()) * Eigen::AngleAxisd(0.017, Vector3::UnitX())).toRotationMatrix();
+  for (std::size_t i = 0; i < p.time_s.size(); ++i) {
+    Eigen::Map<Vector3>(p.delta_theta[i].data()) = turn * Vector3(p.delta_theta[i].data());
+    Eigen::Map<Vector3>(p.delta_v[i].data()) = turn * Vector3(p.delta_v[i].data());
+  }
+  const auto spectra = noise_spectra(p.data(), p.dwell(), 0.0, 0.0);
+  ASSERT_TRUE(spectra);
+  const double tilt = g * g * power(spectra->roll.table, 0.0, 0.01);
+  ASSERT_GT(tilt, 0.0);
+  // x feels cos(roll) sin(pitch) of it, 1.2e-3 of the power; a thousandth of that is left.
+  for (const std::size_t sensor : {3U, 4U}) {
+    EXPECT_LT(power(spectra->sensors[sensor], 0.0, 0.01), 1e-5 * tilt);
+  }
 }
 
 // At 1 Hz the force of a base that turns 2 m below is 1 + 39.5 * 2 / 9.8 = 9 times g and the angle.
