@@ -7,6 +7,7 @@
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/left_out.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal {
 namespace {
@@ -160,6 +161,11 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_
     j["accel_noise_loudest_tenth"] = d.loudest;
   }
   j["nothing_turned"] = d.nothing_turned;
+  if (d.base_tilt) {
+    j["base_tilt"] = {{"range_arcmin", 60.0 * d.base_tilt->range / units::degree},
+                      {"correlation", d.base_tilt->correlation},
+                      {"apart_arcmin", 60.0 * d.base_tilt->apart / units::degree}};
+  }
   j["base"] = d.calibration.moored ? "moored" : "still";
   j["parameters"] = ordered_json::array();
   for (int k = 0; k < sensor_parameter_count; ++k) {

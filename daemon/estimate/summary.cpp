@@ -11,6 +11,7 @@
 #include "daemon/estimate/effect_words.hpp"
 #include "daemon/estimate/quantity_text.hpp"
 #include "daemon/estimate/showing_schedule.hpp"
+#include "estimator/geometry/units.hpp"
 #include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
@@ -386,10 +387,13 @@ Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::
             d.findings.empty()
                 ? std::string("Nothing turned: no sensor effect can be told from motion of the base.")
                 : fmt::format("Nothing turned, so only the noise was judged: {}.", fmt::join(kinds_of(d), ", ")),
-            fmt::format("NIS {:.3g}{}.", d.before.nis,
+            fmt::format("NIS {:.3g}{}{}.", d.before.nis,
                         d.calibration.noise.disturbed.empty()
                             ? std::string()
-                            : fmt::format(", {} s disturbed from outside", d.calibration.noise.disturbed.size())),
+                            : fmt::format(", {} s disturbed from outside", d.calibration.noise.disturbed.size()),
+                        d.base_tilt ? fmt::format(", the base tilts by {:.2g} arcmin, as gyros and gravity show alike",
+                                                  60.0 * d.base_tilt->range / units::degree)
+                                    : std::string()),
             "selfcal plan --optimize"};
   }
   switch (d.verdict) {

@@ -266,6 +266,7 @@ void Diagnoser::leave_unjudged() {
 // The verdict on the noise needs no turn, and nothing else has one.
 void Diagnoser::judge_noise_alone() {
   d_.nothing_turned = true;
+  d_.base_tilt = base_tilt(data_, observed(find_segments(data_), data_));
   const Consistency& consistency = d_.calibration.consistency;
   for (Adequacy* a : {&d_.before, &d_.after}) {
     a->nis = consistency.nis_mean;

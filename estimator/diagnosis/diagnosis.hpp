@@ -13,6 +13,7 @@
 
 #include "estimator/diagnosis/data/faults.hpp"
 #include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/noise/base_tilt.hpp"
 #include "estimator/diagnosis/noise/noise_check.hpp"
 #include "estimator/diagnosis/noise/velocity_jumps.hpp"
 #include "estimator/diagnosis/regression/recording_context.hpp"
@@ -100,6 +101,7 @@ struct Diagnosis {
   bool unexplained = false;
   // No rotation: a bias that changes and a base that moves look alike, and the 24 are open. Only the noise was judged.
   bool nothing_turned = false;
+  std::optional<BaseTilt> base_tilt;  // then
   std::vector<DataFault> faults;
   std::vector<Finding> findings;   // best first
   std::vector<Finding> rejected;   // fitted best, but what remains says no
