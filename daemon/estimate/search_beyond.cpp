@@ -24,17 +24,18 @@ tl::expected<BeyondSearch, std::string> search_beyond(std::span<const discovery:
       first = std::move(both->diagnosis);
       return BeyondSearch{std::move(both->rest), std::move(both->laws)};
     }
+    if (auto alone = discovery::laws_in_place_of_names(unit.front().data, first, rest->recordings().front(),
+                                                       search.fitted(), of_laws, progress)) {
+      replace_process(alone->diagnosis, alone->laws);
+      if (alone->diagnosis.unexplained) {
+        first = std::move(alone->diagnosis);
+        return BeyondSearch{std::move(alone->rest), std::move(alone->laws)};
+      }
+    }
   }
   discovery::Discovery told = search.told();
   BeyondSearch answer{std::move(*rest), std::move(told)};
   replace_process(first, answer.found);
-  if (unit.size() == 1) {
-    if (auto laws = discovery::laws_in_place_of_names(unit.front().data, first, answer.rest.recordings().front(),
-                                                      answer.found, of_laws, progress)) {
-      first = std::move(laws->diagnosis);
-      return BeyondSearch{std::move(laws->rest), std::move(laws->laws)};
-    }
-  }
   if (unit.size() == 1 &&
       discovery::say_what_was_rejected(answer.rest.recordings().front(), first, answer.found, of_laws.stop)) {
     discovery::keep_rejected_names(first, answer.found);

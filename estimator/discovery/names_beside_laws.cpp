@@ -301,7 +301,8 @@ std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const
                                                       const UnitRecording& searched, const Discovery& beside,
                                                       const DiscoveryOptions& of_laws, const Progress& progress) {
   const Laws found = Laws::fitted(beside.fit);
-  if (!d.unexplained || d.model.empty() || found.terms.empty()) {
+  const bool walks = std::any_of(d.findings.begin(), d.findings.end(), [](const auto& f) { return f.process; });
+  if (!(d.unexplained || walks) || d.model.empty() || found.terms.empty()) {
     return std::nullopt;
   }
   CatalogueReach reach(searched, found.terms, found.coefficient, of_laws.stop);
@@ -324,7 +325,7 @@ std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const
     return std::nullopt;
   }
   Discovery laws = search.told();
-  if (!say_less(laws)) {
+  if (laws.laws.empty() || !say_less(laws)) {
     return std::nullopt;
   }
   return NamesBesideLaws{std::move(unnamed), std::move(*rest), std::move(laws)};

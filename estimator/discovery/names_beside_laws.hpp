@@ -25,8 +25,8 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const diag
 
 // A name that takes up a part of a law is no physics of its own: g-sensitivity follows the mean of a creep that has the sign of a force,
 // and what the search finds beside it mends what it took too much. Where an effect that was named could make a part of the laws found
-// beside it, the recording is searched with nothing taken out. `beside`: what the search told of `searched`, the recording less the
-// names. None where names and laws together say less. In `diagnosis` the names of sensors are rejected.
+// beside it, the recording is searched with nothing taken out. `beside`: what the search fitted on `searched`, the recording less the
+// names, which leave something or stand beside a walk. None where names and laws together say less. In `diagnosis` the names of sensors are rejected.
 std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                                       const UnitRecording& searched, const Discovery& beside,
                                                       const DiscoveryOptions& of_laws, const Progress& progress = {});
