@@ -74,21 +74,19 @@ std::vector<double> forces_of_another_zero(const PoseInput& input, const std::ve
   if (!(input.accel_unit > 0.0) || !input.gyros_si || input.sensors != Sensors::both || stretches.size() < least) {
     return {};
   }
-  std::vector<double> forces;
+  std::vector<double> forces(stretches.size());
+  std::transform(stretches.begin(), stretches.end(), forces.begin(), [&](const Pose& p) { return force_of(input, p); });
   Vector3 usual;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::vector<double> rates;
-    for (const Pose& p : stretches) {
-      rates.push_back(p.gyro(axis));
-    }
+    std::vector<double> rates(stretches.size());
+    std::transform(stretches.begin(), stretches.end(), rates.begin(), [&](const Pose& p) { return p.gyro(axis); });
     usual(axis) = median(std::move(rates));
   }
-  std::size_t rests = 0, others = 0;
-  for (const Pose& p : stretches) {
-    forces.push_back(force_of(input, p));
-    rests += (p.gyro - usual).cwiseAbs().maxCoeff() * input.gyro_unit < units::degree ? 1 : 0;  // a centrifuge turns
-    others += std::abs(forces.back() - 1.0) > most_off ? 1 : 0;
-  }
+  const auto rests = static_cast<std::size_t>(std::count_if(stretches.begin(), stretches.end(), [&](const Pose& p) {
+    return (p.gyro - usual).cwiseAbs().maxCoeff() * input.gyro_unit < units::degree;  // a centrifuge turns
+  }));
+  const auto others = static_cast<std::size_t>(
+      std::count_if(forces.begin(), forces.end(), [](double f) { return std::abs(f - 1.0) > most_off; }));
   const bool elsewhere = 10 * rests >= 9 * stretches.size() && 3 * others >= stretches.size();
   return elsewhere ? forces : std::vector<double>{};
 }

@@ -12,12 +12,12 @@ namespace selfcal::diagnosis {
 // Gyros in raw units are not asked.
 bool moves(const PoseInput& input, const Pose& stretch);
 
-// Takes out stretches in which the accelerometers read another force than gravity by more than any bias, where their unit is known: steady
-// acceleration. Returns what they read, in g.
-// Forces of all stretches, g, where the gyros rest in nearly all of them and a third and more read another force than 1 g: what is wrong there is the
-// accelerometers' zero. Empty: no.
+// Forces of all stretches, g, where the gyros rest in nearly all of them and a third and more read another force than 1 g: what is wrong
+// there is the accelerometers' zero. Empty: no.
 std::vector<double> forces_of_another_zero(const PoseInput& input, const std::vector<Pose>& stretches);
 
+// Takes out stretches in which the accelerometers read another force than gravity by more than any bias, where their unit is known: steady
+// acceleration. Returns what they read, in g.
 std::vector<double> drop_other_forces(const PoseInput& input, std::vector<Pose>& stretches);
 
 // Samples that lack: an interval of more than half a second, and of ten usual ones, ends at these.
