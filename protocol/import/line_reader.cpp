@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include <cerrno>
-#include <cstring>
 
 namespace selfcal::import {
 namespace {
@@ -57,9 +56,8 @@ Expected<bool> LineReader::refill() {
                 fmt::format("{}: line {}: damaged: {}", name_, number_ + 1, gzerror(input_->file, &code)));
   }
   buffer_.resize(held + static_cast<std::size_t>(count));
-  if (const void* nul = std::memchr(buffer_.data() + held, '\0', buffer_.size() - held); nul != nullptr) {
+  if (const std::size_t first = buffer_.find('\0', held); first != std::string::npos) {
     const bool wide = buffer_.starts_with("\xFF\xFE") || buffer_.starts_with("\xFE\xFF");
-    const auto first = static_cast<std::size_t>(static_cast<const char*>(nul) - buffer_.data());
     if (!wide && first > 0 && only_zeros_behind(first)) {
       return true;
     }
@@ -96,7 +94,7 @@ Expected<bool> LineReader::next(std::string_view& line) {
     }
     const Expected<bool> more = refill();
     if (!more) {
-      return more;
+      return tl::unexpected(more.error());
     }
     ended_ = !*more;
     end = buffer_.find('\n', at_ + searched);
