@@ -61,10 +61,7 @@ ClassAverage average_over_classes(std::span<const UnitRecording> recordings, con
       average.covariance[r] += moved * moved.transpose();
     }
   }
-  const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
-  for (const auto& scene : scenes) {
-    scene->table = collect_nodes(scene->motion, scene->input);
-  }
+  const std::vector<std::unique_ptr<Scene>> scenes = scenes_with_tables(recordings);
   for (const DiscoveredLaw& law : found.laws) {
     const std::size_t place = place_of(law, found.fit.terms);
     const auto [own_odds, rivals] = words_of(law, members);

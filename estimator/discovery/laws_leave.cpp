@@ -22,10 +22,7 @@ LawFit fit_of_told(std::span<const UnitRecording> recordings, const Discovery& f
   if (found.described.empty()) {
     return found.fit;
   }
-  const std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
-  for (const auto& scene : scenes) {
-    scene->table = collect_nodes(scene->motion, scene->input);
-  }
+  const std::vector<std::unique_ptr<Scene>> scenes = scenes_with_tables(recordings);
   std::vector<LawTerm> told;
   told.reserve(found.laws.size());
   for (const DiscoveredLaw& law : found.laws) {

@@ -37,6 +37,15 @@ inline std::vector<std::unique_ptr<Scene>> scenes_of(std::span<const UnitRecordi
   return scenes;
 }
 
+// For fits of laws.
+inline std::vector<std::unique_ptr<Scene>> scenes_with_tables(std::span<const UnitRecording> recordings) {
+  std::vector<std::unique_ptr<Scene>> scenes = scenes_of(recordings);
+  for (const auto& scene : scenes) {
+    scene->table = collect_nodes(scene->motion, scene->input);
+  }
+  return scenes;
+}
+
 inline std::vector<LawRecording> laws_on(const std::vector<std::unique_ptr<Scene>>& scenes) {
   std::vector<LawRecording> all;
   all.reserve(scenes.size());

@@ -8,28 +8,16 @@
 #include <numbers>
 #include <random>
 
+#include "tests/unit/diagnosis/parked_recording.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
 constexpr double rate_hz = 20.0, g = 9.8, duration_s = 1200.0, amplitude = 1e-3, period_s = 700.0;
 
-struct Parked {
-  std::vector<double> time_s;
-  std::vector<std::array<double, 3>> delta_theta, delta_v;
-
-  ImuData data() const {
-    ImuData all;
-    all.sample_rate_hz = rate_hz;
-    all.time_s = time_s;
-    all.delta_theta = delta_theta;
-    all.delta_v = delta_v;
-    return all;
-  }
-};
-
 // y up; about x by a sine. `felt`: by the accelerometers too.
-Parked tilting(bool felt) {
-  Parked data;
+ParkedRecording tilting(bool felt) {
+  ParkedRecording data;
   std::mt19937 engine(3);
   std::normal_distribution<double> normal;
   double before = 0.0;
@@ -46,7 +34,7 @@ Parked tilting(bool felt) {
 std::vector<Segment> dwell(const ImuData& data) { return {{false, 0, data.size(), 0.0, duration_s, 0.0, 0.0}}; }
 
 TEST(BaseTilt, WhatGravityAndGyrosShowAlikeIsMotion) {
-  const Parked parked = tilting(true);
+  const ParkedRecording parked = tilting(true);
   const ImuData data = parked.data();
   const auto tilt = base_tilt(data, dwell(data));
   ASSERT_TRUE(tilt);
@@ -56,7 +44,7 @@ TEST(BaseTilt, WhatGravityAndGyrosShowAlikeIsMotion) {
 }
 
 TEST(BaseTilt, AGyroThatDriftsTiltsNoBase) {
-  const Parked parked = tilting(false);
+  const ParkedRecording parked = tilting(false);
   const ImuData data = parked.data();
   EXPECT_FALSE(base_tilt(data, dwell(data)));
 }

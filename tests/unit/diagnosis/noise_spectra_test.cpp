@@ -8,23 +8,16 @@
 #include <numbers>
 #include <random>
 
+#include "tests/unit/diagnosis/parked_recording.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
 constexpr double rate_hz = 20.0, g = 9.8, white = 2e-6, count = 1e-5, line = 3e-4, line_hz = 3.0;
 
-struct Parked {
-  std::vector<double> time_s, tilt;
-  std::vector<std::array<double, 3>> delta_theta, delta_v;
+struct Parked : ParkedRecording {
+  std::vector<double> tilt;
 
-  ImuData data() const {
-    ImuData all;
-    all.sample_rate_hz = rate_hz;
-    all.time_s = time_s;
-    all.delta_theta = delta_theta;
-    all.delta_v = delta_v;
-    return all;
-  }
   std::vector<Segment> dwell() const { return {{false, 0, time_s.size(), 0.0, time_s.back(), 0.0, 0.0}}; }
 };
 
