@@ -140,8 +140,7 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
                                                   const std::vector<std::unique_ptr<Taken>>& taken,
                                                   const diagnosis::DiagnosisOptions& of_catalogue,
                                                   const std::function<void()>& progress, const std::stop_token& stop) {
-  if (!taken.front()->diagnosis.faults.empty() ||
-      (taken.size() == 1 && !taken.front()->diagnosis.unexplained && !may_be_a_law(taken.front()->diagnosis))) {
+  if (!taken.front()->diagnosis.faults.empty()) {
     return std::nullopt;
   }
   std::vector<DiagnosedFile> files;
@@ -154,11 +153,12 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   of_laws.coloured = taken.front()->diagnosis.before.coloured;
   const discovery::Progress step = [&](const std::string&) { progress(); };
   diagnosis::Diagnosis& first = taken.front()->diagnosis;
-  auto search = search_beyond(recordings_of(files), of_catalogue, of_laws, first, step);
-  if (!search) {
-    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, search.error()));
+  auto searched = search_beyond(recordings_of(files), of_catalogue, of_laws, first, Search::where_due, step);
+  if (!searched) {
+    return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, searched.error()));
   }
-  if (taken.size() == 1 && !first.unexplained) {
+  auto& search = *searched;
+  if (!search || (taken.size() == 1 && !first.unexplained)) {
     return std::nullopt;
   }
   const auto joint = fit_together(search->rest, search->found, stop);

@@ -11,7 +11,7 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
                const std::function<void(const std::string& step)>& step) {
   diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(data, options, step);
   Cause cause{std::move(outcome.diagnosis), std::move(outcome.failure), std::nullopt};
-  if (!cause.diagnosis || !(cause.diagnosis->unexplained || may_be_a_law(*cause.diagnosis))) {
+  if (!cause.diagnosis) {
     return cause;
   }
   diagnosis::Diagnosis& diagnosis = *cause.diagnosis;
@@ -19,9 +19,9 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
   discovery::DiscoveryOptions of_laws;
   of_laws.stop = options.stop;
   of_laws.coloured = diagnosis.before.coloured;
-  auto search = search_beyond({&recording, 1}, options, of_laws, diagnosis, step);
-  if (search && diagnosis.unexplained && fit_together(search->rest, search->found, options.stop)) {
-    cause.beyond = std::move(search->found);
+  auto search = search_beyond({&recording, 1}, options, of_laws, diagnosis, Search::where_due, step);
+  if (search && *search && diagnosis.unexplained && fit_together((*search)->rest, (*search)->found, options.stop)) {
+    cause.beyond = std::move((*search)->found);
   }
   return cause;
 }

@@ -85,6 +85,18 @@ ordered_json to_json(const diagnosis::Remainder& r) {
   return {{"share", r.share}, {"sigma", r.sigma}, {"forms", forms}, {"places", list(r.places)}};
 }
 
+ordered_json to_json(const diagnosis::LawsInstead& instead) {
+  ordered_json laws = ordered_json::array();
+  for (const diagnosis::LawsInstead::Law& law : instead.laws) {
+    laws.push_back({{"axis", law.axis},
+                    {"expression", law.expression},
+                    {"coefficient", law.coefficient},
+                    {"sigma", law.sigma},
+                    {"unit", law.axis.starts_with("gyro") ? "deg/h" : "ug"}});
+  }
+  return {{"laws", laws}, {"odds", instead.odds}};
+}
+
 ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diagnosis::Located>& by) {
   places.insert(places.end(), by.begin(), by.end());
   return list(places);
@@ -139,6 +151,9 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_
   j["unexplained"] = d.unexplained;
   if (d.remainder) {
     j["remainder"] = to_json(*d.remainder);
+  }
+  if (d.instead) {
+    j["instead_of_names"] = to_json(*d.instead);
   }
   j["rejected"] = list(d.rejected);
   j["suspected"] = list(d.suspected);

@@ -109,6 +109,21 @@ std::vector<std::string> kinds_of(const Diagnosis& d) {
   return words;
 }
 
+std::string laws_instead_words(const diagnosis::LawsInstead& instead) {
+  std::vector<std::string> all;
+  for (const diagnosis::LawsInstead::Law& law : instead.laws) {
+    all.push_back(fmt::format("{} follows {}", law.axis, law.expression));
+  }
+  return fmt::format("{}", fmt::join(all, " and "));
+}
+
+// Laws in the place of what is named, where their odds are worth a word in the verdict.
+std::string or_laws(const Diagnosis& d) {
+  constexpr double worth_a_word = 0.1;
+  return d.instead && d.instead->odds > worth_a_word ? fmt::format("; or that {}", laws_instead_words(*d.instead))
+                                                     : std::string();
+}
+
 // With the equations that the names leave, or with the word that they leave something.
 std::string named(const Diagnosis& d, const discovery::Discovery* beyond) {
   constexpr std::size_t most = 2;
@@ -121,7 +136,7 @@ std::string named(const Diagnosis& d, const discovery::Discovery* beyond) {
   if (d.unexplained && explains(beyond)) {
     return text + "; and that " + discovered_words(*beyond) + left_words(*beyond);
   }
-  return text + (d.unexplained ? "; and what none of these explains" : "");
+  return text + (d.unexplained ? "; and what none of these explains" : or_laws(d));
 }
 
 // What shows it: the strongest coefficient, what the fit makes of the misfit, and what it does to the 24.
@@ -138,6 +153,9 @@ std::string named_cause(const Diagnosis& d, const discovery::Discovery* beyond) 
   text += moved.empty() ? std::string() : fmt::format("; {}", moved);
   if (d.unexplained && !with_laws && !d.remaining.empty()) {
     text += fmt::format("; {:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
+  }
+  if (d.instead) {
+    text += fmt::format("; in its place {} (odds {:.2g})", laws_instead_words(*d.instead), d.instead->odds);
   }
   return text + ".";
 }

@@ -78,6 +78,16 @@ struct ModelEffect {
   Eigen::MatrixXd covariance;
 };
 
+// Laws that explain the recording in the place of the names of sensors (discovery/laws_for_names.hpp).
+struct LawsInstead {
+  struct Law {
+    std::string axis, expression;
+    double coefficient = 0.0, sigma = 0.0;  // ug or deg/h
+  };
+  std::vector<Law> laws;
+  double odds = 0.0;  // against the names
+};
+
 struct Undetectable {
   const Effect* effect = nullptr;
   double expected_z = 0.0;  // of its best coefficient at typical size
@@ -107,6 +117,7 @@ struct Diagnosis {
   std::vector<Finding> rejected;   // fitted best, but what remains says no
   std::vector<Finding> suspected;  // too weak to name
   std::optional<Remainder> remainder;
+  std::optional<LawsInstead> instead;  // the mean and sigma of the 24 hold both
   std::vector<Located> located, remaining;
   std::vector<Located> located_by, remaining_by;  // by gimbal angles, directions, temperature: the worst of each
   std::vector<Undetectable> undetectable, detectable;

@@ -74,6 +74,9 @@ class LawSearch::Search {
   // Laws first, and beside them what a random process takes up; then processes first. The way of the greater posterior
   // probability is reported: a process can stand for any law, and laws added up can stand for a process.
   void fit() {
+    if (options_.least_gain > 0.0 && shortlist_.largest_gain(*model_, shortlist_size) < options_.least_gain) {
+      return write_down();
+    }
     const ProcessFit alone = best_process();
     const bool may_stand_alone = significant(alone);
     take_laws();
@@ -185,8 +188,7 @@ class LawSearch::Search {
            !options_.stop.stop_requested();
   }
 
-  // The pieces stand for a law to a per cent or so: of one of 30 sigma they leave what a process could take up. Score and
-  // residual become those of the recording without the laws.
+  // Of a law of 30 sigma the pieces leave what a process could take up. Score and residual become those without the laws.
   void settle() {
     if (state_.terms.empty()) {
       return;
@@ -241,8 +243,7 @@ class LawSearch::Search {
   bool significant(const ProcessFit& process) const {
     // What is less than this share of a strong law is the error of its linearisation as likely as anything else.
     constexpr double least_share = 0.005;
-    const double taken_off = state_.fit.square_before - state_.fit.square_after;
-    return 2.0 * process.log_likelihood_gain > least_share * taken_off &&
+    return 2.0 * process.log_likelihood_gain > least_share * (state_.fit.square_before - state_.fit.square_after) &&
            log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
                std::log(options_.false_alarm_rate);
   }
@@ -428,9 +429,9 @@ class LawSearch::Search {
     }
     constexpr double worth_a_change = 0.02;  // of the probability
     LawClass all = class_of(k);
-    const std::vector<double>& merit = all.elsewhere().merit;
     const std::size_t best = all.best_elsewhere();
-    if (merit[best] > merit.front() + worth_a_change && put_in_place(k, all.possible()[best], false)) {
+    const double more = all.elsewhere().merit[best] - all.elsewhere().merit.front();
+    if (more > worth_a_change && put_in_place(k, all.possible()[best], false)) {
       all = class_of(k);
     }
     law.carries_over = all.elsewhere().probability.front();

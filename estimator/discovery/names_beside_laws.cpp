@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimator/discovery/catalogue_reach.hpp"
+#include "estimator/discovery/explanation_cost.hpp"
 #include "estimator/discovery/kept_names.hpp"
 #include "estimator/discovery/scene.hpp"
 
@@ -15,11 +16,6 @@ namespace {
 
 using diagnosis::Diagnosis;
 using diagnosis::ModelEffect;
-
-// Twice the logarithm of the choices that one law is, a function and an axis out of half a million with their prior probabilities, and of its
-// coefficient (BIC); and of a name out of the catalogue. What an explanation costs beside the square that it leaves.
-// The logarithm of the odds that it is known physics that stands beside unknown one lowers a name's.
-constexpr double of_a_law = 24.0, of_a_name = 2.0;
 
 struct Laws {
   std::vector<LawTerm> terms;
@@ -52,47 +48,14 @@ struct Laws {
   }
 };
 
-double of_a_coefficient(double rows) { return std::log(std::max(2.0, rows)); }
-
-double cost_of_laws(std::size_t laws, double rows) {
-  return (of_a_law + of_a_coefficient(rows)) * static_cast<double>(laws);
-}
-
-double cost_of_names(const std::vector<ModelEffect>& names, double rows) {
-  constexpr double counts = 3.0;
-  double cost = 0.0;
-  for (const ModelEffect& name : names) {
-    const Eigen::ArrayXd z = name.size.array().abs() / name.covariance.diagonal().array().sqrt();
-    cost += of_a_name + of_a_coefficient(rows) * static_cast<double>(std::max<Eigen::Index>(1, (z > counts).count()));
-  }
-  return cost;
-}
-
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
   // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
   return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
-         of_a_law * static_cast<double>(found.processes.size()) + cost_of_names(names, found.rows);
+         cost_of_processes(found.processes.size()) + cost_of_names(names, found.rows);
 }
 
 // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
 constexpr double least_share_of_laws = 0.3;
-
-// The diagnosis without its names of sensor effects.
-Diagnosis without_names(Diagnosis d) {
-  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
-    return f.source == nullptr || f.source->sensor == nullptr;
-  });
-  d.rejected.insert(d.rejected.begin(), kept, d.findings.end());
-  d.findings.erase(kept, d.findings.end());
-  const auto modelled = std::stable_partition(d.model.begin(), d.model.end(),
-                                              [](const ModelEffect& m) { return m.effect->sensor == nullptr; });
-  d.rejected_model.insert(d.rejected_model.begin(), modelled, d.model.end());
-  d.model.erase(modelled, d.model.end());
-  d.rejected_by_remains_alone = false;
-  d.remainder.reset();
-  d.verdict = d.model.empty() ? diagnosis::DiagnosisVerdict::none_of_the_above : diagnosis::DiagnosisVerdict::named;
-  return d;
-}
 
 class Together {
  public:
@@ -279,8 +242,8 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
       continue;
     }
     const double cost = cost_of_laws(laws->terms.size(), alone.rows);
-    const double of_one_name = of_a_name + of_a_coefficient(alone.rows);
-    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end() || cost + of_one_name >= least) {
+    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end() ||
+        cost + cost_of_a_name(alone.rows) >= least) {
       continue;
     }
     tried.push_back(laws->forms());

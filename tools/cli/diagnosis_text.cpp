@@ -90,6 +90,22 @@ std::string remainder_text(const Diagnosis& d) {
   return text;
 }
 
+// Laws that explain the recording in the place of what is named.
+std::string instead_text(const Diagnosis& d) {
+  if (!d.instead) {
+    return {};
+  }
+  std::string text = fmt::format(
+      "\nin the place of what is named, odds {:.2g} against it; the sigma of the 24 holds both:\n", d.instead->odds);
+  for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
+    text +=
+        fmt::format("  {}  ({}) * {}\n", law.axis,
+                    with_sigma(law.coefficient, law.sigma, std::string(law.axis.starts_with("gyro") ? "deg/h" : "ug")),
+                    law.expression);
+  }
+  return text;
+}
+
 // Those of the 24 that the omission moved by three sigma and more, most first.
 std::string corrections_text(const Diagnosis& d, Detail detail) {
   const auto moved = [&](int k) { return std::abs(d.value(k) - d.calibration.value(k)) / d.calibration.sigma(k); };
@@ -217,6 +233,7 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
   text += remainder_text(d);
+  text += instead_text(d);
   // Where nothing explains the recording, nothing corrects the 24.
   if (!d.unexplained || explains(beyond)) {
     text += corrections_text(d, detail);

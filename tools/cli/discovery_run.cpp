@@ -139,7 +139,17 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   const auto try_on = [&](const discovery::UnexplainedRest& rest) {
     return laws.terms.empty() ? Expected<void>() : try_them(arguments.laws, laws, rest, result);
   };
-  if (!asked && !may_be_a_law(first)) {
+  ProgressLine line;
+  const discovery::Progress progress = [&line](const std::string& words) { line.show(words); };
+  discovery::DiscoveryOptions options;
+  options.coloured = first.before.coloured;
+  auto searched =
+      search_beyond(unit, of_catalogue, options, first, asked ? Search::always : Search::where_due, progress);
+  if (!searched) {
+    return fail(ErrorKind::bad_input, searched.error());
+  }
+  auto& search = *searched;
+  if (!search) {
     if (laws.terms.empty()) {
       return result;
     }
@@ -148,14 +158,6 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
       return fail(ErrorKind::bad_input, rest.error());
     }
     return try_on(*rest).map([&] { return std::move(result); });
-  }
-  ProgressLine line;
-  const discovery::Progress progress = [&line](const std::string& words) { line.show(words); };
-  discovery::DiscoveryOptions options;
-  options.coloured = first.before.coloured;
-  auto search = search_beyond(unit, of_catalogue, options, first, progress);
-  if (!search) {
-    return fail(ErrorKind::bad_input, search.error());
   }
   // What the search withdrew is not taken out: a name that takes up a part of a law leaves another one.
   if (const auto tried = try_on(search->rest); !tried) {

@@ -1,0 +1,51 @@
+#include "estimator/discovery/explanation_cost.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace selfcal::discovery {
+namespace {
+
+// Twice the logarithm of the choices that one law is, a function and an axis out of half a million with their prior probabilities; and of a
+// name out of the catalogue. The logarithm of the odds that it is known physics that stands beside unknown one lowers a name's.
+constexpr double of_a_law = 24.0, of_a_name = 2.0;
+
+double of_a_coefficient(double rows) { return std::log(std::max(2.0, rows)); }
+
+}  // namespace
+
+double cost_of_laws(std::size_t laws, double rows) {
+  return (of_a_law + of_a_coefficient(rows)) * static_cast<double>(laws);
+}
+
+double cost_of_processes(std::size_t processes) { return of_a_law * static_cast<double>(processes); }
+
+double cost_of_a_name(double rows) { return of_a_name + of_a_coefficient(rows); }
+
+double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows) {
+  constexpr double counts = 3.0;
+  double cost = 0.0;
+  for (const diagnosis::ModelEffect& name : names) {
+    const Eigen::ArrayXd z = name.size.array().abs() / name.covariance.diagonal().array().sqrt();
+    cost += of_a_name + of_a_coefficient(rows) * static_cast<double>(std::max<Eigen::Index>(1, (z > counts).count()));
+  }
+  return cost;
+}
+
+diagnosis::Diagnosis without_names(diagnosis::Diagnosis d) {
+  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
+    return f.source == nullptr || f.source->sensor == nullptr;
+  });
+  d.rejected.insert(d.rejected.begin(), kept, d.findings.end());
+  d.findings.erase(kept, d.findings.end());
+  const auto modelled = std::stable_partition(
+      d.model.begin(), d.model.end(), [](const diagnosis::ModelEffect& m) { return m.effect->sensor == nullptr; });
+  d.rejected_model.insert(d.rejected_model.begin(), modelled, d.model.end());
+  d.model.erase(modelled, d.model.end());
+  d.rejected_by_remains_alone = false;
+  d.remainder.reset();
+  d.verdict = d.model.empty() ? diagnosis::DiagnosisVerdict::none_of_the_above : diagnosis::DiagnosisVerdict::named;
+  return d;
+}
+
+}  // namespace selfcal::discovery

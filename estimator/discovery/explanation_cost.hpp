@@ -1,0 +1,22 @@
+// What an explanation costs beside the square that it leaves: twice the logarithm of the choices that it is, and of its coefficients (BIC).
+// Names of the catalogue and laws of a search of half a million functions are weighed by the sum.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "estimator/diagnosis/diagnosis.hpp"
+
+namespace selfcal::discovery {
+
+// `rows`: of the recording that is explained.
+double cost_of_laws(std::size_t laws, double rows);
+double cost_of_processes(std::size_t processes);
+double cost_of_a_name(double rows);
+// Of a name's coefficients those count that the recording shows.
+double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows);
+
+// The diagnosis as it is where no effect of a sensor is named: the names are rejected, those of base and data stay.
+diagnosis::Diagnosis without_names(diagnosis::Diagnosis diagnosis);
+
+}  // namespace selfcal::discovery
