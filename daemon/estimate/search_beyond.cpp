@@ -23,7 +23,7 @@ void hold_both(Diagnosis& d, const discovery::Discovery& laws, double odds) {
   for (std::size_t k = 0; k < laws.fit.terms.size(); ++k) {
     const discovery::LawTerm& term = laws.fit.terms[k];
     const auto row = static_cast<Eigen::Index>(k);
-    instead.laws.push_back({std::string(name_of_axis(term.axis)), term.expression.text(term.constants),
+    instead.laws.push_back({term.axis, std::string(name_of_axis(term.axis)), term.expression.text(term.constants),
                             laws.fit.coefficient(row), std::sqrt(laws.fit.covariance(row, row))});
   }
   instead.odds = odds;
@@ -36,32 +36,41 @@ void hold_both(Diagnosis& d, const discovery::Discovery& laws, double odds) {
   d.instead = std::move(instead);
 }
 
-// Of names that stand alone: laws that are far likelier, in their place; others are kept in `d`.
-std::optional<BeyondSearch> laws_in_their_place(const ImuData& data, Diagnosis& d,
+// Of names that stand alone: laws that are far likelier, in their place; of one recording others are kept in `first`.
+std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::DiagnosedRecording> unit, Diagnosis& first,
                                                 const discovery::DiscoveryOptions& of_laws,
                                                 const discovery::Progress& progress) {
   constexpr double least_odds = 0.01, far_likelier = 10.0;
-  const discovery::UnitRecording as_it_is{data, d.calibration};
-  auto rivals = discovery::laws_for_names(as_it_is, d, std::log(least_odds), of_laws, progress);
+  std::vector<discovery::UnitRecording> as_they_are;
+  std::vector<Diagnosis> unnamed;
+  for (const discovery::DiagnosedRecording& r : unit) {
+    as_they_are.push_back({r.data, r.diagnosis.calibration});
+    unnamed.push_back(discovery::without_names(r.diagnosis));
+    unnamed.back().unexplained = unnamed.back().mismatch = true;
+  }
+  auto rivals = discovery::laws_for_names(unit, as_they_are, std::log(least_odds), of_laws, progress);
   if (!rivals) {
     return std::nullopt;
   }
-  if (rivals->log_odds < std::log(far_likelier)) {
-    hold_both(d, rivals->search.fitted(), std::exp(rivals->log_odds));
-    return std::nullopt;
+  if (rivals->log_odds >= std::log(far_likelier)) {
+    std::vector<discovery::DiagnosedRecording> recordings;
+    for (std::size_t r = 0; r < unit.size(); ++r) {
+      recordings.push_back({unit[r].data, unnamed[r]});
+    }
+    const discovery::Discovery fitted = rivals->search.fitted();
+    discovery::Discovery told = rivals->search.told();
+    auto rest = discovery::UnexplainedRest::of(recordings, of_laws.stop);
+    if (rest && !told.laws.empty() && explains(&told)) {
+      first = std::move(unnamed.front());
+      return BeyondSearch{std::move(*rest), std::move(told)};
+    }
+    if (unit.size() == 1) {
+      hold_both(first, fitted, std::exp(rivals->log_odds));
+    }
+  } else if (unit.size() == 1) {
+    hold_both(first, rivals->search.fitted(), std::exp(rivals->log_odds));
   }
-  const discovery::Discovery fitted = rivals->search.fitted();
-  discovery::Discovery told = rivals->search.told();
-  Diagnosis unnamed = discovery::without_names(d);
-  unnamed.unexplained = unnamed.mismatch = true;
-  const discovery::DiagnosedRecording recording{data, unnamed};
-  auto rest = discovery::UnexplainedRest::of({&recording, 1}, of_laws.stop);
-  if (!rest || told.laws.empty() || !explains(&told)) {
-    hold_both(d, fitted, std::exp(rivals->log_odds));
-    return std::nullopt;
-  }
-  d = std::move(unnamed);
-  return BeyondSearch{std::move(*rest), std::move(told)};
+  return std::nullopt;
 }
 
 }  // namespace
@@ -69,10 +78,8 @@ std::optional<BeyondSearch> laws_in_their_place(const ImuData& data, Diagnosis& 
 tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
     std::span<const discovery::DiagnosedRecording> unit, const diagnosis::DiagnosisOptions& of_catalogue,
     const discovery::DiscoveryOptions& of_laws, Diagnosis& first, Search when, const discovery::Progress& progress) {
-  if (unit.size() == 1 && discovery::names_stand_alone(first)) {
-    if (auto laws = laws_in_their_place(unit.front().data, first, of_laws, progress)) {
-      return laws;
-    }
+  if (auto laws = laws_in_their_place(unit, first, of_laws, progress)) {
+    return laws;
   }
   const bool due = unit.size() > 1 || first.unexplained || may_be_a_law(first);
   if (when == Search::where_due && !due) {

@@ -117,11 +117,14 @@ std::string laws_instead_words(const diagnosis::LawsInstead& instead) {
   return fmt::format("{}", fmt::join(all, " and "));
 }
 
-// Laws in the place of what is named, where their odds are worth a word in the verdict.
-std::string or_laws(const Diagnosis& d) {
+// Whether the odds of laws in the place of what is named are worth a word in the verdict, and an experiment.
+bool doubtful(const Diagnosis& d) {
   constexpr double worth_a_word = 0.1;
-  return d.instead && d.instead->odds > worth_a_word ? fmt::format("; or that {}", laws_instead_words(*d.instead))
-                                                     : std::string();
+  return d.instead && d.instead->odds > worth_a_word;
+}
+
+std::string or_laws(const Diagnosis& d) {
+  return doubtful(d) ? fmt::format("; or that {}", laws_instead_words(*d.instead)) : std::string();
 }
 
 // With the equations that the names leave, or with the word that they leave something.
@@ -423,8 +426,9 @@ Summary summary_of(const Diagnosis& d, const Subject& subject, const discovery::
               {}};
     case DiagnosisVerdict::named:
       return {SummaryStanding::bad, fmt::format("The model leaves out: {}.", named(d, beyond)), named_cause(d, beyond),
-              subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
-                              : command("diagnose", subject, "--amended amended")};
+              doubtful(d)       ? command("diagnose", subject, "--next-experiment next.toml")
+              : subject.run > 0 ? fmt::format("selfcal amend {}", subject.run)
+                                : command("diagnose", subject, "--amended amended")};
     case DiagnosisVerdict::none_of_the_above: return summary_beyond(d, subject, beyond);
     case DiagnosisVerdict::not_enough_information:
       return {SummaryStanding::open, "Recording and model may differ, but too little to say by what.",

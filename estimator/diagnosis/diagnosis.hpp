@@ -81,6 +81,7 @@ struct ModelEffect {
 // Laws that explain the recording in the place of the names of sensors (discovery/laws_for_names.hpp).
 struct LawsInstead {
   struct Law {
+    int place = 0;  // of the axis: gyro x, y, z, accelerometer x, y, z
     std::string axis, expression;
     double coefficient = 0.0, sigma = 0.0;  // ug or deg/h
   };

@@ -65,13 +65,13 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
   const std::array<Elsewhere, 2> all = places();
   if (n > 1) {
     const Attitude as_it_stands = like.calibration.initial_attitude;
-    result.here = planned_information(all.front().plan, like, as_it_stands, terms, stop);
+    result.here = planned_information(all.front().plan, like, as_it_stands, {terms}, stop);
   }
   for (const Elsewhere& one : all) {
     Attitude vehicle = like.calibration.initial_attitude;
     vehicle.roll += one.roll;
     vehicle.pitch += one.pitch;
-    const Eigen::MatrixXd G = planned_information(one.plan, like, vehicle, terms, stop);
+    const Eigen::MatrixXd G = planned_information(one.plan, like, vehicle, {terms}, stop);
     result.information += G;
     for (std::size_t a = 0; a < n; ++a) {
       for (std::size_t b = 0; b < n; ++b) {

@@ -89,6 +89,94 @@ Members members_of(const DiscoveredLaw& law) {
 
 }  // namespace
 
+namespace {
+
+// Laws against the effects in whose place they stand, each as it was fitted.
+struct AgainstNames {
+  PlannedColumns columns;
+  Eigen::VectorXd laws, effects;  // sizes, as the columns have them
+  double log_odds = 0.0;          // of the laws
+
+  // Square of what the other one leaves, fitted in its place.
+  double left_of_laws(const Eigen::MatrixXd& G) const { return left(G, laws, 0, effects.size(), laws.size()); }
+  double left_of_effects(const Eigen::MatrixXd& G) const { return left(G, effects, laws.size(), laws.size(), 0); }
+  // The probability that what is not true is excluded, by a rotation of so much more information.
+  double told(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with) const {
+    const double true_laws = 1.0 / (1.0 + std::exp(-log_odds));
+    return true_laws * beyond(left_of_laws(with) - left_of_laws(now), log_odds) +
+           (1.0 - true_laws) * beyond(left_of_effects(with) - left_of_effects(now), -log_odds);
+  }
+
+ private:
+  static double left(const Eigen::MatrixXd& G, const Eigen::VectorXd& size, Eigen::Index at, Eigen::Index others,
+                     Eigen::Index of_others) {
+    const Eigen::Index n = size.size();
+    const Eigen::MatrixXd cross = G.block(of_others, at, others, n);
+    Eigen::MatrixXd inner = G.block(of_others, of_others, others, others);
+    inner.diagonal() *= 1.0 + 1e-9;  // a column that the rotation does not show takes up nothing
+    inner.diagonal().array() += 1e-12;
+    const Eigen::VectorXd shown = cross * size;
+    return std::max(0.0, size.dot(G.block(at, at, n, n) * size) - shown.dot(inner.ldlt().solve(shown)));
+  }
+  static double beyond(double more, double log_odds) {
+    const double wanted = -log_odds - std::log(least_odds);
+    return more > 0.0 ? 0.5 * std::erfc((wanted - 0.5 * more) / std::sqrt(2.0 * more)) : wanted < 0.0 ? 1.0 : 0.0;
+  }
+};
+
+// None where an effect or a law follows the temperature: nobody knows that of a rotation that was not made.
+std::optional<AgainstNames> against_names(const diagnosis::Diagnosis& d) {
+  AgainstNames a;
+  std::vector<double> laws, effects;
+  for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
+    auto expression = laws::Expression::parse(law.expression);
+    if (!expression || needs_temperature(*expression)) {
+      return std::nullopt;
+    }
+    a.columns.laws.push_back({law.place, std::move(*expression), {}});
+    laws.push_back(law.coefficient);
+  }
+  for (const diagnosis::ModelEffect& m : d.model) {
+    if (m.effect->temperature == diagnosis::TemperatureUse::measured) {
+      return std::nullopt;
+    }
+    if (m.effect->sensor != nullptr) {
+      a.columns.effects.push_back({m.effect, m.constant, m.size, false});
+      effects.insert(effects.end(), m.size.begin(), m.size.end());
+    }
+  }
+  a.laws = Eigen::Map<const Eigen::VectorXd>(laws.data(), static_cast<Eigen::Index>(laws.size()));
+  a.effects = Eigen::Map<const Eigen::VectorXd>(effects.data(), static_cast<Eigen::Index>(effects.size()));
+  a.log_odds = std::log(d.instead->odds);
+  return a;
+}
+
+}  // namespace
+
+std::optional<NextExperiment> plan_against_names(const UnitRecording& recording, const diagnosis::Diagnosis& d,
+                                                 const ExperimentLimits& limits, const std::stop_token& stop) {
+  if (!d.instead) {
+    return std::nullopt;
+  }
+  const auto members = against_names(d);
+  if (!members) {
+    return std::nullopt;
+  }
+  const Eigen::MatrixXd now = information_of(
+      recording.data, diagnosis::forward_pass(recording.data, recording.calibration), members->columns, stop);
+  const auto with = [&](const Schedule& plan) -> Eigen::MatrixXd {
+    return now + planned_information(plan, recording, recording.calibration.initial_attitude, members->columns, stop);
+  };
+  const RatedPlan best = search_plan(
+      limits, 0.0, [&](const Schedule& plan) { return members->told(now, with(plan)); }, stop);
+  if (best.plan.positions.empty() || best.merit < least_help) {
+    return std::nullopt;
+  }
+  const double before = members->left_of_laws(now), after = members->left_of_laws(with(best.plan));
+  return NextExperiment{best.plan, std::sqrt(before), std::sqrt(after), 0.5 * after,
+                        members->columns.effects.front().effect->id};
+}
+
 std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> recordings, const DiscoveredLaw& law,
                                               const ExperimentLimits& limits, const std::stop_token& stop) {
   Members members = members_of(law);
@@ -98,7 +186,7 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
   }
   Eigen::MatrixXd now = Eigen::MatrixXd::Zero(count, count);
   for (const UnitRecording& r : recordings) {
-    now += information_of(r.data, diagnosis::forward_pass(r.data, r.calibration), members.terms, stop);
+    now += information_of(r.data, diagnosis::forward_pass(r.data, r.calibration), {members.terms}, stop);
   }
   // What explains the recordings as well has the size that makes it as large on them.
   members.size_squared = (law.coefficient * law.coefficient * now(0, 0)) *
@@ -106,7 +194,7 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
   const UnitRecording& last = recordings.back();
   const double told_now = told_apart(now, now, members);
   const auto with = [&](const Schedule& plan) -> Eigen::MatrixXd {
-    return now + planned_information(plan, last, last.calibration.initial_attitude, members.terms, stop);
+    return now + planned_information(plan, last, last.calibration.initial_attitude, {members.terms}, stop);
   };
   RatedPlan best = search_plan(
       limits, told_now, [&](const Schedule& plan) { return told_apart(now, with(plan), members); }, stop);

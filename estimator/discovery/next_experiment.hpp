@@ -24,11 +24,16 @@ struct NextExperiment {
       0.0;  // sigma, of the rival that stands behind most of what the plan tells, on the recordings alone
   double separation = 0.0;  // with the planned one
   double log_odds = 0.0;    // expected, of the law against that rival
-  std::string closest;      // that rival
+  std::string closest;      // that rival, an equation or an effect of the catalogue
 };
 
 // The plan that tells most apart, given the recordings that there are. None where the class has one member, or no plan helps. The base stands as in the last recording.
 std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> recordings, const DiscoveredLaw& law,
                                               const ExperimentLimits& limits, const std::stop_token& stop = {});
+
+// The plan that most probably excludes what is not true: the names of the diagnosis, or the laws that explain the recording in their place
+// (Diagnosis::instead). None where there are none, where something follows the temperature, or where no plan helps.
+std::optional<NextExperiment> plan_against_names(const UnitRecording& recording, const diagnosis::Diagnosis& diagnosis,
+                                                 const ExperimentLimits& limits, const std::stop_token& stop = {});
 
 }  // namespace selfcal::discovery

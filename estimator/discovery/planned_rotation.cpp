@@ -49,22 +49,24 @@ bool needs_temperature(const laws::Expression& expression) {
          expression.variables().test(static_cast<std::size_t>(laws::Variable::dT));
 }
 
-Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const std::vector<LawTerm>& terms,
+Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const PlannedColumns& columns,
                                const std::stop_token& stop) {
   const diagnosis::RecordingContext context(data);
   const LawMotion motion(context);
   const NodeTable table = collect_nodes(motion, input);
-  LawColumns columns(motion, table, terms, false);
-  return run_columns(input, trace_pass(input, stop), columns, stop).information;
+  LawColumns laws(motion, table, columns.laws, false);
+  EffectColumns effects(context, columns.effects);
+  TwoSources both(laws, effects);
+  return run_columns(input, trace_pass(input, stop), both, stop).information;
 }
 
 Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,
-                                    const std::vector<LawTerm>& terms, const std::stop_token& stop) {
+                                    const PlannedColumns& columns, const std::stop_token& stop) {
   const diagnosis::IdealRecording ideal(plan, vehicle, like.data.site, planning_rate_hz);
   PassInput input = diagnosis::forward_pass(ideal.data(), like.calibration);
   input.parameters.setZero();
   input.C_nb = ideal.C_nb_start();
-  return information_of(ideal.data(), input, terms, stop);
+  return information_of(ideal.data(), input, columns, stop);
 }
 
 }  // namespace selfcal::discovery

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/discovery/discovery.hpp"
+#include "estimator/discovery/effect_columns.hpp"
 #include "estimator/geometry/schedule.hpp"
 
 namespace selfcal::discovery {
@@ -28,11 +29,17 @@ Schedule walk_over_positions(const ExperimentLimits& limits, double dwell_s, uns
 // Nobody knows the temperature of a rotation that was not made.
 bool needs_temperature(const laws::Expression& expression);
 
-// Information of the laws' coefficients, per unit_of(axis), the 33 states projected out. [terms x terms]
-Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const std::vector<LawTerm>& terms,
+// What has columns on a rotation: the laws, per unit_of(axis), and behind them the effects' coefficients, per typical size.
+struct PlannedColumns {
+  std::vector<LawTerm> laws;
+  std::vector<EffectTerm> effects = {};
+};
+
+// Information of the columns, the 33 states projected out. [columns x columns]
+Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const PlannedColumns& columns,
                                const std::stop_token& stop = {});
 // The same on a plan, with the unit, the site and the noise of `like` and the vehicle in this attitude.
 Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,
-                                    const std::vector<LawTerm>& terms, const std::stop_token& stop = {});
+                                    const PlannedColumns& columns, const std::stop_token& stop = {});
 
 }  // namespace selfcal::discovery

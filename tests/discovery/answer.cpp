@@ -126,6 +126,12 @@ DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
     for (const auto& finding : diagnosis->findings) {
       answer.words["names"].push_back(finding.effect);
     }
+    if (diagnosis->instead) {
+      answer.words["instead"] = {{"odds", diagnosis->instead->odds}, {"laws", ordered_json::array()}};
+      for (const auto& law : diagnosis->instead->laws) {
+        answer.words["instead"]["laws"].push_back({{"axis", law.axis}, {"expression", law.expression}});
+      }
+    }
   }
   return answer;
 }

@@ -73,9 +73,11 @@ Expected<void> try_them(const std::string& file, const LawsToTry& laws, const di
   return {};
 }
 
+// `first`: of the recording that `data` is.
 Expected<void> plan_and_write(const std::string& file, std::span<const discovery::UnitRecording> unit,
-                              BeyondCatalogue& result) {
-  result.next = plan_next(unit, *result.found, {});
+                              const ImuData& data, const diagnosis::Diagnosis& first, BeyondCatalogue& result) {
+  result.next = first.instead && !file.empty() ? discovery::plan_against_names({data, first.calibration}, first, {})
+                                               : plan_next(unit, *result.found, {});
   if (file.empty()) {
     return {};
   }
@@ -175,7 +177,9 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
   if (recordings.size() > 1) {
     result.together = put_together(recordings, search->rest, *result.joint);
   }
-  if (const auto planned = plan_and_write(arguments.next_experiment, search->rest.recordings(), result); !planned) {
+  if (const auto planned =
+          plan_and_write(arguments.next_experiment, search->rest.recordings(), recordings.front().data, first, result);
+      !planned) {
     return tl::unexpected(planned.error());
   }
   if (search->said_by_catalogue) {
