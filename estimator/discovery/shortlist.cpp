@@ -149,12 +149,12 @@ std::vector<Candidate> Shortlist::values_of_wave(const PieceModel& model, const 
   return values;
 }
 
-// Up to its neighbours, which are evenly apart in frequency: beyond them lie other peaks.
+// Up to its neighbours, which are evenly apart in frequency: no period is left out, and beyond them lie other peaks. Beyond the longest
+// a wave is a parabola.
 std::pair<double, double> Shortlist::periods_about(const Function& wave) const {
-  constexpr double least = 0.85, most = 1.18;
-  const double part = wave.constant / longest_of(wave.kernel);
-  return {wave.constant * std::max(least, 1.0 / (1.0 + part)),
-          wave.constant * (part < 1.0 ? std::min(most, 1.0 / (1.0 - part)) : most)};
+  constexpr double beyond_longest = 1.18;
+  const double part = wave.constant / longest_of(wave.kernel);  // of its frequency, to a neighbour
+  return {wave.constant / (1.0 + part), wave.constant * (part < 1.0 ? 1.0 / (1.0 - part) : beyond_longest)};
 }
 
 Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) const {

@@ -1,4 +1,4 @@
-// Periods of a wave that fit alike, where the pieces are measured one by one, each with the same sigma.
+// Periods of a wave that are found, and that fit alike, where the pieces are measured one by one, each with the same sigma.
 #include "estimator/discovery/shortlist.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr double piece_s = 30.0, duration_h = pieces * piece_s / 3600.0, period_
 
 // A wave over the time times wx on the first axis, its square `gain`; wx is 1 in the pieces that are `seen` and 0 elsewhere.
 template <typename F>
-PieceSums wave_where(F&& seen, double gain) {
+PieceSums wave_where(F&& seen, double gain, double period = period_h) {
   PieceSums sums;
   sums.channels = laws::Channels::Zero(pieces, static_cast<Eigen::Index>(laws::variable_count));
   sums.piece_dt = Eigen::VectorXd::Constant(pieces, piece_s);
@@ -30,8 +30,7 @@ PieceSums wave_where(F&& seen, double gain) {
     sums.nodes.push_back({time_s, piece_s});
     sums.piece_of.push_back(k);
     sums.pieces.push_back({piece_s * k, piece_s * (k + 1), k / 5, false});
-    sums.sums.score(k * axis_count) =
-        seen(k) ? std::sin(2.0 * std::numbers::pi * time_s / 3600.0 / period_h + 0.4) : 0.0;
+    sums.sums.score(k * axis_count) = seen(k) ? std::sin(2.0 * std::numbers::pi * time_s / 3600.0 / period + 0.4) : 0.0;
   }
   sums.sums.score *= std::sqrt(gain) / sums.sums.score.norm();
   sums.sums.square = gain;
@@ -81,6 +80,26 @@ TEST(ValuesOfAWave, SeenInFourPiecesManyFitAlike) {
   const Values v = values(wave_where([](int k) { return k % 5 == 0 && k >= 40 && k < 60; }, 900.0),
                           "sin(2*pi*t/?+?)*wx", {period_h, 0.4});
   EXPECT_GT(v.alike(), 8);
+}
+
+// The grid is half a period of resolution apart: each period lies between two of it, and the refinement reaches it. What is left of a wave
+// of 30 sigma is less than one: 0.1 % of its square.
+TEST(BestOfAWave, EveryPeriodIsFound) {
+  laws::VariableSet available;
+  available.set(static_cast<std::size_t>(laws::Variable::t));
+  available.set(static_cast<std::size_t>(laws::Variable::wx));
+  constexpr double gain = 900.0, step = 1.05;
+  for (double period = 0.1 * duration_h; period < 1.9 * duration_h; period *= step) {
+    const PieceSums sums = wave_where([](int /*k*/) { return true; }, gain, period);
+    const Dictionary dictionary = make_dictionary(sums, available);
+    const PieceModel model(sums, dictionary);
+    double found = 0.0;
+    for (const Candidate& c : Shortlist(sums, dictionary).best(model, 40)) {
+      const bool wave = c.term.axis == 0 && c.term.expression.text() == "sin(2*pi*t/?+?)*wx";
+      found = std::max(found, wave ? c.gain : 0.0);
+    }
+    EXPECT_GT(found, gain - 1.0) << "period " << period / duration_h << " of the recording";
+  }
 }
 
 TEST(ValuesOfAWave, NoneOfWhatIsNoWave) {
