@@ -217,8 +217,14 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
   if (!beyond) {
     return tl::unexpected(beyond.error());
   }
+  std::optional<discovery::NextExperiment> next;
+  if (doubtful(diagnosis)) {
+    discovery::ExperimentLimits limits;
+    limits.rotation_s = request.config.rotation_s;
+    next = discovery::plan_against_names({taken.front()->data, diagnosis.calibration}, diagnosis, limits, stop);
+  }
   diagnosis.calibration.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  Estimate estimate = amended_estimate(diagnosis, request, taken.front()->loaded.recording, std::move(*beyond));
+  Estimate estimate = amended_estimate(diagnosis, request, taken.front()->loaded.recording, std::move(*beyond), next);
   estimate.warnings = taken.front()->loaded.warnings;
   return estimate;
 }
@@ -226,7 +232,8 @@ Expected<Estimate> run_amendment(const AmendmentRequest& request, const Estimate
 }  // namespace
 
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording, std::optional<BeyondAnswer> beyond) {
+                          const Recording& recording, std::optional<BeyondAnswer> beyond,
+                          const std::optional<discovery::NextExperiment>& next) {
   const CalibrationOptions options = calibration_options(request.config);
   const discovery::Discovery* found = beyond ? &beyond->found : nullptr;
   Estimate estimate;
@@ -242,6 +249,10 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
   for (const diagnosis::Finding& finding : diagnosis.findings) {
     estimate.notes.push_back(story(finding));
   }
+  if (diagnosis.instead) {
+    estimate.notes.push_back(
+        fmt::format("in its place {} (odds {:.2g})", laws_words(*diagnosis.instead), diagnosis.instead->odds));
+  }
   if (explains(found)) {
     estimate.notes.push_back(discovered_figures(*found));
   }
@@ -254,9 +265,7 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
     document["together"] = together_json(*beyond->together);
     document["fitted_effects"] = fitted_effects_json(*beyond->joint);
   }
-  if (beyond) {
-    add_next_experiment(document, beyond->next);
-  }
+  add_next_experiment(document, beyond ? beyond->next : next);
   estimate.result_json = document.dump();
   return estimate;
 }

@@ -42,8 +42,10 @@ struct BeyondAnswer {
 // "diagnosis" (as `selfcal diagnose --json`), "together" and "next_experiment".
 EstimateJob amendment_job(AmendmentRequest request);
 
-// The same without files: what an amendment may not be written for comes first among the objections.
+// The same without files: what an amendment may not be written for comes first among the objections. `next`: the experiment where laws may
+// stand in the place of what is named (doubtful()).
 Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const AmendmentRequest& request,
-                          const Recording& recording, std::optional<BeyondAnswer> beyond = std::nullopt);
+                          const Recording& recording, std::optional<BeyondAnswer> beyond = std::nullopt,
+                          const std::optional<discovery::NextExperiment>& next = std::nullopt);
 
 }  // namespace selfcal

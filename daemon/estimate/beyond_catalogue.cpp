@@ -225,6 +225,16 @@ std::string instead_words(const discovery::OtherExplanation& instead) {
   return fmt::format("in place of all that {} (odds {:.2g})", first_of(std::move(all), " and ", " "), instead.odds);
 }
 
+std::string laws_words(const diagnosis::LawsInstead& instead) {
+  std::vector<std::string> all;
+  for (const diagnosis::LawsInstead::Law& law : instead.laws) {
+    all.push_back(fmt::format("{} follows {}", law.axis, law.expression));
+  }
+  return first_of(std::move(all), " and ", " ");
+}
+
+bool doubtful(const diagnosis::Diagnosis& d) { return d.instead && d.instead->odds > worth_a_word; }
+
 const char* beyond_what(const Discovery& found) {
   const bool known =
       std::any_of(found.laws.begin(), found.laws.end(), [](const DiscoveredLaw& law) { return !law.effect.empty(); });

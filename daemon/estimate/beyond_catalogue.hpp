@@ -39,6 +39,10 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::
 std::string discovered_words(const discovery::Discovery& found);
 // "in place of all that gyro_z has a bias that walks at random (odds 0.05)"
 std::string instead_words(const discovery::OtherExplanation& instead);
+// "gyro_x follows sin(outer)*fx**2 and gyro_y follows t"
+std::string laws_words(const diagnosis::LawsInstead& instead);
+// Whether laws in the place of what is named have odds that are worth a word in the verdict, and an experiment.
+bool doubtful(const diagnosis::Diagnosis& diagnosis);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"
 std::string discovered_figures(const discovery::Discovery& found);
 // The same without what they make of NIS.

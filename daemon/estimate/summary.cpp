@@ -109,22 +109,9 @@ std::vector<std::string> kinds_of(const Diagnosis& d) {
   return words;
 }
 
-std::string laws_instead_words(const diagnosis::LawsInstead& instead) {
-  std::vector<std::string> all;
-  for (const diagnosis::LawsInstead::Law& law : instead.laws) {
-    all.push_back(fmt::format("{} follows {}", law.axis, law.expression));
-  }
-  return fmt::format("{}", fmt::join(all, " and "));
-}
-
-// Whether the odds of laws in the place of what is named are worth a word in the verdict, and an experiment.
-bool doubtful(const Diagnosis& d) {
-  constexpr double worth_a_word = 0.1;
-  return d.instead && d.instead->odds > worth_a_word;
-}
-
+// Laws in the place of what is named.
 std::string or_laws(const Diagnosis& d) {
-  return doubtful(d) ? fmt::format("; or that {}", laws_instead_words(*d.instead)) : std::string();
+  return doubtful(d) ? fmt::format("; or that {}", laws_words(*d.instead)) : std::string();
 }
 
 // With the equations that the names leave, or with the word that they leave something.
@@ -158,7 +145,7 @@ std::string named_cause(const Diagnosis& d, const discovery::Discovery* beyond) 
     text += fmt::format("; {:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
   }
   if (d.instead) {
-    text += fmt::format("; in its place {} (odds {:.2g})", laws_instead_words(*d.instead), d.instead->odds);
+    text += fmt::format("; in its place {} (odds {:.2g})", laws_words(*d.instead), d.instead->odds);
   }
   return text + ".";
 }

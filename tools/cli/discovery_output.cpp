@@ -304,7 +304,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
   for (const discovery::DiscoveredProcess& p : found.processes) {
     const bool walk = p.kind == discovery::ProcessKind::random_walk;
     text += fmt::format("  {}: a random process, {}: {}{}\n", name_of_axis(p.axis), discovery::name_of(p.kind),
-                        with_sigma(p.size, p.sigma, unit_of_axis(p.axis)), walk ? "/sqrt(h)" : " (1 sigma)");
+                        with_sigma(p.size, p.sigma, unit_of_axis(p.axis)), walk ? "/sqrt(h)" : " (standard deviation)");
   }
   if (found.instead) {
     text += "  or " + instead_words(*found.instead) + "\n";

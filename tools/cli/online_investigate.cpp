@@ -79,8 +79,16 @@ struct Analysis {
     }
     return count;
   }
-  // One equation in each class.
-  bool settled() const { return others() == 0; }
+  // Laws in the place of what is named, with odds that ask for an experiment; null: none.
+  const ordered_json& instead() const {
+    constexpr double worth_an_experiment = 0.1;
+    static const ordered_json none;
+    const auto found = result().at("diagnosis").find("instead_of_names");
+    const bool there = found != result().at("diagnosis").end() && found->at("odds").get<double>() > worth_an_experiment;
+    return there ? *found : none;
+  }
+  // One equation in each class, and no name in doubt.
+  bool settled() const { return others() == 0 && instead().is_null(); }
   // Whether another attitude of the base would part what no rotation of the gimbal does.
   bool on_this_base_only() const {
     return std::any_of(laws().begin(), laws().end(), [](const ordered_json& law) { return !here_only(law).empty(); });
@@ -211,6 +219,9 @@ class Investigation {
              : a.on_this_base_only() ? "one equation is left as long as the base stands as it does"
                                      : "one equation is left";
     }
+    if (!a.next && !a.instead().is_null()) {
+      return "no further rotation would tell what is named from the equation that may stand in its place";
+    }
     if (!a.next) {
       return a.settled()
                  ? "no further rotation would tell more"
@@ -269,6 +280,15 @@ class Investigation {
     }
     if (!unsure.empty()) {
       step["unsure"] = unsure;
+    }
+    if (!a.instead().is_null()) {
+      for (const ordered_json& law : a.instead().at("laws")) {
+        say(fmt::format("   or in its place {} = ({:.4g} +- {:.2g} {}) * {}, odds {:.2g}\n",
+                        law.at("axis").get<std::string>(), law.at("coefficient").get<double>(),
+                        law.at("sigma").get<double>(), law.at("unit").get<std::string>(),
+                        law.at("expression").get<std::string>(), a.instead().at("odds").get<double>()));
+      }
+      step["instead_of_names"] = a.instead();
     }
     if (a.next && !(a.acceptable() && a.settled())) {
       const ordered_json& next = a.result().at("next_experiment");
