@@ -150,7 +150,7 @@ void Diagnoser::name() {
     std::vector<VibrationLine> lines;
     CorrectedRecording quiet = quiet_dwells(lines);
     PassInput without_lines = forward_pass(quiet.data(), d_.calibration);
-    beats_ = fit_velocity_noise(without_lines, d_.noise, find_segments(data_));
+    beats_ = fit_velocity_noise_and_point(without_lines, d_.noise, find_segments(data_));
     if (beats_) {
       if (!without_lines.noise.shaken.empty()) {
         d_.loudest = loudest_of(without_lines.noise.shaken);

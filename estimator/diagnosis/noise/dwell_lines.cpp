@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/noise/dwell_lines.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -119,6 +120,26 @@ std::vector<Line> steady_ones(const Eigen::VectorXd& rate, const std::vector<Lin
   return kept;
 }
 
+// [n x 3] What the base's tilt changes the specific force by, as the gyros turn gravity: -phi x f, phi their angle less its mean rate. A base
+// that tilts to and fro once in a dwell has a peak in each half too. Of the second order: 5 ug of 10 arcmin.
+Eigen::MatrixX3d force_of_tilt(const ImuData& data, const Segment& s) {
+  Vector3 turn = Vector3::Zero(), velocity = Vector3::Zero();
+  for (std::size_t i = s.first; i < s.last; ++i) {
+    turn += Vector3(data.delta_theta[i].data());
+    velocity += Vector3(data.delta_v[i].data());
+  }
+  const auto n = static_cast<Eigen::Index>(s.last - s.first);
+  const Vector3 mean = turn / static_cast<double>(n), force = velocity * data.sample_rate_hz / static_cast<double>(n);
+  Eigen::MatrixX3d tilt(n, 3);
+  Vector3 phi = Vector3::Zero();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vector3 step = Vector3(data.delta_theta[s.first + static_cast<std::size_t>(i)].data()) - mean;
+    tilt.row(i) = force.cross(phi + 0.5 * step).transpose();
+    phi += step;
+  }
+  return tilt;
+}
+
 void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, double resolution_hz) {
   const auto same = std::find_if(all.begin(), all.end(), [&](const VibrationLine& l) {
     return l.axis == line.axis && std::abs(l.frequency_hz - line.frequency_hz) < resolution_hz;
@@ -141,6 +162,7 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
     if (s.rotation || length < least_dwell_s) {
       continue;
     }
+    const Eigen::MatrixX3d tilt = force_of_tilt(data, s);
     const double searched = 6.0 * static_cast<double>(segments.size()) * highest_hz * length;
     for (int axis = 0; axis < 6; ++axis) {
       AngleVelocity& increments = axis < 3 ? delta_theta : delta_v;
@@ -148,6 +170,9 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
       Eigen::VectorXd rate(static_cast<Eigen::Index>(s.last - s.first));
       for (Eigen::Index i = 0; i < rate.size(); ++i) {
         rate(i) = increments[s.first + static_cast<std::size_t>(i)][k] * fs;
+      }
+      if (axis >= 3) {
+        rate -= tilt.col(axis - 3);
       }
       const std::vector<Line> lines = steady_ones(rate, peaks(rate, fs, searched), fs);
       if (lines.empty()) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/noise/loudness.hpp"
+#include "estimator/diagnosis/regression/linear_model.hpp"
 #include "estimator/statistics/climb.hpp"
 
 namespace selfcal::diagnosis {
@@ -127,6 +128,29 @@ bool fit_velocity_noise(PassInput& input, const NoiseCheck& check, const std::ve
     return false;
   }
   input.noise = best.noise;
+  return true;
+}
+
+bool fit_velocity_noise_and_point(PassInput& input, const NoiseCheck& check, const std::vector<Segment>& segments) {
+  constexpr int most_rounds = 3;
+  constexpr double little = 2.0;  // of the log-likelihood
+  const NoiseModel given = input.noise;
+  if (!fit_velocity_noise(input, check, segments)) {
+    return false;
+  }
+  for (int round = 0; round < most_rounds; ++round) {
+    PassInput moved = input;
+    moved.held = false;
+    settle(moved);
+    if (run_pass(moved).log_likelihood < run_pass(input).log_likelihood + little) {
+      break;
+    }
+    input = moved;
+    moved.noise = given;
+    if (fit_velocity_noise(moved, check, segments)) {
+      input.noise = moved.noise;
+    }
+  }
   return true;
 }
 

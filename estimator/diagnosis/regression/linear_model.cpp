@@ -23,18 +23,23 @@ PassInput OperatingPoint::pass(const NoiseModel& noise) const {
   return about;
 }
 
+void settle(PassInput& input) {
+  if (input.held) {
+    return;
+  }
+  for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
+    input.sign = sign;
+    const PassOutput out = run_pass(input);
+    input.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
+    input.C_nb = out.C_nb;
+  }
+  input.sign = +1.0;
+}
+
 OperatingPoint settle(const RecordingContext& context, const OperatingPoint& from, const Hypothesis& hypothesis) {
   OperatingPoint point{from.input, CorrectedRecording(context, from.input, hypothesis.correction())};
-  if (from.input.held) {
-    return point;
-  }
   PassInput about = point.pass(hypothesis.noise);
-  for (const double sign : {+1.0, -1.0, +1.0, -1.0}) {
-    about.sign = sign;
-    const PassOutput out = run_pass(about);
-    about.parameters += out.mean.segment<sensor_parameter_count>(out.layout.parameters());
-    about.C_nb = out.C_nb;
-  }
+  settle(about);
   point.input.parameters = about.parameters;
   point.input.C_nb = about.C_nb;
   return point;

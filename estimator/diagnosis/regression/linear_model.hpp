@@ -17,6 +17,10 @@ struct OperatingPoint {
   PassInput pass(const NoiseModel& noise) const;  // a forward pass; the point must outlive it
 };
 
+// Moves the linearisation (parameters and attitude at the start) of a forward pass to where passes there and back in its own noise end, two of
+// each; not one that is held.
+void settle(PassInput& input);
+
 // The point that the 24 settle at with the hypothesis' terms taken out of the context's recording.
 OperatingPoint settle(const RecordingContext& context, const OperatingPoint& from, const Hypothesis& hypothesis);
 
