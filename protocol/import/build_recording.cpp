@@ -140,6 +140,7 @@ void set_gimbal(const GimbalMap& map, const Places& places, const ColumnData& da
   const std::array<double, 2> fixed = map.fixed_deg.value_or(std::array<double, 2>{});
   recording.gimbal_outer_rad.assign(data.rows, fixed[0] * units::degree);
   recording.gimbal_inner_rad.assign(data.rows, fixed[1] * units::degree);
+  recording.gimbal_absent = map.absent;
   imported.notes.push_back(
       map.absent ? std::string("no gimbal: its read-outs are written as 0, which say nothing")
                  : fmt::format("gimbal read-outs are written as {} and {} deg throughout", fixed[0], fixed[1]));

@@ -197,6 +197,10 @@ bool stands_still(const std::vector<double>& angle) {
 }
 
 Expected<std::optional<std::string>> check_gimbal(const Recording& recording, const CheckPolicy& policy) {
+  const bool still = stands_still(recording.gimbal_outer_rad) && stands_still(recording.gimbal_inner_rad);
+  if (recording.gimbal_absent && still && !policy.gimbal_contradiction_is_error) {
+    return std::optional<std::string>{};  // who recorded it said so
+  }
   const auto found = find_gimbal_contradiction(recording);
   if (!found) {
     return std::optional<std::string>{};
@@ -209,7 +213,7 @@ Expected<std::optional<std::string>> check_gimbal(const Recording& recording, co
   if (policy.gimbal_contradiction_is_error) {
     return bad(words);
   }
-  if (stands_still(recording.gimbal_outer_rad) && stands_still(recording.gimbal_inner_rad)) {
+  if (still) {
     return std::optional<std::string>{fmt::format(
         "gimbal_outer_rad, gimbal_inner_rad: stand still in all rows while delta_theta_rad turns by {:.1f} deg in "
         "rows {} to {}: none were recorded, or a hand turned the sensor",

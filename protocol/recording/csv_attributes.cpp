@@ -91,6 +91,11 @@ Expected<Recording> parse_attributes(std::string_view toml, const std::string& n
   if (read && file->has("start_time_utc")) {
     read = keep(sound_text(*file, "start_time_utc"), recording.start_time_utc);
   }
+  std::string gimbal;
+  if (read && file->has("gimbal")) {
+    read = keep(sound_text(*file, "gimbal"), gimbal);
+  }
+  recording.gimbal_absent = gimbal == gimbal_absent_word;
   if (read && file->has("schedule_deg")) {
     read = keep(file->pairs("schedule_deg"), recording.schedule_deg);
   }
@@ -118,6 +123,9 @@ std::string format_attributes(const Recording& recording) {
   }
   if (!recording.start_time_utc.empty()) {
     text += fmt::format("start_time_utc = {}\n", toml_string(recording.start_time_utc));
+  }
+  if (recording.gimbal_absent) {
+    text += fmt::format("gimbal = {}\n", toml_string(gimbal_absent_word));
   }
   if (!recording.schedule_deg.empty()) {
     text += "# outer, inner\nschedule_deg = [\n";

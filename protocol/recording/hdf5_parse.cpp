@@ -187,6 +187,13 @@ Expected<void> Reader::read_attributes(Recording& recording) const {
     }
     recording.start_time_utc = std::move(*start);
   }
+  if (has_attribute("gimbal")) {
+    const Expected<std::string> gimbal = text("gimbal");
+    if (!gimbal) {
+      return tl::unexpected(gimbal.error());
+    }
+    recording.gimbal_absent = *gimbal == gimbal_absent_word;
+  }
   return {};
 }
 

@@ -64,7 +64,8 @@ bool write_attributes(hid_t file, const Recording& recording) {
          write_number(file, "height_m", recording.height_m) &&
          (!recording.dwell_s || write_number(file, "dwell_s", *recording.dwell_s)) &&
          (!recording.rotation_s || write_number(file, "rotation_s", *recording.rotation_s)) &&
-         (recording.start_time_utc.empty() || write_text(file, "start_time_utc", recording.start_time_utc));
+         (recording.start_time_utc.empty() || write_text(file, "start_time_utc", recording.start_time_utc)) &&
+         (!recording.gimbal_absent || write_text(file, "gimbal", std::string(gimbal_absent_word)));
 }
 
 bool write_origin(hid_t file, const TextAttributes& origin) {

@@ -17,6 +17,7 @@ struct Recording {
   std::optional<double> dwell_s;
   std::optional<double> rotation_s;
   std::string start_time_utc;  // ISO 8601, empty: unknown
+  bool gimbal_absent = false;  // said to have none: its read-outs are zeros and say nothing
 
   // N samples. time_s is the end of each sample's interval.
   std::vector<double> time_s;

@@ -18,6 +18,7 @@ void fields(Stream& stream, RecordingType& r) {
   stream.value(r.latitude_deg);
   stream.value(r.longitude_deg);
   stream.value(r.height_m);
+  stream.value(r.gimbal_absent);
   stream.value(r.dwell_s);
   stream.value(r.rotation_s);
   stream.value(r.temperature_channels);

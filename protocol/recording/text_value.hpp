@@ -9,6 +9,7 @@ namespace selfcal {
 
 inline constexpr std::string_view recording_format = "ins-selfcal-recording";
 inline constexpr int recording_version = 1;
+inline constexpr std::string_view gimbal_absent_word = "absent";
 
 // What is wrong with a text that is to be shown and stored: not UTF-8, a control character, or longer than 256
 // bytes. nullopt: nothing.

@@ -52,16 +52,10 @@ Expected<int> write_mapped(const import::ColumnSource& source, const import::Imp
                         {"source_sha256", *hash},
                         {"import_map", map_text},
                         {"import_notes", fmt::format("{}", fmt::join(imported->notes, "\n"))}};
-  if (map.gimbal.absent) {
-    origin.emplace_back("gimbal", "absent");
-  }
   if (const auto written = write_hdf5(recording, arguments.to, origin); !written) {
     return tl::unexpected(written.error());
   }
   for (const std::string& warning : *warnings) {
-    if (map.gimbal.absent && warning.starts_with("gimbal_")) {
-      continue;  // the map says so
-    }
     fmt::print(stderr, "selfcal import: warning: {}: {}\n", arguments.from, warning);
   }
   fmt::print("{}: {} samples at {} Hz, {:.6g} s\n", arguments.to, recording.size(), recording.sample_rate_hz,

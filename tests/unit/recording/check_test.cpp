@@ -18,6 +18,7 @@ using test::sample_recording;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -176,6 +177,21 @@ TEST_F(GimbalCheck, NoReadOutsAreNoneThatIsWrong) {
   ASSERT_TRUE(by_hand);
   EXPECT_THAT(*by_hand, ElementsAre(AllOf(HasSubstr("none were recorded, or a hand turned the sensor"),
                                           Not(HasSubstr("wrong")))));
+}
+
+// Who recorded it has said so: no word. Where they turn after all, and for an estimate, which needs them, it is what it was.
+TEST_F(GimbalCheck, ReadOutsThatAreSaidToBeAbsentAreNotMissed) {
+  const CheckPolicy lenient{.gimbal_contradiction_is_error = false};
+  r.gimbal_absent = true;
+  std::fill(r.gimbal_inner_rad.begin(), r.gimbal_inner_rad.end(), 0.0);
+  const auto outer_turns = check_recording(r, lenient);
+  ASSERT_TRUE(outer_turns);
+  EXPECT_THAT(*outer_turns, ElementsAre(HasSubstr("tells which of them is wrong")));
+  std::fill(r.gimbal_outer_rad.begin(), r.gimbal_outer_rad.end(), 0.0);
+  EXPECT_THAT(error_of(r), HasSubstr("read-outs turned 0.0 and 0.0 deg"));
+  const auto by_hand = check_recording(r, lenient);
+  ASSERT_TRUE(by_hand);
+  EXPECT_THAT(*by_hand, IsEmpty());
 }
 
 // A read-out that goes from 0.0 past zero to 359.4 deg has turned by -0.6.

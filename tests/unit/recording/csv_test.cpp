@@ -64,6 +64,15 @@ TEST_F(Csv, ReadsBackToTheSameBits) {
   EXPECT_EQ(read.schedule_deg, expected.schedule_deg);
 }
 
+TEST_F(Csv, ReadOutsThatAreNoneAreKeptSo) {
+  Recording recording = test::sample_recording();
+  recording.gimbal_absent = true;
+  ASSERT_TRUE(write_csv(recording, folder / "none.csv"));
+  const auto loaded = read_csv(folder / "none.csv");
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_TRUE(loaded->recording.gimbal_absent);
+}
+
 TEST_F(Csv, AcceptsCarriageReturnsOtherOrderAndExtraColumns) {
   std::string text;
   for (std::size_t at = 0; at < csv.size();) {

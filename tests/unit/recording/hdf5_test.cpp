@@ -26,6 +26,7 @@ TEST(Hdf5, ReadsBackToTheSameBits) {
   EXPECT_EQ(read.dwell_s, expected.dwell_s);
   EXPECT_EQ(read.rotation_s, expected.rotation_s);
   EXPECT_EQ(read.start_time_utc, expected.start_time_utc);
+  EXPECT_FALSE(read.gimbal_absent);
   EXPECT_EQ(read.time_s, expected.time_s);
   EXPECT_EQ(read.delta_theta_rad, expected.delta_theta_rad);
   EXPECT_EQ(read.delta_v_mps, expected.delta_v_mps);
@@ -45,12 +46,14 @@ TEST(Hdf5, WithoutTheOptionalParts) {
   recording.schedule_deg.clear();
   recording.temperature_c.clear();
   recording.temperature_channels = 0;
+  recording.gimbal_absent = true;
   ASSERT_TRUE(write_hdf5(recording, folder / "r.h5"));
   const auto loaded = read_hdf5(folder / "r.h5");
   ASSERT_TRUE(loaded) << loaded.error().message;
   EXPECT_FALSE(loaded->recording.dwell_s);
   EXPECT_TRUE(loaded->recording.schedule_deg.empty());
   EXPECT_EQ(loaded->recording.temperature_channels, 0U);
+  EXPECT_TRUE(loaded->recording.gimbal_absent);
 }
 
 TEST(Hdf5, WhatIsNoHdf5FileIsSaidSo) {
