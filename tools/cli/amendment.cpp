@@ -173,6 +173,26 @@ std::string tilt_text(std::string_view channel, const diagnosis::TiltSpectrum& t
   return text.empty() ? text : text + key_value("above_m", tilt.above_m);
 }
 
+// A phase of its own each, spread by the golden section: no two lines start alike.
+std::string line_text(const diagnosis::CoherentLine& line, double phase_deg) {
+  constexpr std::array<const char*, 6> names = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+  return fmt::format("\n[[effect]]\nid = \"vibration_line\"\n{} = {:.5g}\nfrequency_hz = {:.7g}\nphase = {:.4g}\n",
+                     names.at(static_cast<std::size_t>(line.axis)),
+                     line.amplitude / (line.axis < 3 ? units::degree_per_hour : units::micro_g), line.frequency_hz,
+                     phase_deg);
+}
+
+std::string lines_text(const std::vector<diagnosis::CoherentLine>& lines) {
+  constexpr double golden_deg = 222.4922359;
+  std::string text;
+  double phase_deg = 0.0;
+  for (const diagnosis::CoherentLine& line : lines) {
+    text += line_text(line, phase_deg);
+    phase_deg = std::fmod(phase_deg + golden_deg, 360.0);
+  }
+  return text;
+}
+
 std::string spectra_text(const diagnosis::NoiseSpectra& spectra) {
   constexpr std::array<const char*, 6> names = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
   std::string text;
@@ -206,7 +226,7 @@ std::string physics_text(const Diagnosis& d, const diagnosis::AssumedNoise& assu
       text += equation_text(f, d.mean_temperature_c, latitude);
     }
   }
-  return spectra ? text + spectra_text(*spectra) : text;
+  return spectra ? text + lines_text(spectra->lines) + spectra_text(*spectra) : text;
 }
 
 std::string sim_config_text(const Diagnosis& d, const diagnosis::AssumedNoise& assumed, const Recording& recording,

@@ -45,7 +45,8 @@ struct Overlay {
   bool agrees() const;
 };
 
-// The recording's and the simulation's innovations are those of the same noise: of `recording`'s calibration.
+// The recording's and the simulation's innovations are those of the same noise: of `recording`'s calibration, or where a coarse quantum
+// colours them as the diagnosis fits it, both about the point where passes in that noise end.
 Overlay lay_over(const ImuData& recording, const CalibrationResult& of_recording, const ImuData& simulation,
                  const CalibrationResult& of_simulation);
 

@@ -4,7 +4,11 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/diagnosis/noise/noise_check.hpp"
+#include "estimator/diagnosis/noise/velocity_noise.hpp"
+#include "estimator/diagnosis/regression/linear_model.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/models/segments.hpp"
 #include "estimator/passes/pass.hpp"
 #include "tools/report/overlay_bands.hpp"
 
@@ -53,6 +57,18 @@ Innovations innovations_of(const PassInput& input) {
     all.correlation[a] = correlations(all.value[a], 2 * most_lags);
   }
   return all;
+}
+
+// Beside a coarse quantum the noise that the diagnosis fits, and the point where passes in it end: about that of the calibration, tens of
+// mrad of heading away, a misfit of the second order stands in all lags. False: nothing turned, or no such quantum.
+bool in_noise_of_beats(PassInput& input) {
+  if (!diagnosis::turned(*input.data)) {
+    return false;
+  }
+  const std::vector<Segment> segments = find_segments(*input.data);
+  const diagnosis::NoiseCheck check = diagnosis::check_noise(*input.data, observed(segments, *input.data));
+  return diagnosis::colours_innovations(input, check) &&
+         diagnosis::fit_velocity_noise_and_point(input, check, segments);
 }
 
 // What chance makes of a correlation at lag k (Bartlett 1946), times n. `r`: those of both series, zero where chance makes them.
@@ -178,11 +194,18 @@ OverlayCurve histogram(const Innovations& a, const Innovations& b) {
 
 std::vector<OverlayCurve> overlay_innovations(const ImuData& recording, const CalibrationResult& of_recording,
                                               const ImuData& simulation, const CalibrationResult& of_simulation) {
-  const PassInput own = diagnosis::forward_pass(recording, of_recording);
+  PassInput own = diagnosis::forward_pass(recording, of_recording);
+  const bool of_beats = in_noise_of_beats(own);
   PassInput other = diagnosis::forward_pass(simulation, of_simulation);
   other.noise = own.noise;
-  other.noise.disturbed.clear();  // what shook the recording shakes no simulation
+  other.noise.shaken.clear();
   other.force = own.force;
+  if (of_beats) {
+    other.held = own.held;
+    diagnosis::settle(other);
+  } else {
+    other.noise.disturbed.clear();  // what shook the recording shakes no simulation
+  }
   const Innovations a = innovations_of(own), b = innovations_of(other);
   constexpr std::size_t enough = 100;
   if (a.time_s.size() < enough || b.time_s.size() < enough) {

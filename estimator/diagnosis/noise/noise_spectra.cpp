@@ -6,6 +6,7 @@
 #include <complex>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
+#include <utility>
 
 namespace selfcal::diagnosis {
 namespace {
@@ -41,6 +42,14 @@ std::vector<Stretch> quiet_stretches(const ImuData& data, const std::vector<Segm
     }
   }
   return stretches;
+}
+
+std::vector<Segment> as_segments(const std::vector<Stretch>& stretches) {
+  std::vector<Segment> segments;
+  for (const Stretch& s : stretches) {
+    segments.push_back({.first = s.first, .last = s.last});
+  }
+  return segments;
 }
 
 // A bin of the spectra of one length of pieces.
@@ -362,13 +371,16 @@ std::optional<NoiseSpectra> noise_spectra(const ImuData& data, const std::vector
     return std::nullopt;
   }
   const Base base = base_of(data, stretches.front());
-  const std::vector<Bin> bins = all_bins(data, base, stretches);
+  const bool parked = std::none_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; });
+  CoherentLines coherent =
+      parked ? CoherentLines{{}, CorrectedRecording(data)} : coherent_lines(data, as_segments(stretches));
+  const std::vector<Bin> bins = all_bins(coherent.without.data(), base, stretches);
   if (bins.empty()) {
     return std::nullopt;
   }
   std::array<Tilt, 2> tilt;
-  const bool parked = std::none_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; });
   NoiseSpectra spectra;
+  spectra.lines = std::move(coherent.lines);
   if (parked && base.level) {
     for (std::size_t axis = 0; axis < tilt.size(); ++axis) {
       tilt[axis] = tilt_of(bins, base, data.sample_rate_hz, axis);

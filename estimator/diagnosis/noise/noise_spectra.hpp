@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/diagnosis/noise/coherent_lines.hpp"
 #include "estimator/models/imu_data.hpp"
 #include "estimator/models/segments.hpp"
 
@@ -22,7 +23,10 @@ struct TiltSpectrum {
 };
 
 struct NoiseSpectra {
-  std::array<DensityTable, 6> sensors;  // gyros, accelerometers: of increments over the interval, less their quantum
+  std::array<DensityTable, 6>
+      sensors;  // gyros, accelerometers: of increments over the interval, less their quantum and the lines
+  // Where something turned: those that go on alike through the dwells.
+  std::vector<CoherentLine> lines;
   // Of a base that stands in one attitude all the time with x of b about level: its tilt about x, and about the level
   // axis across it. Empty where it does not show.
   TiltSpectrum roll, pitch;
