@@ -27,4 +27,11 @@ struct GimbalContradiction {
 // 20 deg. What it is for is far larger: swapped or reversed axes, degrees for radians, a read-out that stands still.
 std::optional<GimbalContradiction> find_gimbal_contradiction(const Recording& recording);
 
+// Whether nothing is wrong but a clock and a bias: with one lag of the read-outs, up to 1.5 s either way, that changes evenly by at most 1 s from
+// the first row to the last (angles as commanded, on a clock of their own), and less what the gyros drift by while the read-outs stand
+// (degrees a second of a MEMS gyro), no window contradicts by more than a tolerance found as above. Windows in which the gyros turn
+// by more than half a round, and the read-outs go round, say nothing: angles are known but for whole rounds. Reversed or exchanged axes, another unit and
+// a read-out that stands are no lag.
+bool lags_alone(const Recording& recording);
+
 }  // namespace selfcal

@@ -194,6 +194,44 @@ TEST_F(GimbalCheck, ReadOutsThatAreSaidToBeAbsentAreNotMissed) {
   EXPECT_THAT(*by_hand, IsEmpty());
 }
 
+// Angles as commanded, on a clock of their own: whoever estimates is told, a log is not. The
+// same with an axis reversed, exchanged, or gyros in degrees is.
+TEST_F(GimbalCheck, AReadOutThatLagsIsNotWrong) {
+  const CheckPolicy lenient{.gimbal_contradiction_is_error = false};
+  const auto late = [](const std::vector<double>& angle, double rate_hz) {
+    std::vector<double> lagging;
+    for (std::size_t row = 0; row < angle.size(); ++row) {
+      const double lag_s = 0.4 + 0.3 * static_cast<double>(row) / static_cast<double>(angle.size());
+      const auto rows = static_cast<std::size_t>(std::lround(lag_s * rate_hz));
+      lagging.push_back(angle[row > rows ? row - rows : 0]);
+    }
+    return lagging;
+  };
+  r.gimbal_outer_rad = late(r.gimbal_outer_rad, r.sample_rate_hz);
+  r.gimbal_inner_rad = late(r.gimbal_inner_rad, r.sample_rate_hz);
+  const auto words = [&](const Recording& recording) {
+    const auto warnings = check_recording(recording, lenient);
+    return warnings ? *warnings : std::vector<std::string>{warnings.error().message};
+  };
+  EXPECT_THAT(error_of(r), HasSubstr("deg apart"));
+  EXPECT_THAT(words(r), IsEmpty());
+  Recording reversed = r;
+  for (double& angle : reversed.gimbal_outer_rad) {
+    angle = -angle;
+  }
+  EXPECT_THAT(words(reversed), ElementsAre(HasSubstr("deg apart")));
+  Recording exchanged = r;
+  std::swap(exchanged.gimbal_outer_rad, exchanged.gimbal_inner_rad);
+  EXPECT_THAT(words(exchanged), ElementsAre(HasSubstr("deg apart")));
+  Recording degrees = r;
+  for (auto& d : degrees.delta_theta_rad) {
+    for (double& component : d) {
+      component *= 180.0 / std::numbers::pi;
+    }
+  }
+  EXPECT_THAT(words(degrees), ElementsAre(HasSubstr("deg apart")));
+}
+
 // A read-out that goes from 0.0 past zero to 359.4 deg has turned by -0.6.
 TEST_F(GimbalCheck, AReadOutThatPassesZeroHasNotTurnedAllTheWay) {
   for (double& angle : r.gimbal_inner_rad) {
