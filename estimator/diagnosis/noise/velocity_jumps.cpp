@@ -163,7 +163,7 @@ class Opening {
     std::vector<VelocityJump> found = seen(all);
     const auto in_turns =
         std::partition(found.begin(), found.end(), [&](const VelocityJump& j) { return !near_turn(segments_, j); });
-    if (!likely_in_turns(found, static_cast<std::size_t>(found.end() - in_turns))) {
+    if (in_turns != found.end() && !likely_in_turns(found)) {
       found.erase(in_turns, found.end());
     }
     if (found.empty() ||
@@ -177,15 +177,23 @@ class Opening {
     return true;
   }
 
-  // Whether those in turns, `more` besides, are as many as those elsewhere make likely: an effect stands in turns alone.
-  bool likely_in_turns(const std::vector<VelocityJump>& found, std::size_t more) const {
+  // Whether those in turns are as many as those elsewhere make likely: an effect stands in turns alone. Somebody who gets in knocks several
+  // times within seconds: what follows within `one_s` is one disturbance, where it began.
+  bool likely_in_turns(const std::vector<VelocityJump>& found) const {
     constexpr std::size_t enough = 2;
-    constexpr double chance = 0.05;
-    const auto before = static_cast<std::size_t>(
-        std::count_if(opened_.begin(), opened_.end(), [&](const VelocityJump& j) { return near_turn(segments_, j); }));
-    const std::size_t elsewhere = opened_.size() - before + found.size() - more;
+    constexpr double chance = 0.05, one_s = 15.0;
+    std::vector<VelocityJump> all = opened_;
+    all.insert(all.end(), found.begin(), found.end());
+    std::sort(all.begin(), all.end(),
+              [](const VelocityJump& a, const VelocityJump& b) { return a.start_s < b.start_s; });
+    std::size_t there = 0, elsewhere = 0;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (k == 0 || all[k].start_s - all[k - 1].start_s > one_s) {
+        ++(near_turn(segments_, all[k]) ? there : elsewhere);
+      }
+    }
     const double elsewhere_s = segments_.back().end_s - segments_.front().start_s - turns_s_;
-    return elsewhere >= enough && probability_of(before + more, turns_s_, elsewhere, elsewhere_s) > chance;
+    return elsewhere >= enough && probability_of(there, turns_s_, elsewhere, elsewhere_s) > chance;
   }
 
   PassInput& input_;
