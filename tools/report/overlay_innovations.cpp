@@ -71,6 +71,15 @@ bool in_noise_of_beats(PassInput& input) {
          diagnosis::fit_velocity_noise_and_point(input, check, segments);
 }
 
+// Where nothing turned the 24 are open and the heading is hardly known: the simulation's calibration may have walked anywhere (once 1e11 of the
+// innovations' square). An amended simulation stands as the recording does, with perfect sensors: about that point, if it is the likelier.
+PassInput likelier(const PassInput& simulation, const PassInput& recording) {
+  PassInput as_recorded = simulation;
+  as_recorded.parameters.setZero();
+  as_recorded.C_nb = recording.C_nb;
+  return run_pass(as_recorded).log_likelihood > run_pass(simulation).log_likelihood ? as_recorded : simulation;
+}
+
 // What chance makes of a correlation at lag k (Bartlett 1946), times n. `r`: those of both series, zero where chance makes them.
 double bartlett(const std::vector<double>& r, std::size_t k) {
   const auto at = [&](std::size_t lag) { return lag < r.size() ? r[lag] : 0.0; };
@@ -205,6 +214,7 @@ std::vector<OverlayCurve> overlay_innovations(const ImuData& recording, const Ca
     diagnosis::settle(other);
   } else {
     other.noise.disturbed.clear();  // what shook the recording shakes no simulation
+    other = likelier(other, own);
   }
   const Innovations a = innovations_of(own), b = innovations_of(other);
   constexpr std::size_t enough = 100;
