@@ -169,14 +169,15 @@ std::optional<GimbalContradiction> find_gimbal_contradiction(const Recording& re
 }
 
 bool lags_alone(const Recording& recording) {
-  constexpr double most_s = 1.5, most_growth_s = 1.0, step_s = 0.05;
+  constexpr double step_s = 0.05;
+  constexpr int most_lag = 30, most_growth = 10;  // 1.5 s; 1 s, in two steps each
   const std::vector<Window> windows = comparable_windows(recording);
   if (windows.empty()) {
     return true;
   }
-  for (double growth_s = -most_growth_s; growth_s <= most_growth_s; growth_s += 2.0 * step_s) {
-    for (double lag_s = -most_s; lag_s <= most_s; lag_s += step_s) {
-      const std::vector<double> all = disagreements_with(recording, windows, lag_s, growth_s);
+  for (int growth = -most_growth; growth <= most_growth; ++growth) {
+    for (int lag = -most_lag; lag <= most_lag; ++lag) {
+      const std::vector<double> all = disagreements_with(recording, windows, lag * step_s, growth * 2.0 * step_s);
       if (*std::max_element(all.begin(), all.end()) <= tolerance_of(all)) {
         return true;
       }

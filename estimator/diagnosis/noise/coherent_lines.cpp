@@ -174,6 +174,7 @@ CoherentLines coherent_lines(const ImuData& data, const std::vector<Segment>& st
   AngleVelocity theta(data.delta_theta.begin(), data.delta_theta.end());
   AngleVelocity velocity(data.delta_v.begin(), data.delta_v.end());
   std::vector<std::size_t> sizes;
+  sizes.reserve(stretches.size());
   for (const Segment& s : stretches) {
     sizes.push_back(s.last - s.first);
   }

@@ -46,6 +46,7 @@ std::vector<Stretch> quiet_stretches(const ImuData& data, const std::vector<Segm
 
 std::vector<Segment> as_segments(const std::vector<Stretch>& stretches) {
   std::vector<Segment> segments;
+  segments.reserve(stretches.size());
   for (const Stretch& s : stretches) {
     segments.push_back({.first = s.first, .last = s.last});
   }
