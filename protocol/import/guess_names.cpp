@@ -254,6 +254,10 @@ Role triad_role(const Words& w) {
   if (holds(w, {"mag", "gravity"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
     return Role::other;
   }
+  // What readings scatter by is no reading.
+  if (holds(w, {"std", "stdev", "sigma", "deviation", "variance"}) || is_one_of(w, {"sd", "rms", "var"})) {
+    return Role::other;
+  }
   const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});
   if (holds(w, {"gyr", "pqr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
       is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "dth", "da"}) ||

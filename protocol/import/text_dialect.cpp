@@ -11,6 +11,7 @@
 namespace selfcal::import {
 namespace {
 
+constexpr std::string_view degree_sign = "\xC2\xB0";
 constexpr std::array<std::string_view, 5> comment_marks{"#", "%", "//", "!", "*"};
 
 std::string_view comment_of(std::string_view line) {
@@ -48,6 +49,10 @@ std::string without_thousands(std::string_view field) {
   return groups > 0 && digits == 3 ? text + std::string(field.substr(whole)) : std::string();
 }
 
+// 12°30'15": degrees, minutes and seconds of an angle. Empty: none.
+template <typename Number>
+std::optional<Number> sexagesimal(std::string_view field, char decimal);
+
 template <typename Number>
 std::optional<Number> parsed(std::string_view field, char decimal) {
   std::array<char, 64> buffer{};
@@ -76,11 +81,39 @@ std::optional<Number> parsed(std::string_view field, char decimal) {
   if (field.size() > buffer.size() || (decimal != '.' && field.find('.') != std::string_view::npos)) {
     return std::nullopt;
   }
+  if (field.find(degree_sign) != std::string_view::npos) {
+    return sexagesimal<Number>(field, decimal);
+  }
   std::transform(field.begin(), field.end(), buffer.begin(), [decimal](char c) {
     const bool fortran = c == 'D' || c == 'd';  // 1.0D+03
     return fortran ? 'e' : c == decimal ? '.' : c;
   });
   return whole(buffer.data(), buffer.data() + field.size()) ? std::optional<Number>(value) : std::nullopt;
+}
+
+template <typename Number>
+std::optional<Number> sexagesimal(std::string_view field, char decimal) {
+  const bool negative = field.starts_with('-');
+  field.remove_prefix(negative ? 1 : 0);
+  Number value{};
+  Number part{1};
+  constexpr Number sixty{60};
+  for (const std::string_view mark : {degree_sign, std::string_view("'"), std::string_view("\"")}) {
+    const std::size_t end = field.find(mark);
+    if (end == std::string_view::npos) {
+      break;
+    }
+    const std::string_view digits_of_part = trimmed(field.substr(0, end));
+    const bool whole = digits_of_part.find_first_not_of("0123456789.,") == std::string_view::npos;
+    const auto number = whole ? parsed<Number>(digits_of_part, decimal) : std::nullopt;
+    if (!number || (part < Number{1} && *number >= sixty)) {
+      return std::nullopt;
+    }
+    value += *number * part;
+    part /= sixty;
+    field = trimmed(field.substr(end + mark.size()));
+  }
+  return field.empty() && part < Number{1} ? std::optional<Number>(negative ? -value : value) : std::nullopt;
 }
 
 std::optional<int> digits(std::string_view& text, std::size_t count) {

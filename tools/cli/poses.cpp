@@ -10,6 +10,7 @@
 #include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/convert.hpp"
+#include "tools/cli/means_table.hpp"
 #include "tools/cli/poses_attitude.hpp"
 #include "tools/cli/poses_input.hpp"
 #include "tools/cli/poses_output.hpp"
@@ -94,30 +95,8 @@ Expected<void> add_attitude(const PosesArguments& arguments, bool is_recording, 
   return {};
 }
 
-Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
-  const auto is_hdf5 = [](const std::string& f) { return f.ends_with(".h5") || f.ends_with(".hdf5"); };
-  const bool is_recording = std::any_of(arguments.files.begin(), arguments.files.end(), is_hdf5);
-  if (const auto good = check_arguments(arguments, is_recording); !good) {
-    return tl::unexpected(good.error());
-  }
+Expected<int> tell(const PosesArguments& arguments, const diagnosis::PoseDiagnosis& d, bool si) {
   const std::string& name = arguments.files.front();
-  Expected<RawLog> log =
-      is_recording ? read_hdf5(name, lenient).map([](const auto& loaded) {
-        return RawLog{pose_input_of(loaded.recording), true, 0.0L, {}};
-      })
-                   : read_raw_poses({arguments.files, arguments.gyros, arguments.latitude_deg, arguments.height_m},
-                                    raw_columns(arguments));
-  if (!log) {
-    return tl::unexpected(log.error());
-  }
-  if (!log->notes.empty()) {
-    fmt::print(stderr, "selfcal poses: {}: {}\n", name, log->notes);
-  }
-  if (const auto added = add_attitude(arguments, is_recording, *log); !added) {
-    return tl::unexpected(added.error());
-  }
-  log->input.gyro_unit = arguments.gyro_unit;
-  const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
   if (!d.failure.empty()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", name, d.failure));
   }
@@ -128,9 +107,51 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
     }
     fmt::print("{}\n", document::with_head(document::poses, poses_json(d), *file).dump());
   } else {
-    fmt::print("{}", arguments.details ? poses_details(d, log->si) : poses_summary(d, log->si) + "more: --details\n");
+    fmt::print("{}", arguments.details ? poses_details(d, si) : poses_summary(d, si) + "more: --details\n");
   }
   return poses_mismatch(d) ? 1 : 0;
+}
+
+void print_notes(const std::string& file, const std::string& notes) {
+  if (!notes.empty()) {
+    fmt::print(stderr, "selfcal poses: {}: {}\n", file, notes);
+  }
+}
+
+Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
+  const auto is_hdf5 = [](const std::string& f) { return f.ends_with(".h5") || f.ends_with(".hdf5"); };
+  const bool is_recording = std::any_of(arguments.files.begin(), arguments.files.end(), is_hdf5);
+  if (const auto good = check_arguments(arguments, is_recording); !good) {
+    return tl::unexpected(good.error());
+  }
+  const std::string& name = arguments.files.front();
+  const RawFiles files{arguments.files, arguments.gyros, arguments.latitude_deg, arguments.height_m};
+  if (!is_recording) {
+    const auto table = answer_of_table(files, raw_columns(arguments), arguments.gyro_unit, arguments.false_alarm_rate);
+    if (!table) {
+      return tl::unexpected(table.error());
+    }
+    if (*table) {
+      if ((*table)->diagnosis.failure.empty()) {
+        print_notes(name, (*table)->notes);
+      }
+      return tell(arguments, (*table)->diagnosis, (*table)->si);
+    }
+  }
+  Expected<RawLog> log = is_recording ? read_hdf5(name, lenient).map([](const auto& loaded) {
+    return RawLog{pose_input_of(loaded.recording), true, 0.0L, {}};
+  })
+                                      : read_raw_poses(files, raw_columns(arguments));
+  if (!log) {
+    return tl::unexpected(log.error());
+  }
+  print_notes(name, log->notes);
+  if (const auto added = add_attitude(arguments, is_recording, *log); !added) {
+    return tl::unexpected(added.error());
+  }
+  log->input.gyro_unit = arguments.gyro_unit;
+  const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
+  return tell(arguments, d, log->si);
 }
 
 CommandRun configure(Options& options) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/head_output.hpp"
 #include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_words.hpp"
 #include "tools/cli/rest_output.hpp"
@@ -280,6 +281,13 @@ std::string one_triad_text(const diagnosis::PoseDiagnosis& d, const Units& shown
 
 std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si) {
   const Units shown = units_of(si);
+  if (d.dividing_head) {
+    std::string text = head_text(*d.dividing_head);
+    for (const std::string& words : d.invisible) {
+      text += fmt::format("invisible: {}\n", words);
+    }
+    return text;
+  }
   std::string text =
       fmt::format("{} static pose{}, {:.0f} s in all\n", d.poses, d.poses == 1 ? "" : "s", d.static_seconds);
   for (const std::string& words : d.supports) {

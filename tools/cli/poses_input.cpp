@@ -21,8 +21,19 @@
 #include "tools/cli/log_counts.hpp"
 #include "tools/cli/log_rows.hpp"
 #include "tools/cli/log_time.hpp"
+#include "tools/cli/log_units.hpp"
 
 namespace selfcal::cli {
+
+void set_place(std::optional<double> latitude_deg, std::optional<double> height_m, diagnosis::PoseInput& input) {
+  if (latitude_deg) {
+    input.latitude = *latitude_deg * units::degree;
+    input.gravity = earth::normal_gravity(*input.latitude, height_m.value_or(0.0));
+  } else {
+    constexpr double over_the_earth = 0.015;  // m/s^2: 9.780 to 9.832 at sea level, as likely anywhere
+    input.gravity_sigma = over_the_earth;
+  }
+}
 
 bool has_read_outs(const Recording& recording) {
   const auto zero = [](const std::vector<double>& angles) {
@@ -64,28 +75,6 @@ namespace {
 using diagnosis::PoseInput;
 using diagnosis::Sensors;
 
-// SI per unit where the names of all say one of this quantity; 0: they do not. "gyro_rad" of PX4 is a rate.
-double unit_of(const std::vector<import::NamedColumn>& named, const std::vector<std::size_t>& columns,
-               import::Quantity quantity) {
-  if (columns.empty()) {
-    return 0.0;
-  }
-  std::string said;  // some say it once: "gx (dps), gy, gz"
-  for (const std::size_t column : columns) {
-    const std::string& unit = named[column].unit;
-    if (!unit.empty() && !said.empty() && unit != said) {
-      return 0.0;
-    }
-    said = unit.empty() ? said : unit;
-  }
-  auto unit = import::find_unit(said);
-  if (unit && quantity == import::Quantity::angular_rate && unit->quantity == import::Quantity::angle &&
-      !named[columns.front()].increment) {
-    unit = import::find_unit(said + "/s");
-  }
-  return unit && unit->quantity == quantity ? unit->si : 0.0;
-}
-
 constexpr const char* rate_says = "--rate says how many rows a second it holds";
 
 std::string and_also(const std::string& a, const std::string& b) {
@@ -119,13 +108,6 @@ Expected<void> check_time(const TimedRows& rows, const import::ColumnSource& sou
   return {};
 }
 
-// The only column that is called a temperature, from 1; 0: none.
-std::size_t named_temperature(const std::vector<import::NamedColumn>& named) {
-  const auto is = [](const import::NamedColumn& c) { return c.role == import::Role::temperature; };
-  const auto found = std::find_if(named.begin(), named.end(), is);
-  return std::count_if(named.begin(), named.end(), is) == 1 ? static_cast<std::size_t>(found - named.begin()) + 1 : 0;
-}
-
 // The only column that is called a counter, from 1; 0: none.
 std::size_t named_counter(const std::vector<import::NamedColumn>& named) {
   const auto is = [](const import::NamedColumn& c) { return c.role == import::Role::counter; };
@@ -133,22 +115,15 @@ std::size_t named_counter(const std::vector<import::NamedColumn>& named) {
   return std::count_if(named.begin(), named.end(), is) == 1 ? static_cast<std::size_t>(found - named.begin()) + 1 : 0;
 }
 
-// rad per unit of a read-out: of degrees, unless its name says another unit of angles.
-double unit_of_angle(const import::NamedColumn& column) {
-  const auto unit = import::find_unit(column.unit);
-  return unit && unit->quantity == import::Quantity::angle ? unit->si : units::degree;
-}
-
-// Fewer rows are no log: a table of means, say, of which nothing says how far each is known.
+// Fewer rows are no log.
 Expected<void> check_length(const TimedRows& rows, const std::string& file) {
   constexpr std::size_t least = 100;
   return rows.data.rows >= least
              ? Expected<void>()
              : fail(ErrorKind::bad_input,
-                    fmt::format(
-                        "{}: {} rows: a log of samples is wanted, 100 and more; of a table of means, a row a position "
-                        "or a rate, nothing says how far each is known",
-                        file, rows.data.rows));
+                    fmt::format("{}: {} rows: a log of samples is wanted, 100 and more, or a table of means of "
+                                "accelerometers, a row a position",
+                                file, rows.data.rows));
 }
 
 // A log as its file has it: SI where its names say units.
@@ -418,13 +393,7 @@ Expected<RawLog> read_raw_poses(const RawFiles& files, const RawColumns& columns
   log.si = (!gyros || read->gyro_si > 0.0) && (!accels || read->accel_si > 0.0);
   log.input.gyros_si = read->gyro_si > 0.0;
   log.input.accel_unit = accels && read->accel_si > 0.0 ? 1.0 : 0.0;
-  if (files.latitude_deg) {
-    log.input.latitude = *files.latitude_deg * units::degree;
-    log.input.gravity = earth::normal_gravity(*log.input.latitude, files.height_m.value_or(0.0));
-  } else {
-    constexpr double over_the_earth = 0.015;  // m/s^2: 9.780 to 9.832 at sea level, as likely anywhere
-    log.input.gravity_sigma = over_the_earth;
-  }
+  set_place(files.latitude_deg, files.height_m, log.input);
   return log;
 }
 

@@ -16,6 +16,8 @@ namespace selfcal::cli {
 bool has_read_outs(const Recording& recording);
 // Increments to rates, rad/s and m/s^2; read-outs where it has any; the first temperature channel.
 diagnosis::PoseInput pose_input_of(const Recording& recording);
+// Gravity of the place, and how far it is known: height 0 where none is given, anywhere on the Earth without a latitude.
+void set_place(std::optional<double> latitude_deg, std::optional<double> height_m, diagnosis::PoseInput& input);
 // What `selfcal poses` is asked of logs.
 struct RawFiles {
   std::vector<std::string> poses;  // one log; or one after the other, between which nothing is known

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/head_output.hpp"
 #include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_words.hpp"
 #include "tools/cli/rest_output.hpp"
@@ -202,6 +203,9 @@ Json verdict_of(const diagnosis::PoseDiagnosis& d) {
   } else if (d.by_poses && !d.accel_adequate) {
     verdict = fmt::format("Bias, scale factor and misalignment leave {:.2g} mg rms of the accelerometers.",
                           1e3 * d.accel_rms_g);
+  } else if (d.dividing_head && (d.dividing_head->third || d.dividing_head->drift)) {
+    verdict = d.dividing_head->third ? "A part of three times the head's angle is left beside bias, scale and square."
+                                     : "The accelerometer drifts from stop to stop.";
   } else if (d.rest && drifts(*d.rest)) {
     verdict = "Readings change with time or temperature by more than slow noise makes.";
   }
@@ -241,6 +245,8 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"not_by_position", d.not_by_position},
           {"read_outs", d.read_outs ? read_outs_json(*d.read_outs) : Json()},
           {"attitude", d.by_attitude ? attitude_json(*d.by_attitude) : Json()},
+          {"means", d.means},
+          {"dividing_head", d.dividing_head ? head_json(*d.dividing_head) : Json()},
           {"rest", d.rest ? rest_json(*d.rest) : Json()},
           {"clipped", to_json(d.clipped)},
           {"clipped_poses", d.clipped_poses},
@@ -292,7 +298,8 @@ bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
       d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
                                  [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
   return !d.accel_adequate || !d.gyros_contradict.empty() || !d.accel_named.empty() || !d.gyro_named.empty() ||
-         d.settling.has_value() || nonlinear || (d.rest && drifts(*d.rest));
+         d.settling.has_value() || nonlinear ||
+         (d.dividing_head && (d.dividing_head->third || d.dividing_head->drift)) || (d.rest && drifts(*d.rest));
 }
 
 }  // namespace selfcal::cli

@@ -91,7 +91,9 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_
   if (count < time + wanted) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: {}: {} columns, {} are needed{}", file, source.form(), count, time + wanted,
-                            both ? "; of a log of one sensor --only gyros or --only accelerometers says which" : ""));
+                            both         ? "; of a log of one sensor --only gyros or --only accelerometers says which"
+                            : count == 2 ? "; --angle-column says which of two is the angle of a dividing head"
+                                         : ""));
   }
   const std::size_t told = (columns.angle > 0 ? 1 : 0) + (columns.temperature > 0 ? 1 : 0) + 1;  // and a counter, say
   if (count > time + wanted + told) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "daemon/estimate/quantity_text.hpp"
+#include "tools/cli/head_output.hpp"
 #include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_output.hpp"
 #include "tools/cli/poses_words.hpp"
@@ -74,10 +75,11 @@ std::string counted(std::size_t count, const char* what) {
 
 std::string heading(const PoseDiagnosis& d) {
   const bool stands = d.sensors == Sensors::gyros;  // nothing says which way up
-  std::string text =
-      fmt::format("{}, {:.0f} of {:.0f} s", counted(static_cast<std::size_t>(d.poses), stands ? "stand" : "pose"),
-                  d.static_seconds, d.duration_s);
-  if (d.by_poses && d.sensors == Sensors::both) {
+  std::string text = d.means ? fmt::format("{}, a mean each", counted(static_cast<std::size_t>(d.poses), "pose"))
+                             : fmt::format("{}, {:.0f} of {:.0f} s",
+                                           counted(static_cast<std::size_t>(d.poses), stands ? "stand" : "pose"),
+                                           d.static_seconds, d.duration_s);
+  if (d.by_poses && d.sensors == Sensors::both && !d.means) {
     text += fmt::format(", {} between them", counted(static_cast<std::size_t>(d.turns), "usable turn"));
   }
   if (d.force_at_rest_g > 0.0) {
@@ -426,6 +428,9 @@ std::string unseen(const PoseDiagnosis& d) {
 
 std::string poses_summary(const PoseDiagnosis& d, bool si) {
   const Units shown = units_of(si);
+  if (d.dividing_head) {
+    return head_text(*d.dividing_head) + unseen(d);
+  }
   std::string text = heading(d) + findings(d, shown);
   if (d.read_outs) {
     text += read_outs(*d.read_outs, shown);

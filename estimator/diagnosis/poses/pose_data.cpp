@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/geometry/units.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -203,6 +205,16 @@ std::vector<PoseParameter> parameters_of(const AccelModel& m) {
     all.push_back(p);
   }
   return all;
+}
+
+double gravity_span_deg(const std::vector<Pose>& poses) {
+  double least = 1.0;
+  for (const Pose& a : poses) {
+    for (const Pose& b : poses) {
+      least = std::min(least, a.u.normalized().dot(b.u.normalized()));
+    }
+  }
+  return std::acos(std::clamp(least, -1.0, 1.0)) / units::degree;
 }
 
 }  // namespace selfcal::diagnosis

@@ -81,5 +81,7 @@ struct AccelModel {
 // With what any accelerometer is before: misaligned by 0.03, its scale and bias within 0.1 and 0.2 g of the nominal ones.
 AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& poses);
 std::vector<PoseParameter> parameters_of(const AccelModel& model);
+// The largest angle between directions of gravity in the sensor, of calibrated poses, deg.
+double gravity_span_deg(const std::vector<Pose>& poses);
 
 }  // namespace selfcal::diagnosis

@@ -158,4 +158,25 @@ std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses
   return text.data();
 }
 
+std::string not_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model) {
+  constexpr double most = 0.03;  // of the mean, rms, beside bias, scale factor and misalignment
+  double sum = 0.0, square = 0.0;
+  for (const Pose& p : poses) {
+    sum += p.u.norm();
+    square += p.u.squaredNorm();
+  }
+  const auto n = static_cast<double>(poses.size());
+  const double mean = sum / n, scatter = std::sqrt(std::max(0.0, square / n - mean * mean)) / mean;
+  if (scatter < most) {
+    return lacks_gravity(input, poses, model);
+  }
+  constexpr double percent = 100.0;
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "at rest the accelerometers read forces that differ by %.0f %% rms beside bias, scale factor and "
+                "misalignment: gravity is not what they read",
+                percent * scatter);
+  return text.data();
+}
+
 }  // namespace selfcal::diagnosis

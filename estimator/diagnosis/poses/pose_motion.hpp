@@ -27,4 +27,8 @@ std::vector<std::size_t> find_gaps(const PoseInput& input);
 // while the sensor moves is many times what the fitted model takes for gravity. Empty: it may.
 std::string lacks_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model);
 
+// Why gravity is not what calibrated poses stand in, in words: what `lacks_gravity` says, or forces of all sizes at rest. No parameter of the
+// accelerometers follows from them then. Empty: it is.
+std::string not_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& model);
+
 }  // namespace selfcal::diagnosis

@@ -32,16 +32,6 @@ std::string counted(int count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-double span_of(const std::vector<Pose>& poses) {
-  double least = 1.0;
-  for (const Pose& a : poses) {
-    for (const Pose& b : poses) {
-      least = std::min(least, a.u.normalized().dot(b.u.normalized()));
-    }
-  }
-  return std::acos(std::clamp(least, -1.0, 1.0)) / units::degree;
-}
-
 void add_noise(const PoseInput& input, const std::vector<Pose>& poses, PoseDiagnosis& d) {
   Vector3 white = Vector3::Zero();
   for (const Pose& p : poses) {
@@ -130,7 +120,7 @@ AccelModel calibrate(const PoseInput& input, double alpha, std::vector<Pose>& po
     accel = fit();
   }
   d.accel_parameters = parameters_of(accel);
-  d.gravity_span_deg = span_of(poses);
+  d.gravity_span_deg = gravity_span_deg(poses);
   judge_accelerometers(accel, poses, duration_s, d.has_temperature, 0.5 * left, d);
   return accel;
 }
@@ -152,31 +142,11 @@ std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>&
   return still;
 }
 
-// Forces of all sizes at rest: what the poses stand in is not gravity, and no parameter of the accelerometers follows from it.
-bool read_gravity(const PoseInput& input, const std::vector<Pose>& poses, const AccelModel& accel, PoseDiagnosis& d) {
-  constexpr double most = 0.03;  // of the mean, rms, beside bias, scale factor and misalignment
-  double sum = 0.0, square = 0.0;
-  for (const Pose& p : poses) {
-    sum += p.u.norm();
-    square += p.u.squaredNorm();
-  }
-  const auto n = static_cast<double>(poses.size());
-  const double mean = sum / n, scatter = std::sqrt(std::max(0.0, square / n - mean * mean)) / mean;
-  if (scatter < most) {
-    d.failure = lacks_gravity(input, poses, accel);
-    return d.failure.empty();
-  }
-  d.failure = with_numbers(
-      "at rest the accelerometers read forces that differ by %.0f %% rms beside bias, scale factor and "
-      "misalignment: gravity is not what they read",
-      100.0 * scatter, 0.0);
-  return false;
-}
-
 void judge_poses(const PoseInput& as_told, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
   // Accelerometers, their settling and the gyros share the false-alarm rate: a half, of it a half, and a half.
   const AccelModel accel = calibrate(as_told, 0.5 * alpha, poses, d);
-  if (!read_gravity(as_told, poses, accel, d)) {
+  d.failure = not_gravity(as_told, poses, accel);
+  if (!d.failure.empty()) {
     return;
   }
   const std::vector<std::size_t> turns = usable_turns(as_told, poses, d);
@@ -329,7 +299,8 @@ void judge_accelerometers_alone(const PoseInput& input, double alpha, std::vecto
   }
   if (d.by_poses) {
     const AccelModel accel = calibrate(input, alpha, poses, d);
-    if (!read_gravity(input, poses, accel, d)) {
+    d.failure = not_gravity(input, poses, accel);
+    if (!d.failure.empty()) {
       return;
     }
     d.supports.push_back("gravity in " + std::to_string(d.poses) + " poses: accelerometers");

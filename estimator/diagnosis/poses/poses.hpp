@@ -15,6 +15,7 @@
 
 #include "estimator/diagnosis/effects/effect.hpp"
 #include "estimator/diagnosis/poses/attitude.hpp"
+#include "estimator/diagnosis/poses/dividing_head.hpp"
 #include "estimator/diagnosis/poses/pose_parameter.hpp"
 #include "estimator/diagnosis/poses/rest.hpp"
 #include "estimator/geometry/rotation.hpp"
@@ -150,6 +151,7 @@ struct PoseDiagnosis {
   Sensors sensors = Sensors::both;
   std::array<bool, 3> gyro_axes{true, true, true};  // which axes of gyros the log holds
   int poses = 0;
+  bool means = false;  // a table's, a row a pose
   bool by_poses =
       false;  // whether they are enough for a reference: what follows of accelerometers and gyros is then filled
   double static_seconds = 0.0;
@@ -198,6 +200,7 @@ struct PoseDiagnosis {
   int moving = 0;         // stretches as quiet as the log's quietest that move: no poses
   std::optional<ReadOuts> read_outs;
   std::optional<ByAttitude> by_attitude;
+  std::optional<DividingHead> dividing_head;       // of one accelerometer; nothing else is filled then
   std::optional<Rest> rest;                        // of fewer poses than calibrate
   std::vector<RestNoise> gyro_noise, accel_noise;  // of the triads that the log holds, shortest time first
   std::string not_by_position;                     // why position at rest is no reference, if somebody asked

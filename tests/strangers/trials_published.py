@@ -1,0 +1,54 @@
+"""Tables that are published instead of logs, held against the truth of each."""
+import published
+from answers import SITE, accelerometers, bias, check, near, parameters
+from sensors import DEG, EARTH, G0, GRAVITY
+
+import numpy
+
+
+def positions(operator, rng):
+    truth = published.positions(operator.folder, rng)
+    for file in ("means.csv", "deviations.csv"):
+        answer = operator.answer("poses", file, *SITE)
+        check(f"{file}: a table of {answer['poses']} means, adequate", answer["means"] and answer["poses"] == 24 and answer["accelerometers"]["adequate"])
+        accelerometers(answer, truth["a"], 0.0)
+    answer = operator.answer("poses", "means.csv", *SITE)
+    for k in range(3):   # of the Earth's rate only the vertical part is known without a heading
+        near(f"gyro mean {'xyz'[k]}, deg/h", answer["gyros"]["bias"][k], answer["gyros"]["bias_sigma"][k], truth["g"].bias[k], numpy.linalg.norm(EARTH), 3600 / DEG)
+    known = parameters(operator.answer("poses", "counts.txt"), "accelerometers")
+    for k, axis in enumerate("xyz"):
+        p = known[f"scale_{axis}"]
+        near(f"counts per g {axis}", p["value"], p["sigma"], truth["a"].matrix[k, k] * 16384 / G0 * GRAVITY, 0.0)
+    operator.refused("row 8 is off by", "poses", "misread.csv")
+    answer = operator.answer("poses", "bent.csv", *SITE)
+    check("a square in all axes is a misfit", not answer["accelerometers"]["adequate"] and answer["mismatch"])
+    operator.refused("rows of rates", "poses", "rates.csv")
+    operator.short(14, "poses", "means.csv")
+
+
+def six_faces(operator, rng):
+    truth = published.six_faces(operator.folder, rng)
+    operator.refused("standard deviations of the readings beside the means", "poses", "means.csv", "--only", "accelerometers")
+    accelerometers(operator.answer("poses", "deviations.csv", *SITE), truth["a"], 0.0)
+
+
+def head(operator, rng):
+    truth = published.head(operator.folder, rng)
+    files = {"volts.csv": 2.5, "amperes.csv": 1.3, "g.csv": None, "drift.csv": 2.5, "cubic.csv": None, "minutes.txt": 1.3}
+    for file, unit in files.items():
+        answer = operator.answer("poses", file, *SITE)["dividing_head"]
+        if file == "cubic.csv":
+            check("a cubic part is told", answer["third"]["named"] and not answer["drift"]["named"])
+            continue
+        check(f"{file}: {answer['stops']} stops, a drift where there is one", answer["drift"]["named"] == (file == "drift.csv") and not answer["third"]["named"])
+        for p in answer["parameters"]:
+            true = truth[p["name"]] * (unit or 1.0) if p["name"] == "scale" and unit else truth[p["name"]] - (p["name"] == "scale")
+            near(f"{p['name']}, {p['unit']}", p["value"], p["sigma"], true, 50e-6 if file == "drift.csv" and p["name"] == "bias" else 0.0)
+        check("the quarter of the scale", answer["level_at_deg"] == (90.0 if file == "g.csv" else 0.0))
+    check("two columns without names", operator.answer("poses", "plain.txt", "--only", "accelerometers", "--angle-column", 1)["dividing_head"]["angles"] == 72)
+    operator.refused("8 and more", "poses", "four.csv")
+    operator.refused("whether they are rad", "poses", "radians.csv")
+    operator.short(13, "poses", "volts.csv")
+
+
+TRIALS = {positions: published, six_faces: published, head: published}
