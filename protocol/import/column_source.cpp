@@ -64,7 +64,7 @@ constexpr std::string_view ardupilot =
     "a log of ArduPilot; `sed -n '/^IMU, [0-9]*, [1-9],/d;s/^FMT.*, IMU, [A-Za-z]*, //p;s/^IMU, //p'` makes columns of "
     "its first sensor's lines";
 constexpr std::array<Stranger, 7> strangers{
-    {{"FMT, 128, ", ardupilot},
+    {{"FMT, ", ardupilot},
      {"%RAWIMU", novatel},
      {"#RAWIMU", novatel},
      {"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},

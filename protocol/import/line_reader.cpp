@@ -58,7 +58,8 @@ Expected<bool> LineReader::refill() {
   buffer_.resize(held + static_cast<std::size_t>(count));
   if (const std::size_t first = buffer_.find('\0', held); first != std::string::npos) {
     const bool wide = buffer_.starts_with("\xFF\xFE") || buffer_.starts_with("\xFE\xFF");
-    if (!wide && first > 0 && only_zeros_behind(first)) {
+    const bool begun = first > 0 || number_ > 0;  // a file of zeros alone is no text
+    if (!wide && begun && only_zeros_behind(first)) {
       return true;
     }
     return fail(ErrorKind::bad_input,
@@ -90,7 +91,10 @@ Expected<bool> LineReader::next(std::string_view& line) {
     const std::size_t searched = buffer_.size() - at_;
     if (searched > longest_line) {
       return fail(ErrorKind::bad_input,
-                  fmt::format("{}: line {}: longer than {} bytes", name_, number_ + 1, longest_line));
+                  fmt::format("{}: line {}: longer than {} bytes{}", name_, number_ + 1, longest_line,
+                              number_ == 0 && (buffer_.starts_with('[') || buffer_.starts_with('{'))
+                                  ? ": JSON in one line; `jq -c '.[]'` makes a line of each object of an array"
+                                  : ""));
     }
     const Expected<bool> more = refill();
     if (!more) {

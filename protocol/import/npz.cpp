@@ -79,6 +79,12 @@ Expected<Arrays> read_npz(const std::filesystem::path& file) {
       return tl::unexpected(added.error());
     }
   }
+  if (arrays.columns.empty() && zip_get_num_entries(archive.get(), 0) > 0) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: a zip of other files than NumPy's: unpack it and give what it holds; `selfcal poses "
+                            "--gyros` takes a file of each sensor",
+                            file.string()));
+  }
   return arrays;
 }
 

@@ -306,6 +306,13 @@ void split_fields(std::string_view line, char separator, std::vector<std::string
     }
     return;
   }
+  // "$VNIMU,...*61": a checksum behind a sentence is no part of its last field.
+  constexpr std::size_t longest_checksum = 9;
+  if (line.starts_with('$')) {
+    const std::string_view text = trimmed(line);
+    const std::size_t star = text.rfind('*');
+    line = star != std::string_view::npos && text.size() - star <= longest_checksum ? text.substr(0, star) : text;
+  }
   for (bool more = true; more;) {
     const bool quoted = trimmed(line).starts_with('"');
     const std::size_t opening = quoted ? line.find('"') : 0;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "protocol/import/labelled_lines.hpp"
 #include "protocol/import/line_reader.hpp"
 #include "protocol/import/rows_in_turns.hpp"
 #include "protocol/toml_file/utf8.hpp"
@@ -59,15 +60,53 @@ std::string separator_words(char separator) {
   }
 }
 
+// What the sentences of VectorNav hold, whose first field names them (VN-100 and VN-300 user manuals, ASCII messages); empty: another one.
+std::vector<std::string> names_of_sentence(std::string_view first_field) {
+  if (first_field == "$VNIMU") {
+    return {"",
+            "MagX",
+            "MagY",
+            "MagZ",
+            "AccelX [m/s^2]",
+            "AccelY [m/s^2]",
+            "AccelZ [m/s^2]",
+            "GyroX [rad/s]",
+            "GyroY [rad/s]",
+            "GyroZ [rad/s]",
+            "Temp [C]",
+            "Pressure"};
+  }
+  if (first_field == "$VNYMR") {
+    return {"",
+            "Yaw",
+            "Pitch",
+            "Roll",
+            "MagX",
+            "MagY",
+            "MagZ",
+            "AccelX [m/s^2]",
+            "AccelY [m/s^2]",
+            "AccelZ [m/s^2]",
+            "GyroX [rad/s]",
+            "GyroY [rad/s]",
+            "GyroZ [rad/s]"};
+  }
+  return {};
+}
+
 class TextSource final : public ColumnSource {
  public:
-  TextSource(std::filesystem::path file, TextDialect dialect) : file_(std::move(file)), dialect_(std::move(dialect)) {}
+  TextSource(std::filesystem::path file, TextDialect dialect, std::optional<Labels> labels)
+      : file_(std::move(file)), dialect_(std::move(dialect)), labelled_(std::move(labels)) {}
 
   const std::vector<std::string>& names() const override { return names_; }
   const std::vector<std::string>& units() const override { return units_; }
   const TextDialect* dialect() const override { return &dialect_; }
   std::string preamble() const override { return preamble_; }
   std::string form() const override {
+    if (labelled_) {
+      return "text, a label before each value";
+    }
     return fmt::format("text, {}{}, {}", separator_words(dialect_.separator),
                        dialect_.decimal == ',' ? ", decimal commas" : "",
                        dialect_.header_line > 0 ? fmt::format("names in line {}", dialect_.header_line) : "no names");
@@ -85,18 +124,32 @@ class TextSource final : public ColumnSource {
   }
   Expected<void> take(const ColumnRequest& request, const std::vector<std::string_view>& fields, std::size_t line,
                       ColumnData& data) const;
+  // Fields of a line; false: it is none of the table's.
+  bool fields_of(std::string_view line, std::vector<std::string_view>& fields) const {
+    if (labelled_) {
+      return labelled_fields(line, *labelled_, fields);
+    }
+    split_fields(line, dialect_.separator, fields);
+    return true;
+  }
   bool passed_over(std::string_view line) const {
     return line.empty() || (!dialect_.comment.empty() && line.starts_with(dialect_.comment));
   }
 
   std::filesystem::path file_;
   TextDialect dialect_;
+  std::optional<Labels> labelled_;
   std::vector<std::string> names_;
   std::vector<std::string> units_;
   std::string preamble_;
 };
 
 Expected<void> TextSource::read_head() {
+  if (labelled_) {
+    names_ = as_utf8(labelled_->names);
+    units_ = labelled_->units;
+    return {};
+  }
   Expected<LineReader> reader = LineReader::open(file_);
   if (!reader) {
     return tl::unexpected(reader.error());
@@ -124,6 +177,9 @@ Expected<void> TextSource::read_head() {
       split_fields(line, dialect_.separator, fields);
       break;
     }
+  }
+  if (const std::vector<std::string> known = names_of_sentence(fields.front()); known.size() == fields.size()) {
+    names_ = known;
   }
   names_.resize(std::max(fields.size(), names_.size()));
   return {};
@@ -188,11 +244,13 @@ Expected<ColumnData> TextSource::read(const ColumnRequest& request) const {
       data.left_out = true;
       break;
     }
+    if (!fields_of(line, fields)) {
+      continue;
+    }
     const std::size_t ahead = reader->number() - data.rows;
     if (data.skipped.empty() || data.skipped.back().second != ahead) {
       data.skipped.emplace_back(data.rows, ahead);
     }
-    split_fields(line, dialect_.separator, fields);
     if (const auto taken = take(request, fields, reader->number(), data); !taken) {
       return tl::unexpected(taken.error());
     }
@@ -218,8 +276,10 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
     if (reader->number() < dialect_.first_line || passed_over(trimmed(line))) {
       continue;
     }
+    if (!fields_of(line, fields)) {
+      continue;
+    }
     ++row;
-    split_fields(line, dialect_.separator, fields);
     if (column >= fields.size() || fields[column].empty() || number_of(fields[column], dialect_.decimal) ||
         date_of(fields[column])) {
       return {};
@@ -234,13 +294,13 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
                                                                            : as_utf8(found);
 }
 
-// Dialect that the head of the file shows.
-Expected<TextDialect> judged_dialect(const std::filesystem::path& file) {
+Expected<std::vector<std::string>> first_lines(const std::filesystem::path& file) {
   Expected<LineReader> reader = LineReader::open(file);
   if (!reader) {
     return tl::unexpected(reader.error());
   }
   std::vector<std::string> lines;
+  lines.reserve(lines_to_judge);
   std::string_view line;
   for (bool more = true; more && lines.size() < lines_to_judge;) {
     const Expected<bool> next = reader->next(line);
@@ -252,23 +312,97 @@ Expected<TextDialect> judged_dialect(const std::filesystem::path& file) {
       lines.emplace_back(line);
     }
   }
-  const std::vector<std::string_view> views(lines.begin(), lines.end());
-  const auto dialect = detect_dialect(views);
+  return lines;
+}
+
+// Bytes, two hexadecimal digits each.
+bool is_hex_dump(const std::vector<std::string_view>& lines) {
+  constexpr std::size_t fewest = 8, most_lines = 50;
+  std::size_t rows = 0;
+  bool letters = false;
+  std::vector<std::string_view> fields;
+  for (const std::string_view line : lines) {
+    if (rows == most_lines) {
+      break;
+    }
+    split_fields(line, ' ', fields);
+    const auto is_byte = [](std::string_view f) {
+      return f.size() == 2 && f.find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
+    };
+    if (fields.size() < fewest || !std::all_of(fields.begin(), fields.end(), is_byte)) {
+      return false;
+    }
+    letters |= line.find_first_of("abcdefABCDEF") != std::string_view::npos;
+    ++rows;
+  }
+  return rows > 2 && letters;
+}
+
+// What is known to be no table, and what makes one of it; empty: nothing known.
+std::string known_words(const std::vector<std::string_view>& lines) {
+  const auto first = std::find_if(lines.begin(), lines.end(), [](std::string_view l) { return !trimmed(l).empty(); });
+  const std::string_view begin = first == lines.end() ? std::string_view() : trimmed(*first);
+  if (begin == "[" || begin == "{" || begin.starts_with("[{") || begin.starts_with("{\"")) {
+    return "JSON that is no object a line: `jq -c '.[]'` makes such lines of an array of objects";
+  }
+  if (std::any_of(lines.begin(), lines.end(), [](std::string_view l) { return l == "linear_acceleration:"; })) {
+    return "what `topic echo` prints: `rostopic echo -p` or `ros2 topic echo --csv` prints columns";
+  }
+  if (is_hex_dump(lines)) {
+    return "bytes in hexadecimal: the maker's program makes columns of their messages";
+  }
+  return {};
+}
+
+// How the head of the file shows that it is written: labels, where each line says what its values are.
+struct Form {
+  TextDialect dialect;
+  std::optional<Labels> labels;
+};
+
+Expected<Form> judged_form(const std::filesystem::path& file) {
+  const Expected<std::vector<std::string>> lines = first_lines(file);
+  if (!lines) {
+    return tl::unexpected(lines.error());
+  }
+  const std::vector<std::string_view> views(lines->begin(), lines->end());
+  if (is_hex_dump(views)) {
+    return fail(
+        ErrorKind::bad_input,
+        fmt::format("{}: bytes in hexadecimal: the maker's program makes columns of their messages", file.string()));
+  }
+  Form form;
+  form.labels = detect_labels(views, false);
+  const auto dialect = form.labels ? std::nullopt : detect_dialect(views);
+  if (!form.labels && (!dialect || dialect->header_line == 0)) {
+    form.labels = detect_labels(views, true);
+  }
+  if (form.labels) {
+    return form.labels->rival.empty()
+               ? Expected<Form>(std::move(form))
+               : fail(
+                     ErrorKind::bad_input,
+                     fmt::format("{}: lines of several kinds, ({}) and ({}): a file for each is read (grep makes them)",
+                                 file.string(), fmt::join(form.labels->names, ", "), form.labels->rival));
+  }
+  if (const std::string known = known_words(views); !known.empty()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}", file.string(), known));
+  }
   if (!dialect) {
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: no lines of numbers: of the first {} none has two numbers between commas, semicolons, "
                             "tabs or blanks",
-                            file.string(), lines.size()));
+                            file.string(), views.size()));
   }
+  form.dialect = *dialect;
   // PSINS: three lines of initial values and scale factors stand before the samples, with as many fields.
-  TextDialect found = *dialect;
   constexpr std::size_t psins_header_lines = 3;
-  if (!lines.empty() && lines.front().find("PSINS-format") != std::string::npos &&
-      lines.size() > found.first_line + psins_header_lines) {
-    found.first_line += psins_header_lines;
-    found.header_line = 0;
+  if (!lines->empty() && lines->front().find("PSINS-format") != std::string::npos &&
+      lines->size() > form.dialect.first_line + psins_header_lines) {
+    form.dialect.first_line += psins_header_lines;
+    form.dialect.header_line = 0;
   }
-  return found;
+  return form;
 }
 
 }  // namespace
@@ -301,17 +435,12 @@ std::string ColumnSource::title(std::size_t column) const {
 
 Expected<std::unique_ptr<ColumnSource>> open_text(const std::filesystem::path& file,
                                                   const std::optional<TextDialect>& dialect) {
-  TextDialect used;
-  if (dialect) {
-    used = *dialect;
-  } else {
-    Expected<TextDialect> judged = judged_dialect(file);
-    if (!judged) {
-      return tl::unexpected(judged.error());
-    }
-    used = std::move(*judged);
+  Expected<Form> form = judged_form(file);
+  if (!form && !dialect) {
+    return tl::unexpected(form.error());
   }
-  auto source = std::make_unique<TextSource>(file, used);
+  auto source = std::make_unique<TextSource>(file, dialect ? *dialect : form->dialect,
+                                             form ? std::move(form->labels) : std::nullopt);
   if (const auto head = source->read_head(); !head) {
     return tl::unexpected(head.error());
   }

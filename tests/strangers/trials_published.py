@@ -1,9 +1,10 @@
-"""Tables that are published instead of logs, held against the truth of each."""
-import published
-from answers import SITE, accelerometers, bias, check, near, parameters
-from sensors import DEG, EARTH, G0, GRAVITY
-
+"""Tables that are published instead of logs, and logs with labels, held against the truth of each."""
 import numpy
+
+import labels
+import published
+from answers import SITE, accelerometers, check, gyro_scales, near, parameters
+from sensors import DEG, EARTH, G0, GRAVITY
 
 
 def positions(operator, rng):
@@ -51,4 +52,28 @@ def head(operator, rng):
     operator.short(13, "poses", "volts.csv")
 
 
-TRIALS = {positions: published, six_faces: published, head: published}
+def labelled(operator, rng):
+    truth = labels.labelled(operator.folder, rng)
+    a, g = truth["a"], truth["g"]
+    for file, (per_g, per_dps) in {**truth["files"], "card.txt": (1.0, 1.0)}.items():
+        rate = ["--rate", 100] if file == "sentences.txt" else []
+        answer = operator.answer("poses", file, *SITE, *rate)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            p, raw = known[f"scale_{axis}"], known[f"scale_{axis}"]["unit"] == "raw/g"
+            true = a.matrix[k, k] * (GRAVITY / G0 * per_g if raw else 1.0) - (not raw)
+            near(f"{file}: scale {axis}", p["value"], p["sigma"], true, 4e-5 * max(1.0, per_g if raw else 0.0))
+        raw = answer["gyros"]["raw_unit_rad_s"] is not None
+        check("three gyro scale factors", gyro_scales(answer, g, per_dps / DEG if raw else None) == 3)
+    answer = operator.run("poses", "cut.txt", *SITE)
+    check(f"a cut line is told: {answer.stderr.strip()[-120:]}", answer.returncode > 1 and "line 3001" in answer.stderr or "left out" in answer.stderr)
+    operator.refused("lines of several kinds", "poses", "two.txt")
+    operator.refused("topic echo", "poses", "echo.txt")
+    operator.refused("bytes in hexadecimal", "poses", "bytes.txt")
+    operator.refused("jq -c", "poses", "piece.json")
+    operator.refused("jq -c", "poses", "pretty.json")
+    operator.settled("objects.json", ("accelerometer.axes", "gyro.unit", "accelerometer.unit"))
+    accelerometers(operator.diagnosed("objects.json"), a, 4e-5)
+
+
+TRIALS = {positions: published, six_faces: published, head: published, labelled: labels}

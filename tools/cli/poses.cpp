@@ -139,7 +139,7 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
     }
   }
   Expected<RawLog> log = is_recording ? read_hdf5(name, lenient).map([](const auto& loaded) {
-    return RawLog{pose_input_of(loaded.recording), true, 0.0L, {}};
+    return RawLog{pose_input_of(loaded.recording), true, 0.0L, false, {}};
   })
                                       : read_raw_poses(files, raw_columns(arguments));
   if (!log) {
@@ -150,7 +150,10 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
     return tl::unexpected(added.error());
   }
   log->input.gyro_unit = arguments.gyro_unit;
-  const diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
+  diagnosis::PoseDiagnosis d = diagnosis::diagnose_poses(log->input, arguments.false_alarm_rate);
+  if (log->nameless && !d.failure.empty()) {
+    d.failure += "; without names the first three are taken for gyros: `selfcal import --guess` goes by the numbers";
+  }
   return tell(arguments, d, log->si);
 }
 

@@ -131,6 +131,7 @@ struct OneLog {
   PoseInput input;
   double gyro_si = 0.0, accel_si = 0.0;  // 0: raw, or none
   long double begin_s = 0.0L;            // of a time of the calendar: what was taken off
+  bool nameless = false;
   std::string notes;
 };
 
@@ -234,6 +235,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   OneLog log;
   PoseInput& input = log.input;
   input.sensors = layout->sensors;
+  log.nameless = !layout->by_names && layout->sensors == Sensors::both;
   add_time(*rows, unit, columns.rate_hz, log);
   if (counter > 0) {
     take_lost_rows(rows->data.values[counted], (*source)->title(counter - 1), *columns.rate_hz, log);
@@ -388,7 +390,7 @@ Expected<RawLog> read_raw_poses(const RawFiles& files, const RawColumns& columns
   if (!read) {
     return tl::unexpected(read.error());
   }
-  RawLog log{std::move(read->input), false, read->begin_s, std::move(read->notes)};
+  RawLog log{std::move(read->input), false, read->begin_s, read->nameless, std::move(read->notes)};
   const bool gyros = log.input.sensors != Sensors::accelerometers, accels = log.input.sensors != Sensors::gyros;
   log.si = (!gyros || read->gyro_si > 0.0) && (!accels || read->accel_si > 0.0);
   log.input.gyros_si = read->gyro_si > 0.0;

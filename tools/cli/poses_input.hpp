@@ -28,6 +28,7 @@ struct RawLog {
   diagnosis::PoseInput input;
   bool si = false;             // rad/s and m/s^2
   long double begin_s = 0.0L;  // of a time of the calendar: what was taken off
+  bool nameless = false;       // no names, both triads in the order of the handbook
   std::string notes;           // what was taken for what, where no order of the handbook says it; empty: nothing to say
 };
 // Logs as columns, whatever their form (protocol/import/column_source.hpp), by their names or in the order of the handbook (poses_layout.hpp). What

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <optional>
 
@@ -51,7 +52,7 @@ std::vector<std::size_t> columns_from(std::size_t first, std::size_t count) {
 }
 
 // The first column, or the last one where that rises and the first does not: PSINS writes the time behind its sensors.
-std::size_t nameless_time(const import::ColumnSource& source, std::size_t count) {
+std::size_t nameless_time(const import::ColumnSource& source, const std::vector<std::size_t>& numeric) {
   const auto rises = [&](std::size_t column) {
     import::ColumnRequest request;
     request.tolerant = true;
@@ -61,24 +62,46 @@ std::size_t nameless_time(const import::ColumnSource& source, std::size_t count)
     const auto falls = [](double a, double b) { return !(b > a); };
     return data && std::adjacent_find(data->values[0].begin(), data->values[0].end(), falls) == data->values[0].end();
   };
-  return !rises(0) && rises(count - 1) ? count - 1 : 0;
+  return !rises(numeric.front()) && rises(numeric.back()) ? numeric.size() - 1 : 0;
+}
+
+// Columns that hold a number in the first rows: a sentence's "$IMU", a status word and labels of positions are none.
+std::vector<std::size_t> numeric_columns(const import::ColumnSource& source) {
+  std::vector<std::size_t> numeric;
+  numeric.reserve(source.names().size());
+  for (std::size_t column = 0; column < source.names().size(); ++column) {
+    import::ColumnRequest request;
+    request.tolerant = true;
+    request.columns = {column};
+    request.stamp = column;
+    request.stamp_is_date = true;
+    request.most_rows = 100;
+    const Expected<import::ColumnData> data = source.read(request);
+    const auto finite = [](auto v) { return std::isfinite(v); };
+    if (!data || std::any_of(data->values[0].begin(), data->values[0].end(), finite) ||
+        std::any_of(data->stamps.begin(), data->stamps.end(), finite)) {
+      numeric.push_back(column);
+    }
+  }
+  return numeric;
 }
 
 // Where no name says it: time, three gyros, three accelerometers, or one triad, or one gyro. With a rate the time may lack.
-Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_t count, Sensors sensors,
-                                  const RawColumns& columns, const std::string& file) {
+Expected<PoseLayout> plain_layout(const import::ColumnSource& source, const std::vector<std::size_t>& numeric,
+                                  Sensors sensors, const RawColumns& columns, const std::string& file) {
+  const std::size_t count = numeric.size();
   const bool both = sensors == Sensors::both;
   const std::size_t wanted = both ? 6 : 3;
   PoseLayout layout;
   layout.sensors = sensors;
   std::size_t time = columns.rate_hz && (count == wanted || count == 1) ? 0 : 1;
   if (!columns.rate_hz) {
-    const std::size_t where = count == wanted + 1 ? nameless_time(source, count) : 0;
-    layout.times = {where};
+    const std::size_t where = count == wanted + 1 ? nameless_time(source, numeric) : 0;
+    layout.times = {count > 0 ? numeric[where] : 0};
     time = where == 0 ? 1 : 0;
   }
   if (sensors == Sensors::gyros && (count == time + 1 || count == columns.angle) && count < time + wanted) {
-    layout.gyro = {time};
+    layout.gyro = {numeric[time]};
     layout.only_axis = 0;
     return layout;
   }
@@ -102,11 +125,14 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, std::size_
         fmt::format("{}: {}: {} columns without names: `selfcal import --guess` looks for the sensors among them", file,
                     source.form(), count));
   }
+  const auto of = [&numeric](std::size_t first) {
+    return std::vector<std::size_t>{numeric[first], numeric[first + 1], numeric[first + 2]};
+  };
   if (sensors != Sensors::accelerometers) {
-    layout.gyro = columns_from(time, 3);
+    layout.gyro = of(time);
   }
   if (sensors != Sensors::gyros) {
-    layout.accel = columns_from(time + (both ? 3 : 0), 3);
+    layout.accel = of(time + (both ? 3 : 0));
   }
   return layout;
 }
@@ -214,7 +240,9 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
       return std::move(*one);
     }
   }
-  Expected<PoseLayout> layout = plain_layout(source, named.size(), sensors, columns, file);
+  // A layout of the columns that hold numbers, and then of all.
+  const std::vector<std::size_t> numeric = numeric_columns(source);
+  Expected<PoseLayout> layout = plain_layout(source, numeric, sensors, columns, file);
   if (layout && layout->only_axis >= 0) {
     layout->only_axis = std::max(0, named[layout->gyro.front()].axis);
   }

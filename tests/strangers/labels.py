@@ -1,0 +1,57 @@
+"""Logs that say in each row what its numbers are: serial monitors, JSON a line, IIO dumps, sentences with a checksum."""
+import json
+
+import numpy
+
+from parts import by_hand
+from sensors import DEG, G0, industrial
+
+
+def lines(path, row, count, head="", foot=""):
+    with open(path, "w", encoding="utf-8") as out:
+        out.write(head + "".join(row(k) + "\n" for k in range(count)) + foot)
+
+
+def sentence(text):
+    check = 0
+    for c in text.encode():
+        check ^= c
+    return f"${text}*{check:02X}"
+
+
+def labelled(folder, rng):
+    """One log in the forms of eleven makers; a line that was cut; lines of two sensors; ROS's echo; bytes; JSON in one piece."""
+    g, a, t, f, w = by_hand(rng, industrial, 16)
+    force, rate = a.read(f, 100.0, rng), g.read(w, 100.0, rng)
+    mg, dps, n = force / G0, rate / DEG, len(t)
+    forms = {
+        "commas.txt": lambda k: "t: %.2f, ax: %.6f, ay: %.6f, az: %.6f, gx: %.5f, gy: %.5f, gz: %.5f" % (t[k], *mg[k], *dps[k]),
+        "equals.log": lambda k: "I (%d) imu: ms=%d ax=%.6f ay=%.6f az=%.6f gx=%.5f gy=%.5f gz=%.5f" % (k, 1000 * t[k], *mg[k], *dps[k]),
+        "letters.txt": lambda k: "Time: %.2f s | Accel X: %.6f g, Y: %.6f g, Z: %.6f g | Gyro X: %.5f dps, Y: %.5f dps, Z: %.5f dps" % (t[k], *mg[k], *dps[k]),
+        "before.txt": lambda k: "%.2f -> Accelerometer: X=%.6f Y=%.6f Z=%.6f Gyroscope: X=%.5f Y=%.5f Z=%.5f" % (t[k], *mg[k], *dps[k]),
+        "glued.txt": lambda k: "10:%02d:%05.2f ax=%.6fg ay=%.6fg az=%.6fg gx=%.5fdps gy=%.5fdps gz=%.5fdps" % (int(t[k]) // 60, t[k] % 60, *mg[k], *dps[k]),
+        "three.txt": lambda k: "Time:\t%d ms\tAcc:\t%.6f\t%.6f\t%.6f\tGyro:\t%.5f\t%.5f\t%.5f" % (1000 * t[k], *mg[k], *dps[k]),
+        "words.txt": lambda k: "time %.2f acc %.6f %.6f %.6f gyr %.5f %.5f %.5f" % (t[k], *mg[k], *dps[k]),
+        "rows.jsonl": lambda k: json.dumps({"t": round(t[k], 2), "temp": None, "acc": [round(x, 6) for x in mg[k]], "gyr": [round(x, 5) for x in dps[k]], "ok": True}),
+        "objects.json": lambda k: json.dumps({"id": "imu0", "stamp_ms": int(1.6e12 + 1000 * t[k]), "accel": dict(zip("xyz", numpy.round(mg[k], 6))),
+                                              "gyro": dict(zip("xyz", numpy.round(dps[k], 5)))}),
+        "iio.txt": lambda k: " ".join(f"in_{s}_{x}_raw: {int(v)}" for s, row in (("accel", mg[k] * 16384), ("anglvel", dps[k] * 131)) for x, v in
+                                      zip("xyz", numpy.round(row))) + f" timestamp: {1600000000000000000 + round(t[k] * 1e9)}",
+        "sentences.txt": lambda k: sentence("VNIMU,+0.2012,+0.0987,-0.4411," + ",".join("%+09.5f" % x for x in (*force[k], *(rate[k]))) + ",+21.5,+099.1"),
+    }
+    for name, row in forms.items():
+        lines(folder / name, row, n)
+    truth = {"g": g, "a": a, "files": {name: {"iio.txt": (16384.0, 131.0), "sentences.txt": (G0, DEG)}.get(name, (1.0, 1.0)) for name in forms}}
+    lines(folder / "cut.txt", lambda k: forms["commas.txt"](k)[:60 if k == 3000 else None], n)
+    lines(folder / "two.txt", lambda k: "%s: x=%.6f y=%.6f z=%.6f" % ("acc" if k % 2 else "gyr", *mg[k]), n)
+    lines(folder / "echo.txt", lambda k: "linear_acceleration:\n  x: %.6f\n  y: %.6f\n  z: %.6f\n---" % tuple(force[k]), 2000)
+    lines(folder / "bytes.txt", lambda k: " ".join("%02X" % b for b in b"\x55\x51" + numpy.round(mg[k] * 2048).astype("<i2").tobytes() + b"\x12"), n)
+    (folder / "piece.json").write_text(json.dumps([json.loads(forms["rows.jsonl"](k)) for k in range(n)]), encoding="utf-8")
+    (folder / "pretty.json").write_text(json.dumps([json.loads(forms["rows.jsonl"](k)) for k in range(900)], indent=1), encoding="utf-8")
+    block = forms["commas.txt"](0) + "\n"   # a card's block of zeros behind a line that ends where the program's buffer does
+    text = "".join(forms["commas.txt"](k) + "\n" for k in range(n)).encode()
+    size = 1 << 18
+    whole = text[:text.rfind(b"\n", 0, 4 * size - len(block)) + 1]
+    fill = 4 * size - len(whole)
+    (folder / "card.txt").write_bytes(b"#" * (fill - 1) + b"\n" + whole + b"\0" * 9000)
+    return truth
