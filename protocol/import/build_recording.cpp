@@ -7,6 +7,7 @@
 #include <new>
 
 #include "estimator/geometry/units.hpp"
+#include "protocol/import/full_words.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/resample.hpp"
 #include "protocol/import/time_axis.hpp"
@@ -199,6 +200,19 @@ void take_once(ColumnData& data, std::vector<std::string>& notes) {
   }
 }
 
+// Words of 16 bits without a sign, and full ones, of the sensors.
+void continue_words(const Places& places, ColumnData& data, std::vector<std::string>& notes) {
+  std::size_t columns = 0;
+  for (const std::array<std::size_t, 3>& triad : {places.gyro, places.accelerometer}) {
+    for (const std::size_t place : triad) {
+      columns += continue_full_words(data.values[place]) ? 1 : 0;
+    }
+  }
+  if (columns > 0) {
+    notes.push_back(fmt::format("words of 16 bits, full at 65536, are continued in {} columns", columns));
+  }
+}
+
 // Strictly, or without the rows that lack a number, which the notes then say.
 Expected<ColumnData> read_rows(const ColumnSource& source, ColumnRequest request, const ImportMap& map,
                                const std::string& file, std::vector<std::string>& notes) {
@@ -245,6 +259,10 @@ Expected<Imported> build(const ColumnSource& source, const ImportMap& map, const
   if (std::string words = continue_full_clocks(data->stamps); !words.empty()) {
     imported.notes.push_back(std::move(words));
   }
+  if (std::string words = put_in_order(*data); !words.empty()) {
+    imported.notes.push_back(std::move(words));
+  }
+  continue_words(places, *data, imported.notes);
   constexpr std::size_t fewest = 2;
   if (data->rows < fewest) {
     return fail(ErrorKind::bad_input,

@@ -7,6 +7,7 @@
 
 #include "protocol/import/array_source.hpp"
 #include "protocol/import/bag.hpp"
+#include "protocol/import/split_time.hpp"
 #include "protocol/import/text_source.hpp"
 #include "protocol/recording/atomic_file.hpp"
 
@@ -117,7 +118,7 @@ Expected<std::unique_ptr<ColumnSource>> open_columns(const std::filesystem::path
                                                      const std::optional<TextDialect>& dialect,
                                                      const std::optional<std::string>& topic) {
   try {
-    return open_any(file, dialect, topic);
+    return open_any(file, dialect, topic).map(with_whole_time);
   } catch (const std::bad_alloc&) {
     return fail(ErrorKind::bad_input, fmt::format("{}: does not fit into memory", file.string()));
   }

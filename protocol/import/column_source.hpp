@@ -49,6 +49,8 @@ class ColumnSource {
   virtual std::string form() const = 0;
   // How a text is written; nullptr for other forms.
   virtual const TextDialect* dialect() const { return nullptr; }
+  // Words on columns that are read as one; empty: none.
+  virtual std::string put_together() const { return {}; }
   // What stands before the numbers of a text, for those who know a format by it.
   virtual std::string preamble() const { return {}; }
   // Errors (bad_input) name file, line or row, column, value, and what was expected.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "protocol/import/full_words.hpp"
 #include "protocol/import/guess_orientation.hpp"
 #include "protocol/import/guess_roles.hpp"
 #include "protocol/import/guess_table.hpp"
@@ -21,10 +22,6 @@ namespace {
 constexpr std::size_t most_numbers = std::size_t{40} << 20;  // judged by; 320 MiB
 constexpr std::size_t fewest_columns = 6;
 
-std::string_view si_unit(const UnitClaim& said, std::string_view increments, std::string_view rates) {
-  return said.increments ? increments : rates;
-}
-
 class Guesser {
  public:
   Guesser(const ColumnSource& source, const GuessKnowledge& knowledge, Values values, LeftOutRows lost)
@@ -39,6 +36,9 @@ class Guesser {
       guess_.map.dialect = *source_.dialect();
     }
     psins_ = read_psins(source_.preamble());
+    if (std::string words = continue_full_columns(source_, named_, values_); !words.empty()) {
+      say("columns", std::move(words));
+    }
     roles_ = assign_roles(source_, named_, values_, lost_.rows, psins_.has_value(), guess_.remarks);
     guess_site();
     guess_time();
@@ -346,7 +346,7 @@ class Guesser {
     const UnitClaim said = claim(*roles_.gyro, "gyro.unit");
     const auto claimed = find_unit(said.unit);
     if (!orientation.rad_per_sample || !interval_s_) {
-      gyro.unit = std::string(claimed ? claimed->name : si_unit(said, "rad", "rad/s"));
+      gyro.unit = claimed ? std::string(claimed->name) : said.increments ? "rad" : "rad/s";
       gyro.increments = find_unit(gyro.unit)->quantity == Quantity::angle;
       const char* why = !interval_s_ ? "the sample rate is not known" : "no turn that shows it";
       // "gyro_rad" of PX4 is a rate, other people's are increments.
@@ -380,7 +380,7 @@ class Guesser {
     // Counts, or another unit than the name's.
     const auto other = gyro_unit(*orientation.rad_per_sample, *interval_s_, {{}, said.increments});
     gyro.increments = said.increments;
-    gyro.unit = std::string(si_unit(said, "rad", "rad/s"));
+    gyro.unit = said.increments ? "rad" : "rad/s";
     const double scale = *orientation.rad_per_sample / (said.increments ? 1.0 : *interval_s_);
     gyro.scale = {scale, scale, scale};
     doubt("gyro.unit",
@@ -423,7 +423,7 @@ class Guesser {
                                "moves, or another unit",
                                said.unit, size));
     }
-    accel.unit = std::string(si_unit(said, "m/s", "m/s^2"));
+    accel.unit = said.increments ? "m/s" : "m/s^2";
     const double scale = 9.80665 * (said.increments ? interval : 1.0) / size;
     accel.scale = {scale, scale, scale};
     doubt("accelerometer.unit",

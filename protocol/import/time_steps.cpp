@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "protocol/import/incomplete_rows.hpp"
 
@@ -108,6 +109,43 @@ std::string spread_coarse_stamps(std::vector<long double>& stamps) {
   }
   stamps = std::move(spread);
   return fmt::format("{} rows have the time of the row before, of a clock coarser than the rows: spread evenly", still);
+}
+
+std::string put_in_order(ColumnData& data) {
+  constexpr std::size_t one_in = 50, farthest = 8;
+  std::size_t falls = 0;
+  for (std::size_t k = 1; k < data.stamps.size(); ++k) {
+    falls += data.stamps[k] < data.stamps[k - 1] ? 1 : 0;
+  }
+  if (falls == 0 || falls * one_in > data.stamps.size()) {
+    return {};
+  }
+  std::vector<std::size_t> order(data.stamps.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return data.stamps[a] < data.stamps[b]; });
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    if (order[k] > k + farthest || k > order[k] + farthest) {
+      return {};
+    }
+  }
+  const auto ordered = [&order](auto& all) {
+    auto moved = all;
+    std::transform(order.begin(), order.end(), moved.begin(), [&all](std::size_t from) { return all[from]; });
+    all = std::move(moved);
+  };
+  ordered(data.stamps);
+  std::for_each(data.values.begin(), data.values.end(), ordered);
+  return fmt::format("{} rows stand behind later ones: put in the order of their times", falls);
+}
+
+std::string put_in_order(std::vector<long double>& stamps) {
+  ColumnData alone;
+  alone.rows = stamps.size();
+  alone.stamps = std::move(stamps);
+  std::string words = put_in_order(alone);
+  stamps = std::move(alone.stamps);
+  return words;
 }
 
 std::vector<bool> repeated_rows(const ColumnData& data) {

@@ -19,6 +19,10 @@ std::string continue_full_clocks(std::vector<long double>& stamps);
 // A clock coarser than the rows, or one of blocks of rows: stamps that never fall and stand still for a few rows are spread evenly up to the next
 // one. Words on how many; empty: nothing done, for fewer than one in a hundred stands still, or one does for long.
 std::string spread_coarse_stamps(std::vector<long double>& stamps);
+// Rows that came by a network, a few of them by another way than those before: put in the order of their stamps where one in fifty and fewer stands
+// up to eight rows behind its place. Words on how many; empty: nothing done.
+std::string put_in_order(ColumnData& data);
+std::string put_in_order(std::vector<long double>& stamps);  // alone
 // For each row the number of rows before it with the same stamp.
 std::vector<int> place_in_stamp(const std::vector<long double>& stamps);
 

@@ -3,6 +3,7 @@ import numpy
 
 import labels
 import published
+import words
 from answers import SITE, accelerometers, check, gyro_scales, near, parameters
 from sensors import DEG, EARTH, G0, GRAVITY
 
@@ -76,4 +77,19 @@ def labelled(operator, rng):
     accelerometers(operator.diagnosed("objects.json"), a, 4e-5)
 
 
-TRIALS = {positions: published, six_faces: published, head: published, labelled: labels}
+def imported(operator, rng):
+    """Split times, late rows and words without a sign, brought by `import`."""
+    truth = words.by_network(operator.folder, rng)
+    operator.settled("log.csv", ("accelerometer.axes",))
+    answer = operator.diagnosed("log.csv")
+    accelerometers(answer, truth["a"], 4e-5)
+    check("three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+    words.unsigned(operator.folder, rng)
+    for file in ("plain.csv", "hex.csv", "full.csv"):
+        operator.settled(file, ("accelerometer.axes", "gyro.unit", "accelerometer.unit"))
+        answer = operator.diagnosed(file)
+        carried = answer["gravity_direction_deg"]["after"]
+        check(f"{file}: {answer['poses']} poses, gravity carried to {carried:.2f} deg", answer["poses"] == 16 and carried < 1.0)
+
+
+TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None}

@@ -46,33 +46,4 @@ std::optional<std::vector<double>> rows_by_counter(const std::vector<double>& co
   return rows.back() + 1.0 - kept > most_lost * kept ? std::nullopt : std::optional(std::move(rows));
 }
 
-bool continue_full_words(std::vector<double>& values) {
-  if (values.size() < 3 || !all_whole(values)) {
-    return false;
-  }
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  if (*low < -0.5 * word || *high >= word || *high - *low < 0.75 * word || *high - *low >= word) {
-    return false;
-  }
-  std::vector<double> whole = {values.front()};
-  std::size_t leaps = 0;
-  double largest = 0.0;
-  for (std::size_t k = 1; k < values.size(); ++k) {
-    const double step = std::remainder(values[k] - values[k - 1], word);
-    leaps += std::abs(values[k] - values[k - 1]) > 0.5 * word ? 1 : 0;
-    largest = std::max(largest, std::abs(step));
-    whole.push_back(whole.back() + step);
-  }
-  constexpr std::size_t least = 2;         // out and back
-  constexpr double in_a_row = 0.25;        // of the word: a reading that goes on
-  constexpr double once_and_a_half = 2.0;  // of the word, in all: a sum of increments goes farther
-  const auto [bottom, top] = std::minmax_element(whole.begin(), whole.end());
-  if (leaps < least || largest > in_a_row * word || *top - *bottom > once_and_a_half * word) {
-    return false;
-  }
-  const double off = word * std::round(median(whole) / word);
-  std::transform(whole.begin(), whole.end(), values.begin(), [off](double v) { return v - off; });
-  return true;
-}
-
 }  // namespace selfcal::cli

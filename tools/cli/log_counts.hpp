@@ -1,4 +1,4 @@
-// What a logger counts: rows, and readings in words of 16 bits.
+// What a logger counts: rows.
 #pragma once
 
 #include <optional>
@@ -10,9 +10,5 @@ namespace selfcal::cli {
 // Which row of the sensor each row of the log is, counted from 0, by a COUNTER that rises by the same from row to row, also one that begins again at
 // 2^8, 2^16, 2^24 or 2^32: rows that were lost are left out of it. None: no counter, or one that does not rise so.
 std::optional<std::vector<double>> rows_by_counter(const std::vector<double>& counter);
-
-// Whole numbers that leap by nearly 2^16 between two rows, as words of 16 bits do that are written without their sign, or are full in a fast
-// turn: continued, so that they lie about zero. True: it was done. What stands at the ends of a range clips, and is left as it is.
-bool continue_full_words(std::vector<double>& values);
 
 }  // namespace selfcal::cli

@@ -17,18 +17,11 @@ struct TimedRows {
   std::string notes;     // what was done to them; empty: nothing
 };
 
-// "secs, nsecs", "Unix Time, Microseconds": whole seconds in one column, the part of a second in the next.
-struct SplitTime {
-  std::size_t seconds = 0, part = 0;
-  double part_s = 1.0;  // seconds a unit
-};
-std::optional<SplitTime> split_time(const import::ColumnSource& source);
-
 // Whether a column holds a time anywhere in the first rows.
 bool holds_stamps(const import::ColumnSource& source, std::size_t column);
 
 // With the first of the columns `times` whose stamps rise, or else with the first that can be read: a date of the day stands beside the time of
-// the day. A time that is split is read from both. Rows that stand twice are taken once, a few
+// the day. Rows that stand twice are taken once, a few
 // that stand behind later ones are put in order, clocks that begin again where they are full go on, and where the request is tolerant rows
 // without a time are left out. No `times`: no stamps.
 Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std::vector<std::size_t>& times,

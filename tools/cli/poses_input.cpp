@@ -12,6 +12,7 @@
 #include "estimator/geometry/earth.hpp"
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/column_source.hpp"
+#include "protocol/import/full_words.hpp"
 #include "protocol/import/guess_names.hpp"
 #include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
@@ -246,7 +247,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   std::vector<std::size_t> full;
   for (std::size_t k = 0; k < layout->gyro.size() + layout->accel.size(); ++k) {
     const bool raw = k < layout->gyro.size() ? log.gyro_si == 0.0 : log.accel_si == 0.0;
-    if (raw && continue_full_words(rows->data.values[k])) {
+    if (raw && import::continue_full_words(rows->data.values[k])) {
       full.push_back(request.columns[k] + 1);
     }
   }
@@ -254,7 +255,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
     log.notes = and_also(log.notes, fmt::format("words of 16 bits, full at 65536, are continued in column{} {}",
                                                 full.size() > 1 ? "s" : "", fmt::join(full, ", ")));
   }
-  log.notes = and_also(log.notes, rows->notes);
+  log.notes = and_also(and_also(log.notes, (*source)->put_together()), rows->notes);
   log.notes = and_also(log.notes, layout_words(*layout, rows->time, unit, columns));
   const std::vector<std::vector<double>>& values = rows->data.values;
   if (layout->only_axis >= 0) {

@@ -8,8 +8,6 @@
 #include <numeric>
 #include <optional>
 
-#include "tools/cli/log_time.hpp"
-
 namespace selfcal::cli {
 namespace {
 
@@ -138,10 +136,7 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, const std:
 }
 
 // Columns that are called a time; else the first one, where it is nothing else.
-void add_times(const import::ColumnSource& source, const std::vector<NamedColumn>& named, PoseLayout& layout) {
-  if (const auto split = split_time(source)) {
-    layout.times.push_back(split->seconds);
-  }
+void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k].role == Role::time) {
       layout.times.push_back(k);
@@ -155,8 +150,8 @@ void add_times(const import::ColumnSource& source, const std::vector<NamedColumn
   }
 }
 
-Expected<PoseLayout> layout_by_names(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
-                                     Triads gyro, Triads accel, const RawColumns& columns, const std::string& file) {
+Expected<PoseLayout> layout_by_names(const std::vector<NamedColumn>& named, Triads gyro, Triads accel,
+                                     const RawColumns& columns, const std::string& file) {
   PoseLayout layout;
   layout.by_names = true;
   // Of one sensor alone, if nothing else in the file may be the other one.
@@ -186,7 +181,7 @@ Expected<PoseLayout> layout_by_names(const import::ColumnSource& source, const s
   layout.gyro = gyros ? std::move(gyro.first) : std::vector<std::size_t>{};
   layout.accel = accels ? std::move(accel.first) : std::vector<std::size_t>{};
   if (!columns.rate_hz) {
-    add_times(source, named, layout);
+    add_times(named, layout);
     if (layout.times.empty()) {
       return fail(ErrorKind::bad_input,
                   fmt::format("{}: no column is called a time: --rate says how many rows a second it holds", file));
@@ -196,8 +191,7 @@ Expected<PoseLayout> layout_by_names(const import::ColumnSource& source, const s
 }
 
 // The only column that is called a gyro, whatever stands beside it: a table's angle, a temperature.
-std::optional<PoseLayout> one_named_gyro(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
-                                         const RawColumns& columns) {
+std::optional<PoseLayout> one_named_gyro(const std::vector<NamedColumn>& named, const RawColumns& columns) {
   const auto is = [](const NamedColumn& c) { return c.role == Role::gyro; };
   const auto found = std::find_if(named.begin(), named.end(), is);
   if (found == named.end() || std::count_if(named.begin(), named.end(), is) != 1 || found->axis < 0) {
@@ -209,7 +203,7 @@ std::optional<PoseLayout> one_named_gyro(const import::ColumnSource& source, con
   layout.gyro = {static_cast<std::size_t>(found - named.begin())};
   layout.only_axis = found->axis;
   if (!columns.rate_hz) {
-    add_times(source, named, layout);
+    add_times(named, layout);
   }
   return columns.rate_hz || !layout.times.empty() ? std::optional(std::move(layout)) : std::nullopt;
 }
@@ -233,10 +227,10 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
     (sensors == Sensors::gyros ? gyro : accel) = triads_of(named, Role::unknown);
   }
   if (!gyro.first.empty() || !accel.first.empty()) {
-    return layout_by_names(source, named, std::move(gyro), std::move(accel), columns, file);
+    return layout_by_names(named, std::move(gyro), std::move(accel), columns, file);
   }
   if (sensors == Sensors::gyros) {
-    if (std::optional<PoseLayout> one = one_named_gyro(source, named, columns)) {
+    if (std::optional<PoseLayout> one = one_named_gyro(named, columns)) {
       return std::move(*one);
     }
   }
