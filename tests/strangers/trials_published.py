@@ -3,6 +3,7 @@ import numpy
 
 import labels
 import published
+import silent as silent_gyros
 import words
 from answers import SITE, accelerometers, check, gyro_scales, near, parameters
 from sensors import DEG, EARTH, G0, GRAVITY
@@ -92,4 +93,20 @@ def imported(operator, rng):
         check(f"{file}: {answer['poses']} poses, gravity carried to {carried:.2f} deg", answer["poses"] == 16 and carried < 1.0)
 
 
-TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None}
+def silent(operator, rng):
+    truth = silent_gyros.silent(operator.folder, rng)
+    answer = operator.answer("poses", "hand.csv", *SITE)
+    accelerometers(answer, truth["a"], 4e-5)
+    sigma = answer["gyros"]["bias_sigma"]
+    check(f"bias of the gyros within the band that is set to zero: {sigma}", all(0.1 * DEG < s < 0.6 * DEG for s in sigma))
+    check("three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+    for file in ("hand.csv", "rest.csv"):
+        answer = operator.answer("poses", file)
+        check(f"{file}: why is said", any("set" in words and "to zero" in words for words in answer["invisible"]))
+    check("no sigma by nothing", all(a["mean"]["sigma"] is None for a in answer["rest"]["axes"] if a["sensor"] == "gyro"))
+    answer = operator.answer("poses", "headings.csv", "--only", "gyros")
+    jumps = any(d["effect"] == "gyro_bias_jump" for a in answer["rest"]["axes"] for d in a["drifts"])
+    check(f"jumps {jumps}: or another heading", not jumps or any("another heading" in words for words in answer["invisible"]))
+
+
+TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros}

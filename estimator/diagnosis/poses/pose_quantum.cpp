@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -30,6 +33,57 @@ double hidden_by_quantum(double variance) {
   return std::sqrt(square);
 }
 
+double silent_band(const std::vector<std::array<double, 3>>& series, std::size_t axis, const std::vector<Pose>& poses) {
+  if (poses.empty()) {
+    return 0.0;
+  }
+  const double value = series[poses.front().first][axis];
+  for (const Pose& p : poses) {
+    for (const auto& [first, last] : p.quiet) {
+      for (std::size_t i = first; i < last; ++i) {
+        if (series[i][axis] != value) {
+          return 0.0;
+        }
+      }
+    }
+  }
+  double nearest = HUGE_VAL;
+  for (const std::array<double, 3>& row : series) {
+    nearest = row[axis] == value ? nearest : std::min(nearest, std::abs(row[axis] - value));
+  }
+  return nearest;
+}
+
+double hidden_by_band(double band, double quantum) {
+  constexpr double quanta = 2.0;
+  return band > quanta * quantum ? band / std::sqrt(3.0) : quantum * hidden_by_quantum(0.0);
+}
+
+std::string silent_gyros(const PoseInput& input, const std::vector<Pose>& poses) {
+  std::string axes;
+  double widest = 0.0;
+  for (std::size_t axis = 0; axis < 3 && input.sensors != Sensors::accelerometers; ++axis) {
+    const double band = input.gyro_axes[axis] ? silent_band(input.gyro, axis, poses) : 0.0;
+    if (band > 0.0) {
+      axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
+      widest = std::max(widest, band);
+    }
+  }
+  if (axes.empty()) {
+    return axes;
+  }
+  std::array<char, 120> within{};
+  if (std::isfinite(widest) && input.gyros_si) {
+    std::snprintf(within.data(), within.size(), ": within %.2g deg/s of it", widest / units::degree);
+  } else if (std::isfinite(widest)) {
+    std::snprintf(within.data(), within.size(), ": within %.2g raw units of it", widest);
+  } else {
+    std::snprintf(within.data(), within.size(), ": how near to it nothing says");
+  }
+  return "bias of gyro " + axes + ", which read one value in all rests, as of a device that sets itself to zero" +
+         within.data();
+}
+
 void add_hidden(const PoseInput& input, std::vector<Pose>& poses) {
   const auto fill = [&](const std::vector<std::array<double, 3>>& series, Vector3 Pose::*mean, Vector3 Pose::*white,
                         Vector3 Pose::*hidden) {
@@ -43,9 +97,14 @@ void add_hidden(const PoseInput& input, std::vector<Pose>& poses) {
         const double sigma = (p.*white)(axis)*std::sqrt(samples);
         (p.*hidden)(axis) = quantum > 0.0 ? quantum * hidden_by_quantum(sigma * sigma / (quantum * quantum)) : 0.0;
       }
+      const bool gyro = &series == &input.gyro;
+      const double band = gyro ? silent_band(series, static_cast<std::size_t>(axis), poses) : 0.0;
+      for (Pose& p : poses) {
+        (p.*hidden)(axis) = band > 0.0 ? hidden_by_band(band, quantum) : (p.*hidden)(axis);
+      }
       for (Pose& p : poses) {
         const auto alike = std::count_if(poses.begin(), poses.end(), [&](const Pose& other) {
-          return std::abs((other.*mean)(axis) - (p.*mean)(axis)) < 0.5 * quantum;
+          return band > 0.0 || std::abs((other.*mean)(axis) - (p.*mean)(axis)) < 0.5 * quantum;
         });
         (p.*hidden)(axis) *= std::sqrt(static_cast<double>(std::max<std::ptrdiff_t>(1, alike)));
       }

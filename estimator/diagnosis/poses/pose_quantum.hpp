@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "estimator/diagnosis/poses/pose_data.hpp"
@@ -17,6 +18,16 @@ double quantum_of(const std::vector<std::array<double, 3>>& series, std::size_t 
 // over the quantum: the mean of q / (pi k) exp(-2 pi^2 k^2 (sigma/q)^2) sin(2 pi k x / q), k = 1, 2 ... (Widrow and Kollar 2008), over all x. Its
 // square is a twelfth where nothing scatters.
 double hidden_by_quantum(double variance);
+
+// Of an axis that reads one value in all rests, as gyros do that their device sets to zero: how far the nearest other value of the log is, HUGE_VAL
+// where it has none. 0: it reads several.
+double silent_band(const std::vector<std::array<double, 3>>& series, std::size_t axis, const std::vector<Pose>& poses);
+
+// Sigma of a mean in such a band: that of all values in it; of one no wider than two quanta what the quantum hides.
+double hidden_by_band(double band, double quantum);
+
+// Which gyros read one value in all rests, and how near to it their bias is, in words; empty: none.
+std::string silent_gyros(const PoseInput& input, const std::vector<Pose>& poses);
 
 // Fills `gyro_hidden` and `accel_hidden` of the poses. Poses in which an axis reads the same to a quantum are off by the same: their sigma is as
 // much larger as makes that of their mean no smaller than one's.

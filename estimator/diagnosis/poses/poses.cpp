@@ -10,6 +10,7 @@
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
+#include "estimator/diagnosis/poses/pose_quantum.hpp"
 #include "estimator/diagnosis/poses/pose_spikes.hpp"
 #include "estimator/diagnosis/poses/pose_stuck.hpp"
 #include "estimator/diagnosis/poses/pose_thermal.hpp"
@@ -271,6 +272,8 @@ void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<P
     }
     d.gyro_bias[axis] = mean;
     d.gyro_bias_sigma[axis] = poses.size() > 1 ? std::sqrt(square / (n - 1.0) / n) : d.gyro_white_rms[axis];
+    d.gyro_bias_sigma[axis] =
+        std::hypot(d.gyro_bias_sigma[axis], poses.front().gyro_hidden(static_cast<Eigen::Index>(axis)) / std::sqrt(n));
     d.gyro_held_out_rms[axis] = poses.size() > 1 ? std::sqrt(square / n) * n / (n - 1.0) : 0.0;
   }
   if (poses.size() < least_poses) {
@@ -416,6 +419,9 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     d.has_temperature = take_temperatures(input, poses);
   }
   d.by_poses = poses.size() >= least_poses && input.sensors != Sensors::gyros;
+  if (std::string silent = silent_gyros(input, poses); !silent.empty()) {
+    d.invisible.push_back(std::move(silent));
+  }
   if (input.attitude && input.sensors != Sensors::accelerometers) {
     d.by_attitude = judge_attitude(input, *input.attitude, poses);
   }

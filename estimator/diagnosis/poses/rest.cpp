@@ -15,6 +15,11 @@ namespace {
 void add_quantum(const PoseInput& input, const std::vector<Pose>& poses, RestAxis& a) {
   const auto& series = a.gyro ? input.gyro : input.accel;
   const auto axis = static_cast<std::size_t>(a.axis);
+  if (const double band = silent_band(series, axis, poses); band > 0.0) {
+    a.quantum = quantum_of(series, axis, 0, series.size());
+    a.mean_sigma = std::hypot(a.mean_sigma, hidden_by_band(band, a.quantum));
+    return;
+  }
   double least = HUGE_VAL, square = 0.0, count = 0.0;
   for (const Pose& p : poses) {
     for (const auto& [first, last] : p.quiet) {
@@ -87,11 +92,24 @@ std::string of_gyros(const Rest& rest) {
   if (!rest.si) {
     return "bias of the gyros apart from the Earth's rate: no unit and no north";
   }
+  if (!std::isfinite(sigma)) {
+    return "the Earth's rate: gyros that read one value do not show it";
+  }
   if (sigma > visible) {
     return with_number("the Earth's 15.04 deg/h apart from a bias of the gyros known to %.2g", sigma);
   }
   return with_number("bias of the gyros apart from the Earth's rate (%.2f deg/h in all)",
                      std::sqrt(square) / units::degree_per_hour);
+}
+
+// Whether a jump of the gyros is no larger than a sensor that was turned sees of the Earth's rate.
+bool may_be_headings(const Rest& rest) {
+  constexpr double both_ways = 2.0 * 15.041 * units::degree_per_hour, sure = 3.0;
+  return rest.si && std::any_of(rest.axes.begin(), rest.axes.end(), [](const RestAxis& a) {
+           return a.gyro && std::any_of(a.terms.begin(), a.terms.end(), [](const RestTerm& t) {
+                    return t.found.equation.jumps && std::abs(t.found.value) - sure * t.found.sigma < both_ways;
+                  });
+         });
 }
 
 }  // namespace
@@ -151,6 +169,9 @@ std::vector<std::string> undetermined_at_rest(const Rest& rest, const PoseDiagno
     if (!d.earth_taken_out) {
       all.push_back(of_gyros(rest));
     }
+  }
+  if (may_be_headings(rest)) {
+    all.emplace_back("a jump of the gyros apart from another heading: the Earth's rate makes as much");
   }
   if (names(rest, false, true) || names(rest, false, false)) {
     all.emplace_back("drift of accelerometers or tilt of the base: 1 mg is 0.057 deg");
