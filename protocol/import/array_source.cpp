@@ -142,6 +142,49 @@ void add_array(const std::string& name, NumberType type, bool big_endian, const 
   }
 }
 
+namespace {
+
+void put_number(std::string& out, std::uint64_t number) {
+  out.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+}  // namespace
+
+void put_array(std::string& out, const std::string& name, NumberType type, const ArrayShape& shape,
+               std::string_view bytes) {
+  put_number(out, name.size());
+  out += name;
+  put_number(out, static_cast<std::uint64_t>(type));
+  put_number(out, shape.rows);
+  put_number(out, shape.columns);
+  put_number(out, shape.column_major ? 1 : 0);
+  out += bytes;
+}
+
+void add_arrays(std::string written, Arrays& arrays) {
+  const std::string& block = arrays.blocks.emplace_back(std::move(written));
+  const std::size_t number_of_block = arrays.blocks.size() - 1;
+  std::size_t at = 0;
+  const auto take = [&] {
+    std::uint64_t number = 0;
+    std::memcpy(&number, block.data() + at, sizeof number);
+    at += sizeof number;
+    return static_cast<std::size_t>(number);
+  };
+  // Our own child wrote it: no checks.
+  while (at < block.size()) {
+    const std::size_t length = take();
+    const std::string name = block.substr(at, length);
+    at += length;
+    const auto type = static_cast<NumberType>(take());
+    const std::size_t rows = take(), columns = take();
+    const bool column_major = take() != 0;
+    add_array(name, type, std::endian::native == std::endian::big, {rows, columns, column_major}, number_of_block, at,
+              arrays);
+    at += rows * columns * size_of(type);
+  }
+}
+
 Expected<std::unique_ptr<ColumnSource>> array_source(Arrays arrays, const std::string& file) {
   std::map<std::size_t, std::size_t> lengths;
   for (const RawColumn& column : arrays.columns) {

@@ -39,6 +39,12 @@ struct ArrayShape {
 void add_array(const std::string& name, NumberType type, bool big_endian, const ArrayShape& shape, std::size_t block,
                std::size_t offset, Arrays& arrays);
 
+// An array as a child process hands it over: name, type, shape, bytes.
+void put_array(std::string& out, const std::string& name, NumberType type, const ArrayShape& shape,
+               std::string_view bytes);
+// All that stand in what our own child wrote.
+void add_arrays(std::string block, Arrays& arrays);
+
 // Keeps the columns of the length that most of them have; what else there is (scalars, other rates) is left out and
 // named in form(). An error (bad_input) where nothing is left.
 Expected<std::unique_ptr<ColumnSource>> array_source(Arrays arrays, const std::string& file);
@@ -49,5 +55,7 @@ Expected<void> add_npy(std::string image, const std::string& name, const std::st
 // The whole file; nullopt: this program was built without.
 Expected<Arrays> read_npz(const std::filesystem::path& file);
 Expected<Arrays> read_mat(const std::filesystem::path& file);
+// An HDF5 file of any program: data sets of real numbers with one or two dimensions by their paths, tables by their members, units by an attribute.
+Expected<Arrays> read_hdf5_arrays(const std::filesystem::path& file);
 
 }  // namespace selfcal::import

@@ -10,6 +10,7 @@
 #include "protocol/import/split_time.hpp"
 #include "protocol/import/text_source.hpp"
 #include "protocol/recording/atomic_file.hpp"
+#include "protocol/recording/hdf5.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -64,15 +65,13 @@ constexpr std::string_view novatel =
 constexpr std::string_view ardupilot =
     "a log of ArduPilot; `sed -n '/^IMU, [0-9]*, [1-9],/d;s/^FMT.*, IMU, [A-Za-z]*, //p;s/^IMU, //p'` makes columns of "
     "its first sensor's lines";
-constexpr std::array<Stranger, 7> strangers{
+constexpr std::array<Stranger, 6> strangers{
     {{"FMT, ", ardupilot},
      {"%RAWIMU", novatel},
      {"#RAWIMU", novatel},
      {"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
      {"#ROSRECORD", "a ROS bag of version 1, which this program does not read; version 2.0 is read"},
-     {"\x28\xB5\x2F\xFD", "compressed with zstd; `zstd -d` unpacks it"},
-     {"\x89HDF",
-      "an HDF5 file; a recording needs no import, and of others the arrays are wanted as .npz, .mat or CSV"}}};
+     {"\x28\xB5\x2F\xFD", "compressed with zstd; `zstd -d` unpacks it"}}};
 
 Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& file,
                                                  const std::optional<TextDialect>& dialect,
@@ -103,6 +102,12 @@ Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& fi
   }
   if (head.starts_with("MATLAB ") || (file.extension() == ".mat" && head.find('\0') != std::string::npos)) {
     return open_arrays(file, read_mat);
+  }
+  if (head.starts_with("\x89HDF")) {
+    if (!is_foreign_hdf5(file)) {
+      return fail(ErrorKind::bad_input, fmt::format("{}: a recording, which needs no import", file.string()));
+    }
+    return open_arrays(file, read_hdf5_arrays);
   }
   for (const Stranger& stranger : strangers) {
     if (head.starts_with(stranger.magic)) {

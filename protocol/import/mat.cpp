@@ -2,8 +2,6 @@
 #include <fmt/format.h>
 #include <matio.h>
 
-#include <bit>
-#include <cstring>
 #include <memory>
 #include <optional>
 
@@ -39,9 +37,7 @@ std::optional<NumberType> type_of(const matvar_t& variable) {
   }
 }
 
-void put(std::string& out, std::uint64_t number) { out.append(reinterpret_cast<const char*>(&number), sizeof number); }
-
-// Name, type, rows, columns, bytes of each matrix of real numbers; structures by their fields.
+// Each matrix of real numbers; structures by their fields.
 void put_variable(std::string& out, const std::string& name, matvar_t* variable, int depth) {
   if (variable == nullptr || depth > deepest) {
     return;
@@ -64,12 +60,9 @@ void put_variable(std::string& out, const std::string& name, matvar_t* variable,
   if (rows == 0 || columns == 0 || rows > most_bytes / size / columns || variable->nbytes != rows * columns * size) {
     return;
   }
-  put(out, name.size());
-  out += name;
-  put(out, static_cast<std::uint64_t>(*type));
-  put(out, rows);
-  put(out, columns);
-  out.append(static_cast<const char*>(variable->data), variable->nbytes);
+  constexpr bool column_major = true;
+  put_array(out, name, *type, {rows, columns, column_major},
+            {static_cast<const char*>(variable->data), variable->nbytes});
 }
 
 Expected<std::string> variables_of(const std::string& file) {
@@ -94,28 +87,15 @@ Expected<Arrays> read_mat(const std::filesystem::path& file) {
   if (!bytes) {
     return tl::unexpected(bytes.error());
   }
+  if (bytes->empty()) {  // written as HDF5 by another program, whose arrays do not say their class as MATLAB's do
+    Expected<Arrays> others = read_hdf5_arrays(file);
+    if (others && !others->columns.empty()) {
+      return others;
+    }
+  }
   Arrays arrays;
   arrays.form = "MATLAB .mat";
-  const std::string& block = arrays.blocks.emplace_back(std::move(*bytes));
-  std::size_t at = 0;
-  const auto take = [&] {
-    std::uint64_t number = 0;
-    std::memcpy(&number, block.data() + at, sizeof number);
-    at += sizeof number;
-    return static_cast<std::size_t>(number);
-  };
-  // Our own child wrote it: no checks.
-  while (at < block.size()) {
-    const std::size_t length = take();
-    const std::string name = block.substr(at, length);
-    at += length;
-    const auto type = static_cast<NumberType>(take());
-    const std::size_t rows = take();
-    const std::size_t columns = take();
-    constexpr bool column_major = true;
-    add_array(name, type, std::endian::native == std::endian::big, {rows, columns, column_major}, 0, at, arrays);
-    at += rows * columns * size_of(type);
-  }
+  add_arrays(std::move(*bytes), arrays);
   return arrays;
 }
 

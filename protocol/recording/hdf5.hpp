@@ -21,6 +21,9 @@ Expected<LoadedRecording> read_hdf5(const std::filesystem::path& path, const Che
 Expected<LoadedRecording> read_hdf5_image(const void* image, std::size_t size, const std::string& name,
                                           const CheckPolicy& policy = {});
 
+// Whether it is an HDF5 file that says no format of a recording: another program's. What is damaged is none.
+bool is_foreign_hdf5(const std::filesystem::path& path);
+
 // Writes f8, chunked, shuffled and deflated. The file appears under its name complete and on disk, or not at all:
 // it is written beside its place, synced, and renamed; an existing file is replaced only by a complete one. A full
 // disk or an unwritable folder is an error (internal: it is this machine that fails) and leaves no partial file.

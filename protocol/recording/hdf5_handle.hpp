@@ -1,5 +1,4 @@
-// The HDF5 C library's identifiers as values that close themselves, and its error stack as text. Private to this
-// folder.
+// The HDF5 C library's identifiers as values that close themselves, and its error stack as text. Private to protocol.
 #pragma once
 
 #include <hdf5.h>

@@ -60,7 +60,7 @@ class Reader {
 Expected<Handle> Reader::open_scalar(const char* attribute) const {
   if (!has_attribute(attribute)) {
     constexpr std::string_view no_recording =
-        ": no recording of this program; of other HDF5 files the arrays are wanted as .npz, .mat or CSV";
+        ": no recording of this program; `selfcal import --guess` and `selfcal poses` read the arrays of others";
     return bad("attribute {} missing{}", attribute, std::string_view(attribute) == "format" ? no_recording : "");
   }
   Handle opened(H5Aopen(file_, attribute, H5P_DEFAULT), H5Aclose);

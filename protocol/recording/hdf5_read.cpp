@@ -1,6 +1,7 @@
 #include <filesystem>
 
 #include "protocol/recording/hdf5.hpp"
+#include "protocol/recording/hdf5_handle.hpp"
 #include "protocol/recording/hdf5_parse.hpp"
 #include "protocol/recording/isolated_parse.hpp"
 
@@ -31,6 +32,15 @@ Expected<LoadedRecording> read_hdf5(const std::filesystem::path& path, const Che
     return fail(ErrorKind::bad_input, name + ": not a regular file");
   }
   return checked(parse_isolated(name, [&] { return hdf5::parse_file(name); }), name, policy);
+}
+
+bool is_foreign_hdf5(const std::filesystem::path& path) {
+  const auto answer = bytes_isolated(path.string(), [&path]() -> Expected<std::string> {
+    const hdf5::QuietErrors quiet;
+    const hdf5::Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+    return std::string(file && H5Aexists(file.get(), "format") == 0 ? "foreign" : "");
+  });
+  return answer && !answer->empty();
 }
 
 Expected<LoadedRecording> read_hdf5_image(const void* image, std::size_t size, const std::string& name,

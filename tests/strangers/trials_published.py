@@ -1,6 +1,7 @@
 """Tables that are published instead of logs, and logs with labels, held against the truth of each."""
 import numpy
 
+import arrays
 import labels
 import published
 import silent as silent_gyros
@@ -109,4 +110,17 @@ def silent(operator, rng):
     check(f"jumps {jumps}: or another heading", not jumps or any("another heading" in words for words in answer["invisible"]))
 
 
-TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros}
+def hdf5(operator, rng):
+    truth = arrays.hdf5(operator.folder, rng)
+    for file in ("groups.h5", "table.hdf5", "own.mat", "structure.mat", "others.mat"):
+        answer = operator.answer("poses", file, *SITE)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            p, raw = known[f"scale_{axis}"], known[f"scale_{axis}"]["unit"] == "raw/g"
+            near(f"{file}: scale {axis}", p["value"], p["sigma"], truth["a"].matrix[k, k] * (GRAVITY if raw else 1.0) - (not raw), 4e-5 * (G0 if raw else 1.0))
+        check("three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+    operator.settled("groups.h5", ("accelerometer.axes",))
+    accelerometers(operator.diagnosed("groups.h5"), truth["a"], 4e-5)
+
+
+TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays}

@@ -198,7 +198,8 @@ CommandRun configure(Options& options) {
   auto arguments = std::make_shared<ImportArguments>();
   options.text(
       "FILE", arguments->from,
-      "with --map or --guess: text with any delimiter, plain or gzip, .npy, .npz, .mat, a ROS bag (.db3, .bag); "
+      "with --map or --guess: text with any delimiter, plain or gzip, .npy, .npz, .mat, HDF5, a ROS bag (.db3, "
+      ".bag); "
       "else CSV with its attributes in a TOML file of the same stem; with --as-run also a recording (.h5)",
       Needed::yes);
   options.text("-o,--output", arguments->to, "HDF5 file to write: .h5 or .hdf5");

@@ -119,7 +119,9 @@ void print_notes(const std::string& file, const std::string& notes) {
 }
 
 Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
-  const auto is_hdf5 = [](const std::string& f) { return f.ends_with(".h5") || f.ends_with(".hdf5"); };
+  const auto is_hdf5 = [](const std::string& f) {
+    return (f.ends_with(".h5") || f.ends_with(".hdf5")) && !is_foreign_hdf5(f);
+  };
   const bool is_recording = std::any_of(arguments.files.begin(), arguments.files.end(), is_hdf5);
   if (const auto good = check_arguments(arguments, is_recording); !good) {
     return tl::unexpected(good.error());
