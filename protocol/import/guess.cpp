@@ -112,7 +112,7 @@ class Guesser {
       map.time.unit = "date";
     } else if (find_unit(claimed) && find_unit(claimed)->quantity == Quantity::time) {
       map.time.unit = claimed;
-      const bool long_unit = claimed == "min" || claimed == "h";
+      const bool long_unit = claimed == "min" || claimed == "h" || claimed == "d";
       if (!long_unit && std::find(units.begin(), units.end(), claimed) == units.end()) {
         doubt("time.unit", fmt::format("{} by its name; that would make {:.6g} Hz", claimed,
                                        1.0 / (interval * find_unit(claimed)->si)));

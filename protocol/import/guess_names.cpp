@@ -37,112 +37,6 @@ Words words_of(std::string_view name) {
   return words;
 }
 
-}  // namespace
-
-// Blanks, points, carets and parentheses are taken out first.
-std::string known_unit(std::string_view written) {
-  std::string text;
-  constexpr std::string_view degree_sign = "\xC2\xB0";
-  constexpr std::string_view micro_signs[] = {"\xC2\xB5", "\xCE\xBC"};
-  constexpr std::string_view square = "\xC2\xB2";
-  for (std::size_t k = 0; k < written.size(); ++k) {
-    const std::string_view rest = written.substr(k);
-    if (rest.starts_with(degree_sign)) {
-      text += "deg";
-      ++k;
-    } else if (rest.starts_with(micro_signs[0]) || rest.starts_with(micro_signs[1])) {
-      text += 'u';
-      ++k;
-    } else if (rest.starts_with(square)) {
-      text += '2';
-      ++k;
-    } else if (std::string_view(" ^*.()").find(written[k]) == std::string_view::npos) {
-      text += lower(written[k]);
-    }
-  }
-  struct Known {
-    std::string_view written, unit;
-  };
-  static constexpr std::array<Known, 72> known{{
-      {"rad/s", "rad/s"},
-      {"rads", "rad/s"},
-      {"rads-1", "rad/s"},
-      {"radps", "rad/s"},
-      {"rad/sec", "rad/s"},
-      {"deg/s", "deg/s"},
-      {"degs", "deg/s"},
-      {"dps", "deg/s"},
-      {"deg/sec", "deg/s"},
-      {"degs-1", "deg/s"},
-      {"deg/s-1", "deg/s"},
-      {"degps", "deg/s"},
-      {"deg/h", "deg/h"},
-      {"degh", "deg/h"},
-      {"deg/hr", "deg/h"},
-      {"dph", "deg/h"},
-      {"mrad/s", "mrad/s"},
-      {"rad/h", "rad/h"},
-      {"mdeg/s", "mdeg/s"},
-      {"mdps", "mdeg/s"},
-      {"rpm", "rpm"},
-      {"rev/s", "rev/s"},
-      {"revs", "rev/s"},
-      {"rps", "rev/s"},
-      {"1/min", "rpm"},
-      {"arcsec/s", "arcsec/s"},
-      {"rad", "rad"},
-      {"deg", "deg"},
-      {"arcsec", "arcsec"},
-      {"\"", "arcsec"},
-      {"mrad", "mrad"},
-      {"urad", "urad"},
-      {"arcmin", "arcmin"},
-      {"m/s2", "m/s^2"},
-      {"ms2", "m/s^2"},
-      {"mps2", "m/s^2"},
-      {"m/s/s", "m/s^2"},
-      {"ms-2", "m/s^2"},
-      {"m/sec2", "m/s^2"},
-      {"g", "g"},
-      {"mg", "mg"},
-      {"ug", "ug"},
-      {"ft/s2", "ft/s^2"},
-      {"cm/s2", "cm/s^2"},
-      {"gal", "cm/s^2"},
-      {"m/s", "m/s"},
-      {"mps", "m/s"},
-      {"ms-1", "m/s"},
-      {"gs", "g*s"},
-      {"mgs", "mg*s"},
-      {"ugs", "ug*s"},
-      {"mm/s", "mm/s"},
-      {"cm/s", "cm/s"},
-      {"ft/s", "ft/s"},
-      {"s", "s"},
-      {"sec", "s"},
-      {"seconds", "s"},
-      {"ms", "ms"},
-      {"msec", "ms"},
-      {"us", "us"},
-      {"usec", "us"},
-      {"ns", "ns"},
-      {"nsec", "ns"},
-      {"nanoseconds", "ns"},
-      {"milliseconds", "ms"},
-      {"microseconds", "us"},
-      {"c", "C"},
-      {"degc", "C"},
-      {"celsius", "C"},
-      {"k", "K"},
-      {"f", "F"},
-      {"degf", "F"},
-  }};
-  const auto* const found = std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.written == text; });
-  return found == known.end() ? std::string() : std::string(found->unit);
-}
-
-namespace {
-
 // Takes a unit off the end of the words: acc x m s2.
 std::string unit_at_end(Words& words) {
   struct Ending {
@@ -249,6 +143,19 @@ int take_axis(Words& words) {
   return -1;
 }
 
+// 0, 1 or 2 of a rate of roll, pitch or yaw; -1: none.
+int turned_about(const Words& words, const std::string& unit) {
+  const auto quantity = find_unit(unit);
+  const bool rate = holds(words, {"rate"}) || (quantity && quantity->quantity == Quantity::angular_rate);
+  constexpr std::array<std::string_view, 3> names{"roll", "pitch", "yaw"};
+  for (std::size_t k = 0; k < names.size() && rate; ++k) {
+    if (is_one_of(words, {names[k]}) || is_one_of(words, {std::string(names[k]) + "rate"})) {
+      return static_cast<int>(k);
+    }
+  }
+  return -1;
+}
+
 Role triad_role(const Words& w) {
   // "Gravity X" of a phone is what its filter makes of all sensors.
   if (holds(w, {"mag", "gravity"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
@@ -259,8 +166,12 @@ Role triad_role(const Words& w) {
     return Role::other;
   }
   const bool inc = holds(w, {"delta", "incr"}) || is_one_of(w, {"inc", "d"});
+  // "gFx" of a phone's G-force meter.
+  if (is_one_of(w, {"g"}) && is_one_of(w, {"f"})) {
+    return Role::accelerometer;
+  }
   if (holds(w, {"gyr", "pqr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
-      is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "dth", "da"}) ||
+      is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "rot", "dth", "da"}) ||
       (inc && (holds(w, {"theta", "angle"}) || is_one_of(w, {"ang"}))) ||
       (holds(w, {"ang"}) && holds(w, {"rate", "vel"}))) {
     return Role::gyro;
@@ -290,7 +201,7 @@ Role single_role(const Words& w) {
   if (holds(w, {"gimbal", "turntable", "encoder", "resolver", "cmd", "axis"})) {
     return Role::gimbal;
   }
-  if (holds(w, {"time", "stamp", "zeit", "utc", "date", "epoch"}) ||
+  if (holds(w, {"time", "stamp", "zeit", "utc", "date", "epoch", "elapsed"}) ||
       is_one_of(w, {"t", "ts", "sec", "seconds", "millis", "micros", "tow", "sow", "s", "ms", "us", "ns"})) {
     return Role::time;
   }
@@ -329,6 +240,9 @@ void add_role_by_unit(NamedColumn& column) {
   const bool unsaid = column.role == Role::unknown;
   if (column.axis < 0 && unit->quantity == Quantity::time && (unsaid || column.role == Role::temperature)) {
     column.role = Role::time;
+  } else if (column.axis >= 0 && unsaid && unit->quantity == Quantity::time) {
+    column.axis = -1;  // "X[s]" beside each channel
+    column.role = Role::time;
   } else if (column.axis >= 0 && unsaid && unit->quantity == Quantity::angular_rate) {
     column.role = Role::gyro;
   } else if (column.axis >= 0 && unsaid && unit->quantity == Quantity::acceleration) {
@@ -352,6 +266,14 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
       bare = head;
     }
   }
+  // "IMU_ATTI(0):accelX": what stands in brackets within a name is no unit.
+  std::string without;
+  if (const std::size_t open = bare.find('('), close = bare.find(')');
+      close != std::string_view::npos && open < close && !trimmed(bare.substr(close + 1)).empty() &&
+      known_unit(bare.substr(open + 1, close - open - 1)).empty()) {
+    without = std::string(bare.substr(0, open)) + " " + std::string(bare.substr(close + 1));
+    bare = without;
+  }
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}, std::pair{'{', '}'}}) {
     const std::size_t begin = bare.find(open);
     const std::size_t end = begin == std::string_view::npos ? begin : bare.find(close, begin);
@@ -371,6 +293,12 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
       holds(words, {"delta", "incr", "dtheta", "dvel", "dang"}) || is_one_of(words, {"inc", "d", "dv", "dth", "da"});
   Words stems = words;
   column.axis = index >= 0 ? index : take_axis(stems);
+  // "Yaw Rate [deg/s]": about x, y, z of the body.
+  if (const int about = turned_about(words, column.unit); column.axis < 0 && about >= 0) {
+    column.axis = about;
+    column.role = Role::gyro;
+    return column;
+  }
   column.increment = delta || (column.axis >= 0 && is_one_of(stems, {"dv", "dth", "da", "dtheta", "dvel", "dang"}));
   column.role = column.axis >= 0 ? triad_role(stems) : single_role(words);
   // "Gyro X temp", "axisP[0]"
@@ -409,6 +337,11 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
                                      {"s", "s"},
                                      {"sec", "s"},
                                      {"seconds", "s"},
+                                     {"h", "h"},
+                                     {"hours", "h"},
+                                     {"minutes", "min"},
+                                     {"datenum", "d"},
+                                     {"days", "d"},
                                      {"tow", "s"},
                                      {"sow", "s"}});
   }
@@ -427,11 +360,43 @@ NamedColumn read_name(std::string_view name, std::string_view unit) {
   return column.role == Role::unknown ? read_plain_name(name, unit) : column;
 }
 
+namespace {
+
+bool is_triad(const std::vector<NamedColumn>& all, const std::vector<bool>& among) {
+  std::array<bool, 3> there{};
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (among[k] && all[k].axis >= 0) {
+      there.at(static_cast<std::size_t>(all[k].axis)) = true;
+    }
+  }
+  return there[0] && there[1] && there[2];
+}
+
+// A phone's "linear acceleration" and "user acceleration" beside its accelerometers are without gravity; alone ROS calls accelerometers so.
+void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
+  std::vector<bool> plain(all.size(), false), linear(all.size(), false);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k].role == Role::accelerometer) {
+      linear[k] = holds(words_of(names[k]), {"linear", "user"});
+      plain[k] = !linear[k];
+    }
+  }
+  if (is_triad(all, plain) && is_triad(all, linear)) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      all[k].role = linear[k] ? Role::other : all[k].role;
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units) {
   std::vector<NamedColumn> all;
+  all.reserve(names.size());
   for (std::size_t k = 0; k < names.size(); ++k) {
     all.push_back(read_name(names[k], k < units.size() ? std::string_view(units[k]) : std::string_view{}));
   }
+  leave_out_linear(names, all);
   // "rotation.x" beside "rotation.w" is no rate.
   for (const AttitudeColumns& attitude : attitudes_by_name(names, units)) {
     for (const std::size_t column : attitude.columns) {

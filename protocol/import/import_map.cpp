@@ -273,7 +273,7 @@ void read_text(Section& section, ImportMap& map) {
 void read_time(Section& section, ImportMap& map) {
   TimeMap& time = map.time;
   time.column = section.column("column");
-  section.text("unit", time.unit, {"s", "ms", "100us", "us", "ns", "min", "h", "date"});
+  section.text("unit", time.unit, {"s", "ms", "100us", "us", "ns", "min", "h", "d", "date"});
   section.text("stamp", time.stamp, {"begin", "middle", "end"});
   section.text("interval", time.interval, {"nominal", "stamps"});
   section.flag("resample", time.resample);

@@ -64,7 +64,8 @@ Expected<bool> LineReader::refill() {
     }
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: line {}: {}", name_, number_ + 1,
-                            wide ? "UTF-16; text in UTF-8 is expected" : "holds a byte 0; a text is expected"));
+                            wide ? "UTF-16; text in UTF-8 is expected (`iconv -f UTF-16 -t UTF-8` makes it)"
+                                 : "holds a byte 0; a text is expected"));
   }
   return count > 0;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 
 #include "protocol/import/guess_names.hpp"
@@ -114,64 +113,6 @@ std::optional<Number> sexagesimal(std::string_view field, char decimal) {
     field = trimmed(field.substr(end + mark.size()));
   }
   return field.empty() && part < Number{1} ? std::optional<Number>(negative ? -value : value) : std::nullopt;
-}
-
-std::optional<int> digits(std::string_view& text, std::size_t count) {
-  int value = 0;
-  if (text.size() < count) {
-    return std::nullopt;
-  }
-  const auto [stopped, error] = std::from_chars(text.data(), text.data() + count, value);
-  if (error != std::errc{} || stopped != text.data() + count || value < 0) {
-    return std::nullopt;
-  }
-  text.remove_prefix(count);
-  return value;
-}
-
-bool take(std::string_view& text, char c) {
-  const bool there = text.starts_with(c);
-  text.remove_prefix(there ? 1 : 0);
-  return there;
-}
-
-// hh:mm:ss[.s...]
-std::optional<long double> clock_of(std::string_view& text) {
-  const auto hours = digits(text, 2);
-  if (!hours || !take(text, ':')) {
-    return std::nullopt;
-  }
-  const auto minutes = digits(text, 2);
-  if (!minutes || *hours > 24 || *minutes > 59 || !take(text, ':')) {
-    return std::nullopt;
-  }
-  const std::size_t length = std::min(text.find_first_not_of("0123456789.,"), text.size());
-  const char decimal = text.substr(0, length).find(',') != std::string_view::npos ? ',' : '.';
-  const auto seconds = parsed<long double>(text.substr(0, length), decimal);
-  if (!seconds || *seconds >= 61.0L) {
-    return std::nullopt;
-  }
-  text.remove_prefix(length);
-  return static_cast<long double>(*hours * 3600 + *minutes * 60) + *seconds;
-}
-
-// Z, +hh:mm, +hhmm, +hh: seconds ahead of UTC.
-std::optional<int> offset_of(std::string_view text) {
-  if (text.empty() || text == "Z" || text == "z") {
-    return 0;
-  }
-  const int sign = text.front() == '-' ? -1 : 1;
-  if (text.front() != '-' && text.front() != '+') {
-    return std::nullopt;
-  }
-  text.remove_prefix(1);
-  const auto hours = digits(text, 2);
-  take(text, ':');
-  const auto minutes = text.empty() ? std::optional<int>(0) : digits(text, 2);
-  if (!hours || !minutes || !text.empty()) {
-    return std::nullopt;
-  }
-  return sign * (*hours * 3600 + *minutes * 60);
 }
 
 enum class Field { number, date, empty, word, wrong };
@@ -350,37 +291,6 @@ std::optional<double> grouped_number_of(std::string_view field, const TextDialec
 
 std::optional<long double> long_number_of(std::string_view field, const TextDialect& dialect) {
   return grouped<long double>(field, dialect);
-}
-
-std::optional<long double> date_of(std::string_view field) {
-  std::string_view text = field;
-  long double days = 0.0L;
-  if (text.size() > 4 && (text[4] == '-' || text[4] == '/')) {
-    const char mark = text[4];
-    const auto year = digits(text, 4);
-    take(text, mark);
-    const auto month = digits(text, 2);
-    if (!year || !month || !take(text, mark)) {
-      return std::nullopt;
-    }
-    const auto day = digits(text, 2);
-    if (!day || !(take(text, 'T') || take(text, ' '))) {
-      return std::nullopt;
-    }
-    const std::chrono::year_month_day date{std::chrono::year{*year}, std::chrono::month{static_cast<unsigned>(*month)},
-                                           std::chrono::day{static_cast<unsigned>(*day)}};
-    if (!date.ok()) {
-      return std::nullopt;
-    }
-    days = static_cast<long double>(std::chrono::sys_days(date).time_since_epoch().count());
-  }
-  const auto seconds = clock_of(text);
-  const auto offset = seconds ? offset_of(text) : std::nullopt;
-  if (!offset) {
-    return std::nullopt;
-  }
-  constexpr long double day_s = 86400.0L;
-  return days * day_s + *seconds - static_cast<long double>(*offset);
 }
 
 std::vector<std::string> header_fields(std::string_view line, const TextDialect& dialect) {

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "protocol/import/dates.hpp"
+
 namespace selfcal::import {
 
 struct TextDialect {
@@ -28,10 +30,6 @@ std::optional<double> number_of(std::string_view field, char decimal);
 // Of a text whose dialect is known: where the decimal mark is a comma, "1.234.567,8" too.
 std::optional<double> grouped_number_of(std::string_view field, const TextDialect& dialect);
 std::optional<long double> long_number_of(std::string_view field, const TextDialect& dialect);
-
-// Seconds since 1970 of an ISO 8601 date and time (a blank for the T, offset or Z optional), or since midnight of a time
-// alone.
-std::optional<long double> date_of(std::string_view field);
 
 // What the first lines of a text show. nullopt: no run of lines with the same number of numeric fields, two at least.
 // LINES without their ends; a last one that is cut off is not to be among them.

@@ -14,7 +14,7 @@ using units::hour;
 constexpr double g = units::standard_gravity;
 constexpr double foot = 0.3048;  // m, international
 
-constexpr std::array<Unit, 35> table{{
+constexpr std::array<Unit, 36> table{{
     {"rad/s", Quantity::angular_rate, 1.0},
     {"deg/s", Quantity::angular_rate, degree},
     {"deg/h", Quantity::angular_rate, degree / hour},
@@ -50,6 +50,7 @@ constexpr std::array<Unit, 35> table{{
     {"ns", Quantity::time, 1e-9},
     {"min", Quantity::time, 60.0},
     {"h", Quantity::time, hour},
+    {"d", Quantity::time, 24.0 * hour},
 }};
 
 }  // namespace

@@ -3,6 +3,7 @@ import numpy
 
 import arrays
 import labels
+import makers as makers_tables
 import published
 import silent as silent_gyros
 import words
@@ -123,4 +124,19 @@ def hdf5(operator, rng):
     accelerometers(operator.diagnosed("groups.h5"), truth["a"], 4e-5)
 
 
-TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays}
+def makers(operator, rng):
+    truth = makers_tables.makers(operator.folder, rng)
+    for file in truth["files"]:
+        answer = operator.answer("poses", file, *SITE)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            p, raw = known[f"scale_{axis}"], known[f"scale_{axis}"]["unit"] == "raw/g"
+            near(f"{file}: scale {axis}", p["value"], p["sigma"], truth["a"].matrix[k, k] * (GRAVITY / G0 if raw else 1.0) - (not raw), 4e-5)
+        check("three gyro scale factors", gyro_scales(answer, truth["g"], 1 / DEG if file == "dji.csv" else None) == 3)
+        check(f"{answer['duration_s']:.1f} s", 120 < answer["duration_s"] < 250)
+    answer = operator.answer("poses", "gforce.csv")
+    check("accelerometers alone, no gyros", answer["sensors"] == "accelerometers" and answer["by_poses"])
+    operator.refused("a unit in its name", "poses", "fast.csv")
+
+
+TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables}

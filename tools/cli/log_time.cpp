@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -128,6 +129,19 @@ Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSourc
   }
   const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
   const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);
+  // Excel's and MATLAB's days since 1900 and since 0.
+  constexpr double shortest_s = 5e-5;
+  constexpr std::array<std::pair<long double, long double>, 2> days{{{25000.0L, 80000.0L}, {690000.0L, 800000.0L}}};
+  if (units.empty() && interval < shortest_s && !stamps.empty()) {
+    const bool in_days = std::any_of(days.begin(), days.end(), [&](const auto& range) {
+      return stamps.front() > range.first && stamps.back() < range.second;
+    });
+    return in_days ? Expected<std::string>("d")
+                   : fail(ErrorKind::bad_input,
+                          fmt::format("{}: {}: intervals of {:.3g}: in s nothing samples so fast; a unit in its name "
+                                      "says what it is (time_h); {}",
+                                      file, source.title(rows.time), interval, way_out));
+  }
   if (units.empty() || std::find(units.begin(), units.end(), "s") != units.end()) {
     return std::string("s");
   }
