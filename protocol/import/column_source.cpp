@@ -105,7 +105,8 @@ Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& fi
   }
   if (head.starts_with("\x89HDF")) {
     if (!is_foreign_hdf5(file)) {
-      return fail(ErrorKind::bad_input, fmt::format("{}: a recording, which needs no import", file.string()));
+      return fail(ErrorKind::bad_input,
+                  fmt::format("{}: HDF5: a recording, which needs no import, or damaged", file.string()));
     }
     return open_arrays(file, read_hdf5_arrays);
   }

@@ -3,6 +3,7 @@ import numpy
 
 from recordings import FACES, write
 from sensors import DEG, EARTH, G0, GRAVITY, UP, industrial, turn
+from tables import write_log
 
 
 def cube(rng, count):
@@ -38,7 +39,23 @@ def positions(folder, rng):
     rates = numpy.outer(numpy.linspace(-100, 100, 12) * DEG, [0, 0, 1])
     write(folder / "rates.csv", ["n", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps"],
           [number[:12], *(force[:12] / G0).T, *((rates + rate[:12]) / DEG).T], ["%d"] + ["%.6f"] * 6)
+    nominal = numpy.array([c.T @ [0, 0, 1.0] for c in at])
+    write(folder / "nominal.csv", ["n", "gx", "gy", "gz", "ax", "ay", "az"], [number, *nominal.T, *(force / G0).T], ["%d"] + ["%.4f"] * 3 + ["%.6f"] * 3)
     return {"g": g, "a": a}
+
+
+def table_log(folder, rng):
+    """A rate table that logs its angle in a file of its own: 20 Hz, from 0 to 360 deg, begun earlier, 80 ms late."""
+    g, a = industrial(rng)
+    rates = numpy.concatenate([numpy.full(1500, float(r)) for r in (0, 20, -20, 50, -50, 100, -100, 150, -150, 0)])
+    rates = numpy.convolve(numpy.pad(rates, 100, "edge"), numpy.ones(201) / 201, "valid")
+    angle, t = numpy.cumsum(rates) / 100, (numpy.arange(len(rates)) + 1) / 100
+    c_bn = numpy.array([turn([0, 0, 1], x) for x in angle * DEG]).transpose(0, 2, 1)
+    write_log(folder / "imu.csv", t, g.read(c_bn @ EARTH + (rates * DEG)[:, None] * [0, 0, 1], 100.0, rng), a.read(c_bn @ [0, 0, GRAVITY], 100.0, rng))
+    stamps = numpy.arange(-5, t[-1] + 5, 0.05)
+    shown = numpy.interp(stamps - 0.08, t, angle)
+    write(folder / "table.csv", ["time_s", "table_angle_deg", "table_rate_dps"], [stamps, shown % 360, numpy.gradient(shown) * 20], ["%.3f", "%.4f", "%.3f"])
+    return {"response": g.matrix[:, 2], "late_s": 0.08}
 
 
 def six_faces(folder, rng):
@@ -75,6 +92,8 @@ def head(folder, rng):
     put("drift.csv", ["angle_deg", "output_V"], fine, read(fine, 2.5, drift=100e-6))
     put("cubic.csv", ["angle_deg", "output_V"], fine, read(fine, 2.5, k3=80e-6))
     put("four.csv", ["angle_deg", "output_V"], fine[::18], read(fine[::18], 2.5))
+    write(folder / "more.csv", ["No", "Angle (deg)", "Mean (V)", "Std (V)", "Temp (C)"],
+          [numpy.arange(25) + 1, round_trip, read(round_trip, 2.5), 0 * round_trip + 2e-4, 0 * round_trip + 25], ["%d", "%.1f", "%.8f", "%.6f", "%.2f"])
     put("radians.csv", ["angle", "output_V"], fine * DEG, read(fine, 2.5), "%.6f")
     with open(folder / "minutes.txt", "w", encoding="utf-8") as out:
         out.write("Angle;Output (mA)\n")

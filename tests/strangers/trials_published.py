@@ -28,6 +28,7 @@ def positions(operator, rng):
     answer = operator.answer("poses", "bent.csv", *SITE)
     check("a square in all axes is a misfit", not answer["accelerometers"]["adequate"] and answer["mismatch"])
     operator.refused("rows of rates", "poses", "rates.csv")
+    operator.refused("hold gravity", "poses", "nominal.csv")
     operator.short(14, "poses", "means.csv")
 
 
@@ -39,7 +40,7 @@ def six_faces(operator, rng):
 
 def head(operator, rng):
     truth = published.head(operator.folder, rng)
-    files = {"volts.csv": 2.5, "amperes.csv": 1.3, "g.csv": None, "drift.csv": 2.5, "cubic.csv": None, "minutes.txt": 1.3}
+    files = {"volts.csv": 2.5, "amperes.csv": 1.3, "g.csv": None, "drift.csv": 2.5, "cubic.csv": None, "minutes.txt": 1.3, "more.csv": 2.5}
     for file, unit in files.items():
         answer = operator.answer("poses", file, *SITE)["dividing_head"]
         if file == "cubic.csv":
@@ -54,6 +55,19 @@ def head(operator, rng):
     operator.refused("8 and more", "poses", "four.csv")
     operator.refused("whether they are rad", "poses", "radians.csv")
     operator.short(13, "poses", "volts.csv")
+
+
+def table_log(operator, rng):
+    truth = published.table_log(operator.folder, rng)
+    answer = operator.answer("poses", "imu.csv", "--angle-file", "table.csv")
+    axes = answer["read_outs"]["axes"]
+    check(f"one axis, {axes[0]['rows']} rates", len(axes) == 1 and axes[0]["rows"] == 8)
+    for k in range(3):
+        near(f"response {'xyz'[k]}", axes[0]["response"][k], axes[0]["response_sigma"][k], truth["response"][k], 1e-5)
+    clock = answer["read_outs"]["clock"]
+    near("late, ms", clock["delay_s"], clock["delay_sigma_s"], truth["late_s"], 0.0, 1e3)
+    operator.refused("--angle-file takes", "poses", "imu.csv", "--attitude", "table.csv")
+    operator.refused("no column is called an angle", "poses", "imu.csv", "--angle-file", "imu.csv")
 
 
 def labelled(operator, rng):
@@ -139,4 +153,4 @@ def makers(operator, rng):
     operator.refused("a unit in its name", "poses", "fast.csv")
 
 
-TRIALS = {positions: published, six_faces: published, head: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables}
+TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables}

@@ -1,6 +1,7 @@
 #include "tools/cli/log_units.hpp"
 
 #include <algorithm>
+#include <regex>
 #include <string>
 
 #include "estimator/geometry/units.hpp"
@@ -37,6 +38,14 @@ std::size_t named_temperature(const std::vector<import::NamedColumn>& named) {
 double unit_of_angle(const import::NamedColumn& column) {
   const auto unit = import::find_unit(column.unit);
   return unit && unit->quantity == import::Quantity::angle ? unit->si : units::degree;
+}
+
+bool called_angle(const import::NamedColumn& column, const std::string& name) {
+  static const std::regex angle("angle|winkel|theta|tilt", std::regex::icase);
+  const auto unit = import::find_unit(column.unit);
+  return unit ? unit->quantity == import::Quantity::angle
+              : std::regex_search(name, angle) || column.role == import::Role::outer ||
+                    column.role == import::Role::inner || column.role == import::Role::gimbal;
 }
 
 }  // namespace selfcal::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "protocol/import/guess_names.hpp"
@@ -18,5 +19,8 @@ std::size_t named_temperature(const std::vector<import::NamedColumn>& named);
 
 // rad per unit of a read-out: of degrees, unless its name says another unit of angles.
 double unit_of_angle(const import::NamedColumn& column);
+
+// Whether its name calls it an angle of a table: by its unit, else by a word.
+bool called_angle(const import::NamedColumn& column, const std::string& name);
 
 }  // namespace selfcal::cli

@@ -40,16 +40,20 @@ Triad triad_of(const std::vector<NamedColumn>& named, Role role) {
   return std::count(triad.begin(), triad.end(), named.size()) > 0 ? Triad{} : triad;
 }
 
-// Columns of what the readings of each row scatter by: "std_ax", "ax sigma".
-Triad deviations_of(const ColumnSource& source, const std::vector<NamedColumn>& named) {
+const std::regex& scatter_words() {
   static const std::regex scatter("(standard)?[ _-]*(std[ _-]*dev|stdev|stddev|std|sigma|deviation)",
                                   std::regex::icase);
+  return scatter;
+}
+
+// Columns of what the readings of each row scatter by: "std_ax", "ax sigma".
+Triad deviations_of(const ColumnSource& source, const std::vector<NamedColumn>& named) {
   std::vector<NamedColumn> plain(named.size());
   for (std::size_t k = 0; k < named.size(); ++k) {
     const std::string& name = source.names()[k];
-    if (std::regex_search(name, scatter)) {
-      plain[k] =
-          import::read_name(std::regex_replace(name, scatter, " "), k < source.units().size() ? source.units()[k] : "");
+    if (std::regex_search(name, scatter_words())) {
+      plain[k] = import::read_name(std::regex_replace(name, scatter_words(), " "),
+                                   k < source.units().size() ? source.units()[k] : "");
     }
   }
   return triad_of(plain, Role::accelerometer);
@@ -219,14 +223,6 @@ Expected<std::optional<TableAnswer>> answer_of_means(const ColumnSource& source,
   return std::optional(std::move(answer));
 }
 
-bool called_angle(const NamedColumn& column, const std::string& name) {
-  static const std::regex angle("angle|winkel|theta|tilt", std::regex::icase);
-  const auto unit = import::find_unit(column.unit);
-  return unit ? unit->quantity == Quantity::angle
-              : std::regex_search(name, angle) || column.role == Role::outer || column.role == Role::inner ||
-                    column.role == Role::gimbal;
-}
-
 struct HeadColumns {
   std::size_t angle = 0, reading = 0;
 };
@@ -236,8 +232,9 @@ std::optional<HeadColumns> head_of(const ColumnSource& source, const std::vector
                                    const RawColumns& asked) {
   std::vector<std::size_t> angles, readings;
   for (std::size_t k = 0; k < named.size(); ++k) {
-    const auto data = read(source, {k}, 1, true);
-    if (!data || data->rows == 0 || !std::isfinite(data->values[0][0]) || k + 1 == asked.temperature) {
+    const auto data = read(source, {k}, rows_of_a_log, true);
+    if (!data || data->rows == 0 || !std::isfinite(data->values[0][0]) || k + 1 == asked.temperature ||
+        std::regex_search(source.names()[k], scatter_words()) || counts_rows(data->values[0])) {
       continue;
     }
     const auto unit = import::find_unit(named[k].unit);

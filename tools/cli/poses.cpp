@@ -10,6 +10,7 @@
 #include "protocol/recording/hdf5.hpp"
 #include "tools/cli/command.hpp"
 #include "tools/cli/convert.hpp"
+#include "tools/cli/log_angles.hpp"
 #include "tools/cli/means_table.hpp"
 #include "tools/cli/poses_attitude.hpp"
 #include "tools/cli/poses_input.hpp"
@@ -22,7 +23,7 @@ constexpr WholeRange known_columns{1, 1000};
 
 struct PosesArguments {
   std::vector<std::string> files;
-  std::string gyros;
+  std::string gyros, angle_file;
   std::optional<double> latitude_deg, height_m, rate_hz;
   double gyro_unit = 1.0;
   double false_alarm_rate = 0.01;
@@ -39,7 +40,7 @@ RawColumns raw_columns(const PosesArguments& arguments) {
   }
   columns.rate_hz = arguments.rate_hz;
   columns.raw_gyros = arguments.gyro_unit != 1.0;
-  columns.angle = static_cast<std::size_t>(arguments.angle_column.value_or(0));
+  columns.angle = arguments.angle_file.empty() ? static_cast<std::size_t>(arguments.angle_column.value_or(0)) : 0;
   columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
 }
@@ -50,7 +51,8 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
     return fail(ErrorKind::usage, "FILE: a log or a recording is needed");
   }
   const bool of_columns = !arguments.only.empty() || arguments.angle_column || arguments.temperature_column ||
-                          !arguments.gyros.empty() || arguments.rate_hz || arguments.latitude_deg || arguments.height_m;
+                          !arguments.gyros.empty() || !arguments.angle_file.empty() || arguments.rate_hz ||
+                          arguments.latitude_deg || arguments.height_m;
   if (is_recording && (of_columns || arguments.files.size() > 1)) {
     return fail(ErrorKind::usage,
                 fmt::format("{}: a recording is given alone: --only, --gyros, --rate, --latitude, --height and columns "
@@ -59,6 +61,9 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
   }
   if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty())) {
     return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers");
+  }
+  if (!arguments.angle_file.empty() && (arguments.files.size() > 1 || arguments.rate_hz)) {
+    return fail(ErrorKind::usage, "--angle-file: with one FILE that holds its times");
   }
   const bool attitude_asked = !arguments.attitude.file.empty() || !arguments.attitude.columns.empty();
   if (attitude_asked && (arguments.files.size() > 1 || arguments.rate_hz)) {
@@ -128,7 +133,7 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
   }
   const std::string& name = arguments.files.front();
   const RawFiles files{arguments.files, arguments.gyros, arguments.latitude_deg, arguments.height_m};
-  if (!is_recording) {
+  if (!is_recording && arguments.angle_file.empty()) {
     const auto table = answer_of_table(files, raw_columns(arguments), arguments.gyro_unit, arguments.false_alarm_rate);
     if (!table) {
       return tl::unexpected(table.error());
@@ -146,6 +151,12 @@ Expected<int> diagnose_by_poses(const PosesArguments& arguments) {
                                       : read_raw_poses(files, raw_columns(arguments));
   if (!log) {
     return tl::unexpected(log.error());
+  }
+  if (!arguments.angle_file.empty()) {
+    const auto column = static_cast<std::size_t>(arguments.angle_column.value_or(0));
+    if (const auto added = add_angles(arguments.angle_file, column, name, *log); !added) {
+      return tl::unexpected(added.error());
+    }
   }
   print_notes(name, log->notes);
   if (const auto added = add_attitude(arguments, is_recording, *log); !added) {
@@ -172,6 +183,8 @@ CommandRun configure(Options& options) {
   options.number("--height", arguments->height_m, range::height, "of the place, m");
   options.whole("--angle-column", arguments->angle_column, known_columns,
                 "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
+  options.text("--angle-file", arguments->angle_file,
+               "the table's own log with its time and its angle, of which --angle-column then says the column");
   options.whole("--temperature-column", arguments->temperature_column, known_columns,
                 "the CSV's column, from 1, that holds a temperature, degC");
   options.text(

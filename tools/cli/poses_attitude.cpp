@@ -350,7 +350,7 @@ Expected<ChosenAttitude> choose_attitude(const std::string& log_path, const RawL
                        fail(ErrorKind::bad_input,
                             fmt::format(
                                 "{}: no columns that their names call an attitude (qw qx qy qz, R11 to R33, roll pitch "
-                                "yaw); --attitude-columns says which",
+                                "yaw); --attitude-columns says which, --angle-file takes a table's one angle",
                                 path)))
                  : chosen;
   }

@@ -117,14 +117,18 @@ std::size_t named_counter(const std::vector<import::NamedColumn>& named) {
 }
 
 // Fewer rows are no log.
-Expected<void> check_length(const TimedRows& rows, const std::string& file) {
+Expected<void> check_length(const import::ColumnSource& source, const std::string& file) {
   constexpr std::size_t least = 100;
-  return rows.data.rows >= least
+  import::ColumnRequest request;
+  request.tolerant = true;
+  request.most_rows = least;
+  const Expected<import::ColumnData> data = source.read(request);
+  return !data || data->rows >= least
              ? Expected<void>()
              : fail(ErrorKind::bad_input,
                     fmt::format("{}: {} rows: a log of samples is wanted, 100 and more, or a table of means of "
                                 "accelerometers, a row a position",
-                                file, rows.data.rows));
+                                file, data->rows));
 }
 
 // A log as its file has it: SI where its names say units.
@@ -198,6 +202,9 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   if (!source) {
     return tl::unexpected(source.error());
   }
+  if (const auto enough = check_length(**source, path); !enough) {
+    return tl::unexpected(enough.error());
+  }
   const std::vector<import::NamedColumn> named = import::read_names((*source)->names(), (*source)->units());
   const Expected<PoseLayout> layout = pose_layout(**source, named, columns, path);
   if (!layout) {
@@ -218,9 +225,6 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   Expected<TimedRows> rows = rows_of(**source, named, *layout, request, path);
   if (!rows) {
     return tl::unexpected(rows.error());
-  }
-  if (const auto enough = check_length(*rows, path); !enough) {
-    return tl::unexpected(enough.error());
   }
   std::string unit = "s";
   if (!layout->times.empty()) {

@@ -71,6 +71,18 @@ std::string turning(const PoseInput& input) {
              : std::string();
 }
 
+// Columns that are called gyros and hold gravity: the nominal values of a table, in g or m/s^2.
+bool holds_gravity(const PoseInput& input) {
+  constexpr double alike = 0.98;  // cosine of 11 deg: a table's positions are no farther from the nominal ones
+  for (std::size_t k = 0; k < input.gyro.size(); ++k) {
+    const Vector3 rate = vector_of(input.gyro[k]), accel = vector_of(input.accel[k]);
+    if (!(rate.norm() > 0.0) || rate.normalized().dot(accel.normalized()) < alike) {
+      return false;
+    }
+  }
+  return !input.gyro.empty();
+}
+
 // A row that the others contradict by more than chance: its residual against the scatter of the others alone (deleted residual, Student's).
 struct OddRow {
   Eigen::Index row = 0;
@@ -179,7 +191,9 @@ PoseDiagnosis diagnose_means(const PoseMeans& means, double alpha) {
     return d;
   }
   if (input.sensors == Sensors::both) {
-    d.failure = turning(input);
+    d.failure = holds_gravity(input) ? "the columns that are called gyros hold gravity, as nominal values do: --only "
+                                       "accelerometers leaves them out"
+                                     : turning(input);
   }
   std::vector<Pose> poses = poses_of(means);
   d.has_temperature = take_temperatures(input, poses);
