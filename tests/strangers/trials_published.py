@@ -2,6 +2,7 @@
 import numpy
 
 import arrays
+import claims as claims_of_names
 import labels
 import makers as makers_tables
 import published
@@ -153,4 +154,13 @@ def makers(operator, rng):
     operator.refused("a unit in its name", "poses", "fast.csv")
 
 
-TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables}
+def claims(operator, rng):
+    truth = claims_of_names.claims(operator.folder, rng)
+    operator.refused("gravity in another unit", "poses", "unit.csv")
+    operator.refused("added up", "poses", "sums.csv")
+    operator.refused("across it", "poses", "angles.csv")
+    operator.refused("divided by their size", "poses", "direction.csv")
+    accelerometers(operator.answer("poses", "coarse.csv", *SITE), truth["a"], 2e-4)
+
+
+TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables, claims: claims_of_names}

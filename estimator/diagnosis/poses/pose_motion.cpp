@@ -87,6 +87,12 @@ std::vector<double> forces_of_another_zero(const PoseInput& input, const std::ve
   }));
   const auto others = static_cast<std::size_t>(
       std::count_if(forces.begin(), forces.end(), [](double f) { return std::abs(f - 1.0) > most_off; }));
+  // Forces that are alike are gravity in another unit; about another zero they differ by up to 2 g.
+  constexpr double alike = 1.3;
+  const auto [least_force, most_force] = std::minmax_element(forces.begin(), forces.end());
+  if (*most_force < alike * *least_force) {
+    return {};
+  }
   const bool elsewhere = 10 * rests >= 9 * stretches.size() && 3 * others >= stretches.size();
   return elsewhere ? forces : std::vector<double>{};
 }

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "estimator/diagnosis/poses/pose_axes.hpp"
+#include "estimator/diagnosis/poses/pose_claims.hpp"
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_earth.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
@@ -339,9 +340,15 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
   if (nothing_else && !d.other_forces.empty()) {
     const bool free =
         std::all_of(d.other_forces.begin(), d.other_forces.end(), [](double force) { return force < weightless; });
-    return free ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
-                  "acceleration"
-                : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
+    constexpr std::size_t several = 4;
+    constexpr double of_each_other = 1.3;
+    const auto [low, high] = std::minmax_element(d.other_forces.begin(), d.other_forces.end());
+    const bool alike = d.other_forces.size() >= several && *high < of_each_other * *low;
+    return free    ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
+                     "acceleration"
+           : alike ? "at rest the accelerometers read" + with_numbers(" %.4g to %.4g g: ", *low, *high) +
+                         "gravity in another unit than is said of them"
+                   : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
   }
   if (nothing_else && d.clipped_poses > 0) {
     return "at rest an accelerometer stands at the end of its range: its means are none";
@@ -389,6 +396,10 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
   d.sensors = input.sensors;
   d.duration_s = input.time_s.back() - input.time_s.front();
   d.gyro_axes = input.gyro_axes;
+  d.failure = no_readings(input);
+  if (!d.failure.empty()) {
+    return d;
+  }
   const std::vector<StuckAxis> stuck = find_stuck(input);
   add_dead_axes(stuck, d);
   if (!d.failure.empty()) {
