@@ -19,6 +19,10 @@ char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + '
 
 // "GyroX" -> gyro x, "acc_x_m_s2" -> acc x m s2
 Words words_of(std::string_view name) {
+  constexpr std::string_view omega = "\xCF\x89", written = "omega ";
+  if (const std::size_t at = name.find(omega); at != std::string_view::npos) {
+    return words_of(std::string(name.substr(0, at)).append(written).append(name.substr(at + omega.size())));
+  }
   Words words(1);
   char before = ' ';
   for (const char c : name) {

@@ -13,7 +13,7 @@ namespace selfcal::import {
 namespace {
 
 constexpr std::string_view blanks = " \t\r";
-constexpr std::string_view ends_of_word = " \t\r,;|:={}[]()\"'";
+constexpr std::string_view ends_of_word = " \t\r,;|:={}[]()<>\"'";
 constexpr std::string_view ends_of_value = " \t\r,;|={}[]()\"'";
 
 bool begins_number(std::string_view text) {
@@ -63,6 +63,7 @@ class Reader {
   void skip() {
     while (!rest_.empty() && (blanks.find(rest_.front()) != std::string_view::npos || rest_.front() == ',' ||
                               rest_.front() == ';' || rest_.front() == '|')) {
+      apart_ = apart_ || blanks.find(rest_.front()) == std::string_view::npos;
       drop(1);
     }
   }
@@ -75,6 +76,7 @@ class Reader {
     if (!ahead.starts_with(':') && !ahead.starts_with('=')) {
       return false;
     }
+    equals_ = ahead.front() == '=';
     rest_ = ahead.substr(1);
     return true;
   }
@@ -103,6 +105,11 @@ class Reader {
     count_ += marked || words_ ? 1 : 0;
   }
   void add(std::string_view value, std::string unit) {
+    // "gz=0.1 1600000000": a blank ends what an equals sign gives.
+    if (!empty_ && equals_ && !apart_) {
+      label_.clear();
+    }
+    apart_ = false;
     line_.values.push_back(value);
     line_.names.push_back(label_);
     line_.units.push_back(std::move(unit));
@@ -116,6 +123,7 @@ class Reader {
     if (marks()) {
       begin_label(trimmed(text), true);
     } else if (!label_.empty()) {
+      line_.numbers += number_of(text, '.') ? 1 : 0;  // t="0.01"
       add(text, {});
     }
   }
@@ -186,7 +194,9 @@ class Reader {
   LabelledLine line_;
   std::vector<std::string> prefixes_;
   std::string label_, before_, stem_;
-  bool empty_ = false;  // the label has no value yet
+  bool empty_ = false;   // the label has no value yet
+  bool equals_ = false;  // its mark
+  bool apart_ = false;   // more than blanks since the last value
   std::size_t count_ = 0;
 };
 

@@ -52,9 +52,29 @@ std::string without_thousands(std::string_view field) {
 template <typename Number>
 std::optional<Number> sexagesimal(std::string_view field, char decimal);
 
+// "[0.5", "0.5)", "0.5f},": what a list of a program puts around a number.
+std::string_view without_brackets(std::string_view field) {
+  constexpr std::string_view opening = "[({", closing = "])},;";
+  const std::size_t first = std::min(field.find_first_not_of(opening), field.size());
+  field.remove_prefix(first);
+  const std::size_t last = field.find_last_not_of(closing);
+  field = field.substr(0, last == std::string_view::npos ? 0 : last + 1);
+  const bool single =
+      field.size() > 1 && (field.back() == 'f' || field.back() == 'F') && field.find('.') != std::string_view::npos;
+  return trimmed(single ? field.substr(0, field.size() - 1) : field);
+}
+
 template <typename Number>
 std::optional<Number> parsed(std::string_view field, char decimal) {
   std::array<char, 64> buffer{};
+  constexpr std::string_view around = "[]{}();,fF";
+  if (!field.empty() &&
+      (around.find(field.front()) != std::string_view::npos || around.find(field.back()) != std::string_view::npos)) {
+    if (const std::string_view bare = without_brackets(field);
+        bare.size() < field.size() && field.find('x') == std::string_view::npos) {
+      return parsed<Number>(bare, decimal);
+    }
+  }
   if (field.starts_with('+')) {
     field.remove_prefix(1);
     if (field.starts_with('-')) {
@@ -298,6 +318,10 @@ std::vector<std::string> header_fields(std::string_view line, const TextDialect&
   // A tab at the end is behind a field, as in the rows of numbers.
   line = dialect.separator == '\t' ? line.substr(std::min(line.find_first_not_of(" \r"), line.size())) : trimmed(line);
   line.remove_prefix(mark.size());
+  // "#Fields: t ax ay az"
+  if (const std::size_t colon = line.find(':'); !mark.empty() && colon < trimmed(line).find_first_of(" \t,;")) {
+    line.remove_prefix(colon + 1);
+  }
   std::vector<std::string_view> fields;
   split_fields(line, dialect.separator, fields);
   std::vector<std::string> names;

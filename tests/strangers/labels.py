@@ -19,6 +19,34 @@ def sentence(text):
     return f"${text}*{check:02X}"
 
 
+def lists(folder, rng):
+    """Rows as programs print lists, accelerometers before gyros and no names; XML, InfluxDB, names behind a word and in Greek; a rest of such rows."""
+    g, a, t, f, w = by_hand(rng, industrial, 16)
+    force, rate = a.read(f, 100.0, rng), g.read(w, 100.0, rng)
+    mg, dps, n = force / G0, rate / DEG, len(t)
+
+    def numbers(k, form, between=", "):
+        return between.join(form % v for v in (t[k], *force[k], *rate[k]))
+    forms = {
+        "brackets.txt": ("", lambda k: f"[{numbers(k, '%.6f')}]", ""),
+        "tuples.txt": ("", lambda k: "(%.2f, [%.6f, %.6f, %.6f], [%.6f, %.6f, %.6f])" % (t[k], *force[k], *rate[k]), ""),
+        "numpy.txt": ("", lambda k: f"[ {numbers(k, '%.6f', '  ')}]", ""),
+        "array.h": ("const float imu[][7] = {\n", lambda k: f"{{{numbers(k, '%.6ff')}}},", "};\n"),
+        "matrix.m": ("imu = [\n", lambda k: f"   {numbers(k, '%.7e', '   ')};", "];\n"),
+        "sentences.txt": ("", lambda k: sentence("IMU," + numbers(k, "%.6f", ",")), ""),
+        "samples.xml": ('<?xml version="1.0"?>\n<log>\n', lambda k: '<sample t="%.2f" ax="%.6f" ay="%.6f" az="%.6f" gx="%.6f" gy="%.6f" gz="%.6f"/>' % (t[k], *force[k], *rate[k]),
+                        "</log>\n"),
+        "influx.txt": ("", lambda k: "imu,host=pi ax=%.6f,ay=%.6f,az=%.6f,gx=%.6f,gy=%.6f,gz=%.6f %d" % (*force[k], *rate[k], 1600000000000000000 + round(t[k] * 1e9)), ""),
+        "greek.csv": ("t,a_x,a_y,a_z,ω_x,ω_y,ω_z\n", lambda k: numbers(k, "%.6f", ","), ""),
+        "fields.txt": ("#Fields: t ax ay az gx gy gz\n", lambda k: numbers(k, "%.6f", " "), ""),
+    }
+    for name, (head, row, foot) in forms.items():
+        lines(folder / name, row, n, head, foot)
+    still = t < 6.0
+    lines(folder / "rest.txt", lambda k: f"{numbers(k % int(still.sum()), '%.6f', ' ')}".replace("%.6f" % t[k % int(still.sum())], "%.2f" % ((k + 1) / 100), 1), 12000)
+    return {"g": g, "a": a, "files": list(forms)}
+
+
 def labelled(folder, rng):
     """One log in the forms of eleven makers; a line that was cut; lines of two sensors; ROS's echo; bytes; JSON in one piece."""
     g, a, t, f, w = by_hand(rng, industrial, 16)

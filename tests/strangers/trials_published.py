@@ -95,6 +95,19 @@ def labelled(operator, rng):
     accelerometers(operator.diagnosed("objects.json"), a, 4e-5)
 
 
+def lists(operator, rng):
+    truth = labels.lists(operator.folder, rng)
+    for file in truth["files"]:
+        answer = operator.answer("poses", file, *SITE)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            near(f"{file}: 1 g of {axis}", known[f"scale_{axis}"]["value"], known[f"scale_{axis}"]["sigma"], truth["a"].matrix[k, k] * GRAVITY, 4e-5 * G0)
+        check("three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+    axes = {(a["sensor"], a["axis"]): a["mean"]["value"] for a in operator.answer("poses", "rest.txt")["rest"]["axes"]}
+    size = numpy.linalg.norm([axes["accelerometer", axis] for axis in "xyz"])
+    check(f"at rest the accelerometers are those of 1 g: {size:.3f}", abs(size / GRAVITY - 1) < 0.02)
+
+
 def imported(operator, rng):
     """Split times, late rows and words without a sign, brought by `import`."""
     truth = words.by_network(operator.folder, rng)
@@ -163,4 +176,4 @@ def claims(operator, rng):
     accelerometers(operator.answer("poses", "coarse.csv", *SITE), truth["a"], 2e-4)
 
 
-TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables, claims: claims_of_names}
+TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, lists: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables, claims: claims_of_names}

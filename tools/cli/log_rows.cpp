@@ -93,7 +93,9 @@ bool fill_incomplete(const PoseLayout& layout, TimedRows& rows) {
   }
   kept.flip();
   import::leave_out(kept, data);
-  rows.notes += (rows.notes.empty() ? "" : "; ") + words;
+  if (lack > 0) {
+    rows.notes += (rows.notes.empty() ? "" : "; ") + words;
+  }
   return true;
 }
 

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
+
+#include "protocol/import/median.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -84,6 +87,36 @@ std::vector<std::size_t> numeric_columns(const import::ColumnSource& source) {
   return numeric;
 }
 
+// How much the size of a triad differs from row to row: the median of what it is off by, over its median.
+double spread_of_size(const std::vector<std::vector<double>>& values, std::size_t first) {
+  std::vector<double> sizes;
+  sizes.reserve(values[first].size());
+  for (std::size_t row = 0; row < values[first].size(); ++row) {
+    const double size = std::hypot(values[first][row], values[first + 1][row], values[first + 2][row]);
+    if (std::isfinite(size)) {
+      sizes.push_back(size);
+    }
+  }
+  const double middle = sizes.empty() ? 0.0 : import::median(sizes);
+  std::for_each(sizes.begin(), sizes.end(), [middle](double& size) { size = std::abs(size - middle); });
+  return middle > 0.0 ? import::median(std::move(sizes)) / middle : HUGE_VAL;
+}
+
+// Whether gravity stands in the first of two triads, whose size then hardly changes, and not in the second.
+bool gravity_is_first(const import::ColumnSource& source, const std::vector<std::size_t>& six) {
+  import::ColumnRequest request;
+  request.tolerant = true;
+  request.columns = six;
+  request.most_rows = 200000;
+  const Expected<import::ColumnData> data = source.read(request);
+  constexpr double hardly = 0.05, times = 10.0;
+  if (!data) {
+    return false;
+  }
+  const double first = spread_of_size(data->values, 0), second = spread_of_size(data->values, 3);
+  return first < hardly && second > times * first;
+}
+
 // Where no name says it: time, three gyros, three accelerometers, or one triad, or one gyro. With a rate the time may lack.
 Expected<PoseLayout> plain_layout(const import::ColumnSource& source, const std::vector<std::size_t>& numeric,
                                   Sensors sensors, const RawColumns& columns, const std::string& file) {
@@ -131,6 +164,13 @@ Expected<PoseLayout> plain_layout(const import::ColumnSource& source, const std:
   }
   if (sensors != Sensors::gyros) {
     layout.accel = of(time + (both ? 3 : 0));
+  }
+  if (both) {
+    std::vector<std::size_t> six = layout.gyro;
+    six.insert(six.end(), layout.accel.begin(), layout.accel.end());
+    if (gravity_is_first(source, six)) {
+      std::swap(layout.gyro, layout.accel);
+    }
   }
   return layout;
 }
