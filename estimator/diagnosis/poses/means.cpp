@@ -153,7 +153,11 @@ void judge_means(const PoseMeans& means, double alpha, std::vector<Pose>& poses,
   }
   d.accel_parameters = parameters_of(model);
   if (by_rows) {
-    widen(model.free, d.accel_parameters);
+    double freedom = model.free;
+    for (const PoseEffect& e : d.accel_named) {
+      freedom -= static_cast<double>(e.value.size());
+    }
+    widen(std::max(least_freedom, freedom), d.accel_parameters);
   }
   d.gravity_span_deg = gravity_span_deg(poses);
   judge_accelerometers(model, poses, duration_s, d.has_temperature, 0.25 * alpha, d);
