@@ -45,7 +45,7 @@ std::string unit_of(hid_t dataset) {
       char* text = nullptr;
       const bool read = H5Aget_storage_size(attribute.get()) <= sizeof(hvl_t) &&
                         H5Aread(attribute.get(), memory.get(), static_cast<void*>(&text)) >= 0 && text != nullptr;
-      const std::string unit = read ? std::string(text).substr(0, longest) : std::string();
+      std::string unit = read ? std::string(text).substr(0, longest) : std::string();
       H5free_memory(text);
       return unit;
     }
