@@ -8,6 +8,7 @@
 #include "daemon/estimate/left_out.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
+#include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
 namespace {
@@ -92,7 +93,7 @@ ordered_json to_json(const diagnosis::LawsInstead& instead) {
                     {"expression", law.expression},
                     {"coefficient", law.coefficient},
                     {"sigma", law.sigma},
-                    {"unit", law.axis.starts_with("gyro") ? "deg/h" : "ug"}});
+                    {"unit", unit_of_axis(law.place)}});
   }
   return {{"laws", laws}, {"odds", instead.odds}};
 }

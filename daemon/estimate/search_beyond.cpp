@@ -42,33 +42,33 @@ std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::Diagn
                                                 const discovery::Progress& progress) {
   constexpr double least_odds = 0.01, far_likelier = 10.0;
   std::vector<discovery::UnitRecording> as_they_are;
-  std::vector<Diagnosis> unnamed;
   for (const discovery::DiagnosedRecording& r : unit) {
     as_they_are.push_back({r.data, r.diagnosis.calibration});
-    unnamed.push_back(discovery::without_names(r.diagnosis));
-    unnamed.back().unexplained = unnamed.back().mismatch = true;
   }
   auto rivals = discovery::laws_for_names(unit, as_they_are, std::log(least_odds), of_laws, progress);
   if (!rivals) {
     return std::nullopt;
   }
+  const discovery::Discovery fitted = rivals->search.fitted();  // telling takes it away
   if (rivals->log_odds >= std::log(far_likelier)) {
+    std::vector<Diagnosis> unnamed;
+    for (const discovery::DiagnosedRecording& r : unit) {
+      unnamed.push_back(discovery::without_names(r.diagnosis));
+      unnamed.back().unexplained = unnamed.back().mismatch = true;
+    }
     std::vector<discovery::DiagnosedRecording> recordings;
     for (std::size_t r = 0; r < unit.size(); ++r) {
       recordings.push_back({unit[r].data, unnamed[r]});
     }
-    const discovery::Discovery fitted = rivals->search.fitted();
     discovery::Discovery told = rivals->search.told();
     auto rest = discovery::UnexplainedRest::of(recordings, of_laws.stop);
     if (rest && !told.laws.empty() && explains(&told)) {
       first = std::move(unnamed.front());
       return BeyondSearch{std::move(*rest), std::move(told)};
     }
-    if (unit.size() == 1) {
-      hold_both(first, fitted, std::exp(rivals->log_odds));
-    }
-  } else if (unit.size() == 1) {
-    hold_both(first, rivals->search.fitted(), std::exp(rivals->log_odds));
+  }
+  if (unit.size() == 1) {
+    hold_both(first, fitted, std::exp(rivals->log_odds));
   }
   return std::nullopt;
 }

@@ -27,13 +27,17 @@ double left_by(const Eigen::MatrixXd& G, const Members& m, Eigen::Index a, Eigen
   return m.size_squared(a) * std::max(0.0, left);
 }
 
-// The probability that b is no member any more when a is the truth. The logarithm of the odds of a against b, as the recordings
-// have them, grows by half of what b leaves more of a, with a variance of all of it.
+// The probability that what is not true is excluded. `log_odds`: of the truth against it, as the recordings have them; they grow by half of
+// `more`, what it leaves more of the truth, with a variance of all of that.
+double excludes(double more, double log_odds) {
+  const double wanted = -log_odds - std::log(least_odds);
+  return more > 0.0 ? 0.5 * std::erfc((wanted - 0.5 * more) / std::sqrt(2.0 * more)) : wanted < 0.0 ? 1.0 : 0.0;
+}
+
+// The same of member b when a is the truth.
 double excluded(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with, const Members& m, Eigen::Index a,
                 Eigen::Index b) {
-  const double more = std::max(0.0, left_by(with, m, a, b) - left_by(now, m, a, b));
-  const double wanted = std::log(m.odds(b) / m.odds(a)) - std::log(least_odds);
-  return more > 0.0 ? 0.5 * std::erfc((wanted - 0.5 * more) / std::sqrt(2.0 * more)) : wanted < 0.0 ? 1.0 : 0.0;
+  return excludes(left_by(with, m, a, b) - left_by(now, m, a, b), std::log(m.odds(a) / m.odds(b)));
 }
 
 // What a plan is worth, each member the truth with its probability: the share of the others that it excludes, and the probability that
@@ -103,8 +107,8 @@ struct AgainstNames {
   // The probability that what is not true is excluded, by a rotation of so much more information.
   double told(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with) const {
     const double true_laws = 1.0 / (1.0 + std::exp(-log_odds));
-    return true_laws * beyond(left_of_laws(with) - left_of_laws(now), log_odds) +
-           (1.0 - true_laws) * beyond(left_of_effects(with) - left_of_effects(now), -log_odds);
+    return true_laws * excludes(left_of_laws(with) - left_of_laws(now), log_odds) +
+           (1.0 - true_laws) * excludes(left_of_effects(with) - left_of_effects(now), -log_odds);
   }
 
  private:
@@ -117,10 +121,6 @@ struct AgainstNames {
     inner.diagonal().array() += 1e-12;
     const Eigen::VectorXd shown = cross * size;
     return std::max(0.0, size.dot(G.block(at, at, n, n) * size) - shown.dot(inner.ldlt().solve(shown)));
-  }
-  static double beyond(double more, double log_odds) {
-    const double wanted = -log_odds - std::log(least_odds);
-    return more > 0.0 ? 0.5 * std::erfc((wanted - 0.5 * more) / std::sqrt(2.0 * more)) : wanted < 0.0 ? 1.0 : 0.0;
   }
 };
 

@@ -11,11 +11,11 @@ namespace {
 
 constexpr double word = 65536.0;
 
+}  // namespace
+
 bool all_whole(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v == std::floor(v) && std::abs(v) < 1e15; });
 }
-
-}  // namespace
 
 bool continue_full_words(std::vector<double>& values) {
   if (values.size() < 3 || !all_whole(values)) {

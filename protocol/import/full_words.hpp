@@ -9,6 +9,8 @@
 
 namespace selfcal::import {
 
+bool all_whole(const std::vector<double>& values);
+
 // Whole numbers that leap by nearly 2^16 between two rows, as words of 16 bits do that are written without their sign, or are full in a fast
 // turn: continued, so that they lie about zero. True: it was done. What stands at the ends of a range clips, and is left as it is.
 bool continue_full_words(std::vector<double>& values);

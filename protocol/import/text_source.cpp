@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -62,36 +63,21 @@ std::string separator_words(char separator) {
 
 // What the sentences of VectorNav hold, whose first field names them (VN-100 and VN-300 user manuals, ASCII messages); empty: another one.
 std::vector<std::string> names_of_sentence(std::string_view first_field) {
+  constexpr std::array sensors = {"MagX",           "MagY",           "MagZ",
+                                  "AccelX [m/s^2]", "AccelY [m/s^2]", "AccelZ [m/s^2]",
+                                  "GyroX [rad/s]",  "GyroY [rad/s]",  "GyroZ [rad/s]"};
+  std::vector<std::string> before, behind;
   if (first_field == "$VNIMU") {
-    return {"",
-            "MagX",
-            "MagY",
-            "MagZ",
-            "AccelX [m/s^2]",
-            "AccelY [m/s^2]",
-            "AccelZ [m/s^2]",
-            "GyroX [rad/s]",
-            "GyroY [rad/s]",
-            "GyroZ [rad/s]",
-            "Temp [C]",
-            "Pressure"};
+    before = {""};
+    behind = {"Temp [C]", "Pressure"};
+  } else if (first_field == "$VNYMR") {
+    before = {"", "Yaw", "Pitch", "Roll"};
+  } else {
+    return {};
   }
-  if (first_field == "$VNYMR") {
-    return {"",
-            "Yaw",
-            "Pitch",
-            "Roll",
-            "MagX",
-            "MagY",
-            "MagZ",
-            "AccelX [m/s^2]",
-            "AccelY [m/s^2]",
-            "AccelZ [m/s^2]",
-            "GyroX [rad/s]",
-            "GyroY [rad/s]",
-            "GyroZ [rad/s]"};
-  }
-  return {};
+  before.insert(before.end(), sensors.begin(), sensors.end());
+  before.insert(before.end(), behind.begin(), behind.end());
+  return before;
 }
 
 class TextSource final : public ColumnSource {

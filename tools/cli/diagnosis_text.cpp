@@ -12,6 +12,7 @@
 #include "daemon/estimate/summary.hpp"
 #include "estimator/geometry/sensor_parameters.hpp"
 #include "estimator/geometry/units.hpp"
+#include "protocol/law_file/law_file.hpp"
 #include "tools/cli/diagnose_output.hpp"
 #include "tools/cli/finding_text.hpp"
 
@@ -98,10 +99,8 @@ std::string instead_text(const Diagnosis& d) {
   std::string text = fmt::format(
       "\nin the place of what is named, odds {:.2g} against it; the sigma of the 24 holds both:\n", d.instead->odds);
   for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
-    text +=
-        fmt::format("  {}  ({}) * {}\n", law.axis,
-                    with_sigma(law.coefficient, law.sigma, std::string(law.axis.starts_with("gyro") ? "deg/h" : "ug")),
-                    law.expression);
+    text += fmt::format("  {}  ({}) * {}\n", law.axis,
+                        with_sigma(law.coefficient, law.sigma, std::string(unit_of_axis(law.place))), law.expression);
   }
   return text;
 }

@@ -5,21 +5,12 @@
 #include <cmath>
 
 #include "estimator/statistics/median.hpp"
+#include "protocol/import/full_words.hpp"
 
 namespace selfcal::cli {
-namespace {
-
-constexpr double word = 65536.0;
-
-bool all_whole(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return v == std::floor(v) && std::abs(v) < 1e15; });
-}
-
-}  // namespace
-
 std::optional<std::vector<double>> rows_by_counter(const std::vector<double>& counter) {
-  constexpr std::array<double, 4> full = {256.0, word, 16777216.0, 4294967296.0};
-  if (counter.size() < 3 || !all_whole(counter)) {
+  constexpr std::array<double, 4> full = {256.0, 65536.0, 16777216.0, 4294967296.0};
+  if (counter.size() < 3 || !import::all_whole(counter)) {
     return std::nullopt;
   }
   std::vector<double> steps;
