@@ -10,6 +10,19 @@ namespace {
 
 struct Profile {
   const Schedule* schedule;
+  double ramp;  // share of a move's time, 0.5 at most
+
+  // Share of the way at the share x of the time. A ramp covers half of the way that the steady rate covers in its time.
+  double done(double x) const {
+    const auto rising = [this](double s) {
+      return ramp > 0.0 ? 0.5 * (s - ramp / std::numbers::pi * std::sin(std::numbers::pi * s / ramp)) : 0.0;
+    };
+    const double steady = 1.0 / (1.0 - ramp);
+    if (x < ramp) {
+      return steady * rising(x);
+    }
+    return x > 1.0 - ramp ? 1.0 - steady * rising(1.0 - x) : steady * (x - 0.5 * ramp);
+  }
 
   GimbalPosition at(double t) const {
     const Schedule& s = *schedule;
@@ -19,11 +32,10 @@ struct Profile {
       }
       t -= s.dwell_s[k];
       if (t < s.rotation_s) {
-        const double x = t / s.rotation_s;
-        const double done = x - std::sin(2.0 * std::numbers::pi * x) / (2.0 * std::numbers::pi);
+        const double way = done(t / s.rotation_s);
         const GimbalPosition& a = s.positions[k];
         const GimbalPosition& b = s.positions[k + 1];
-        return {a.outer_deg + done * (b.outer_deg - a.outer_deg), a.inner_deg + done * (b.inner_deg - a.inner_deg)};
+        return {a.outer_deg + way * (b.outer_deg - a.outer_deg), a.inner_deg + way * (b.inner_deg - a.inner_deg)};
       }
       t -= s.rotation_s;
     }
@@ -34,8 +46,8 @@ struct Profile {
 }  // namespace
 
 IdealRecording::IdealRecording(const Schedule& schedule, const Attitude& vehicle, const earth::Position& site,
-                               double rate_hz) {
-  const Profile profile{&schedule};
+                               double rate_hz, double ramp) {
+  const Profile profile{&schedule, ramp};
   const Matrix3 C_nv = attitude_matrix(vehicle);
   const Vector3 omega_ie_n = earth::omega_ie_n(site.latitude);
   const Vector3 f_n(0.0, earth::normal_gravity(site.latitude, site.height), 0.0);

@@ -10,11 +10,12 @@
 
 namespace selfcal::diagnosis {
 
-// Moves have the rate profile 1 - cos. The angle increments are exact; the velocity increments are those of the
+// `ramp`: how a move's rate rises and falls (turn_ramp.hpp), 1 - cos over all of the move if nothing else is said. The angle increments are exact; the velocity increments are those of the
 // attitude at each sample's middle, which moves signatures by the square of the turn within a sample, 1e-3.
 class IdealRecording {
  public:
-  IdealRecording(const Schedule& schedule, const Attitude& vehicle, const earth::Position& site, double rate_hz);
+  IdealRecording(const Schedule& schedule, const Attitude& vehicle, const earth::Position& site, double rate_hz,
+                 double ramp = 0.5);
   IdealRecording(const IdealRecording&) = delete;
   IdealRecording& operator=(const IdealRecording&) = delete;
 

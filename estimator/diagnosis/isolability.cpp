@@ -7,6 +7,7 @@
 #include "estimator/diagnosis/regression/regression.hpp"
 #include "estimator/diagnosis/regression/signature_pass.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/diagnosis/turn_ramp.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -113,8 +114,9 @@ Split plan_split(const Diagnosis& d, const ModelEffect& model, const Finding& fi
   const Eigen::MatrixXd now = information(context, forward_pass(data, d.calibration), contest.candidates);
   std::vector<Trial> tried = trials(done, d.calibration.initial_attitude);
   std::vector<std::vector<Separation>> results;
+  const double ramp = turn_ramp(data);
   for (Trial& trial : tried) {
-    const IdealRecording ideal(trial.experiment.schedule, trial.vehicle, data.site, planning_rate_hz);
+    const IdealRecording ideal(trial.experiment.schedule, trial.vehicle, data.site, planning_rate_hz, ramp);
     const std::vector<double> temperature = temperatures_like(data, ideal.data().size());
     ImuData as_planned = ideal.data();
     as_planned.temperature = temperature;

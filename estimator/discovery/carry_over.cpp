@@ -63,15 +63,16 @@ CarryOver carry_over(const UnitRecording& like, const std::vector<PossibleLaw>& 
     total += law.odds;
   }
   const std::array<Elsewhere, 2> all = places();
+  const Planning planning(like);
   if (n > 1) {
     const Attitude as_it_stands = like.calibration.initial_attitude;
-    result.here = planned_information(all.front().plan, like, as_it_stands, {terms}, stop);
+    result.here = planning.information(all.front().plan, as_it_stands, {terms}, stop);
   }
   for (const Elsewhere& one : all) {
     Attitude vehicle = like.calibration.initial_attitude;
     vehicle.roll += one.roll;
     vehicle.pitch += one.pitch;
-    const Eigen::MatrixXd G = planned_information(one.plan, like, vehicle, {terms}, stop);
+    const Eigen::MatrixXd G = planning.information(one.plan, vehicle, {terms}, stop);
     result.information += G;
     for (std::size_t a = 0; a < n; ++a) {
       for (std::size_t b = 0; b < n; ++b) {

@@ -164,8 +164,9 @@ std::optional<NextExperiment> plan_against_names(const UnitRecording& recording,
   }
   const Eigen::MatrixXd now = information_of(
       recording.data, diagnosis::forward_pass(recording.data, recording.calibration), members->columns, stop);
+  const Planning planning(recording);
   const auto with = [&](const Schedule& plan) -> Eigen::MatrixXd {
-    return now + planned_information(plan, recording, recording.calibration.initial_attitude, members->columns, stop);
+    return now + planning.information(plan, recording.calibration.initial_attitude, members->columns, stop);
   };
   const RatedPlan best = search_plan(
       limits, 0.0, [&](const Schedule& plan) { return members->told(now, with(plan)); }, stop);
@@ -193,8 +194,9 @@ std::optional<NextExperiment> plan_experiment(std::span<const UnitRecording> rec
                          now.diagonal().cwiseMax(1e-12 * now.diagonal().maxCoeff()).cwiseInverse();
   const UnitRecording& last = recordings.back();
   const double told_now = told_apart(now, now, members);
+  const Planning planning(last);
   const auto with = [&](const Schedule& plan) -> Eigen::MatrixXd {
-    return now + planned_information(plan, last, last.calibration.initial_attitude, {members.terms}, stop);
+    return now + planning.information(plan, last.calibration.initial_attitude, {members.terms}, stop);
   };
   RatedPlan best = search_plan(
       limits, told_now, [&](const Schedule& plan) { return told_apart(now, with(plan), members); }, stop);

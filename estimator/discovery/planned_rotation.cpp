@@ -6,6 +6,7 @@
 
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/diagnosis/turn_ramp.hpp"
 
 namespace selfcal::discovery {
 namespace {
@@ -60,10 +61,12 @@ Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, cons
   return run_columns(input, trace_pass(input, stop), both, stop).information;
 }
 
-Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,
-                                    const PlannedColumns& columns, const std::stop_token& stop) {
-  const diagnosis::IdealRecording ideal(plan, vehicle, like.data.site, planning_rate_hz);
-  PassInput input = diagnosis::forward_pass(ideal.data(), like.calibration);
+Planning::Planning(const UnitRecording& like) : like_(like), ramp_(diagnosis::turn_ramp(like.data)) {}
+
+Eigen::MatrixXd Planning::information(const Schedule& plan, const Attitude& vehicle, const PlannedColumns& columns,
+                                      const std::stop_token& stop) const {
+  const diagnosis::IdealRecording ideal(plan, vehicle, like_.data.site, planning_rate_hz, ramp_);
+  PassInput input = diagnosis::forward_pass(ideal.data(), like_.calibration);
   input.parameters.setZero();
   input.C_nb = ideal.C_nb_start();
   return information_of(ideal.data(), input, columns, stop);

@@ -38,8 +38,18 @@ struct PlannedColumns {
 // Information of the columns, the 33 states projected out. [columns x columns]
 Eigen::MatrixXd information_of(const ImuData& data, const PassInput& input, const PlannedColumns& columns,
                                const std::stop_token& stop = {});
-// The same on a plan, with the unit, the site and the noise of `like` and the vehicle in this attitude.
-Eigen::MatrixXd planned_information(const Schedule& plan, const UnitRecording& like, const Attitude& vehicle,
-                                    const PlannedColumns& columns, const std::stop_token& stop = {});
+// A rotation of the unit of `like`, at its site, with its noise and its gimbal's way of turning.
+class Planning {
+ public:
+  explicit Planning(const UnitRecording& like);
+
+  // The same on a plan, with the vehicle in this attitude.
+  Eigen::MatrixXd information(const Schedule& plan, const Attitude& vehicle, const PlannedColumns& columns,
+                              const std::stop_token& stop = {}) const;
+
+ private:
+  UnitRecording like_;
+  double ramp_;  // turn_ramp.hpp
+};
 
 }  // namespace selfcal::discovery
