@@ -65,6 +65,7 @@ ordered_json to_json(const discovery::Discovery& d) {
                          {"coefficient", law.coefficient},
                          {"sigma", law.sigma},
                          {"significance", law.significance},
+                         {"gain", law.gain},
                          {"held_out_gain", law.held_out_gain},
                          {"share", law.share},
                          {"stability", law.stability},
@@ -141,12 +142,18 @@ ordered_json fitted_json(std::span<const discovery::UnitRecording> recordings,
                          const std::vector<discovery::LawTerm>& forms) {
   const std::vector<double> stated(forms.size(), std::numeric_limits<double>::quiet_NaN());
   std::vector<discovery_trial::RivalLaw> laws;
+  std::vector<double> gains;
   if (const auto tried = discovery::try_laws(recordings, forms, stated)) {
     for (const discovery::TriedLaw& law : *tried) {
       laws.push_back({law.term.axis, law.expression, law.coefficient});
+      gains.push_back(law.gain);
     }
   }
-  return to_json(laws);
+  ordered_json j = to_json(laws);
+  for (std::size_t k = 0; k < gains.size(); ++k) {
+    j["laws"][k]["gain"] = gains[k];
+  }
+  return j;
 }
 
 struct Request {
