@@ -117,6 +117,9 @@ class Guesser {
         doubt("time.unit", fmt::format("{} by its name; that would make {:.6g} Hz", claimed,
                                        1.0 / (interval * find_unit(claimed)->si)));
       }
+    } else if (const std::string& other = named_[column].other_unit; !other.empty()) {
+      map.time.unit = units.empty() ? map.time.unit : units.front();
+      doubt("time.unit", fmt::format("nobody says how long one of its {} is", other));
     } else if (units.empty()) {
       doubt("time.unit", fmt::format("intervals of {:.6g}: no unit makes a sample rate of that", interval));
     } else {
@@ -164,16 +167,6 @@ class Guesser {
     say("time.leave_out_incomplete", lines + ": they are left out, as samples that were lost");
   }
 
-  // ln: a scale error of an instrument in a unit that no name says. Whole numbers are likely to be counts: 1024 of MMA8451's
-  // are 1 g, 16.4 of MPU-6050's 1 deg/s.
-  double nearness(const std::array<std::size_t, 3>& columns) const {
-    constexpr double of_counts = 0.01, of_numbers = 0.03;
-    const bool whole = std::all_of(columns.begin(), columns.end(), [this](std::size_t column) {
-      return std::all_of(values_[column].begin(), values_[column].end(), [](double v) { return v == std::floor(v); });
-    });
-    return whole ? of_counts : of_numbers;
-  }
-
   UnitClaim claim(const std::array<std::size_t, 3>& columns, const char* key) {
     UnitClaim said{{}, named_[columns[0]].increment};
     for (const std::size_t column : columns) {
@@ -183,6 +176,9 @@ class Guesser {
         return {{}, said.increments};
       }
       said.unit = unit.empty() ? said.unit : unit;
+    }
+    if (const std::string& other = named_[columns[0]].other_unit; said.unit.empty() && !other.empty()) {
+      doubt(key, other + " is no unit that is known");
     }
     return said;
   }
@@ -369,7 +365,7 @@ class Guesser {
                                    fit->increments ? "increments" : "rates", 100.0 * std::expm1(fit->off)));
       if (!fit->rivals.empty()) {
         doubt("gyro.unit", fmt::format("{} or {}: both fit the turns", fit->unit, fmt::join(fit->rivals, ", ")));
-      } else if (said.unit.empty() && fit->off > nearness(*roles_.gyro)) {
+      } else if (said.unit.empty() && fit->off > nearness(triad_columns(values_, *roles_.gyro))) {
         doubt("gyro.unit", fmt::format("{} within {:.1f} %; what a count of an instrument means may be as near",
                                        fit->unit, 100.0 * std::expm1(fit->off)));
       } else if (said.unit.empty() && is_doubted("time")) {
@@ -406,7 +402,7 @@ class Guesser {
       if (!fit->rivals.empty() || (!interval_s_ && fit->increments)) {
         doubt("accelerometer.unit",
               fmt::format("{} or {}: gravity fits both", fit->unit, fmt::join(fit->rivals, ", ")));
-      } else if (said.unit.empty() && fit->off > nearness(*roles_.accelerometer)) {
+      } else if (said.unit.empty() && fit->off > nearness(triad_columns(values_, *roles_.accelerometer))) {
         doubt("accelerometer.unit",
               fmt::format("{} within {:.1f} %; what a count of an instrument means may be as near", fit->unit,
                           100.0 * std::expm1(fit->off)));
@@ -443,7 +439,8 @@ class Guesser {
     const std::vector<double>& values = values_[roles_.temperature.front()];
     const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
     const bool whole = std::all_of(values.begin(), values.end(), [](double v) { return v == std::floor(v); });
-    const TemperatureFit fit = temperature_unit(mean, named_[roles_.temperature.front()].unit, whole);
+    const TemperatureFit fit =
+        temperature_unit(mean, named_[roles_.temperature.front()].unit, whole, is_doubted("gyro.unit"));
     map.temperature_unit = fit.unit;
     guess_.remarks.push_back({"temperature.unit", fit.words, fit.doubt});
   }

@@ -3,43 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <initializer_list>
+#include <utility>
 
 #include "protocol/import/guess_attitude.hpp"
+#include "protocol/import/name_triads.hpp"
+#include "protocol/import/name_words.hpp"
 #include "protocol/import/text_dialect.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::import {
 namespace {
 
-using Words = std::vector<std::string>;
-
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-// "GyroX" -> gyro x, "acc_x_m_s2" -> acc x m s2
-Words words_of(std::string_view name) {
-  constexpr std::string_view omega = "\xCF\x89", written = "omega ";
-  if (const std::size_t at = name.find(omega); at != std::string_view::npos) {
-    return words_of(std::string(name.substr(0, at)).append(written).append(name.substr(at + omega.size())));
-  }
-  Words words(1);
-  char before = ' ';
-  for (const char c : name) {
-    const bool capital = c >= 'A' && c <= 'Z' && before >= 'a' && before <= 'z';
-    if (!is_letter(c) && !is_digit(c)) {
-      words.emplace_back();
-    } else {
-      if (capital) {
-        words.emplace_back();
-      }
-      words.back() += lower(c);
-    }
-    before = c;
-  }
-  std::erase(words, std::string());
-  return words;
-}
 
 // Takes a unit off the end of the words: acc x m s2.
 std::string unit_at_end(Words& words) {
@@ -100,19 +75,6 @@ std::string unit_at_end(Words& words) {
   return {};
 }
 
-bool holds(const Words& words, std::initializer_list<std::string_view> parts) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-    return std::any_of(parts.begin(), parts.end(),
-                       [&](std::string_view part) { return word.find(part) != std::string::npos; });
-  });
-}
-
-bool is_one_of(const Words& words, std::initializer_list<std::string_view> whole) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-    return std::any_of(whole.begin(), whole.end(), [&](std::string_view one) { return word == one; });
-  });
-}
-
 // The unit of the first pair whose word is among WORDS.
 std::string unit_among(const Words& words, std::initializer_list<std::pair<std::string_view, std::string_view>> pairs) {
   for (const auto& [word, unit] : pairs) {
@@ -131,6 +93,16 @@ int take_axis(Words& words) {
       const int axis = static_cast<int>(letters.find(*word));
       words.erase(std::next(word).base());
       return axis;
+    }
+  }
+  // "xAccel"
+  static constexpr std::string_view behind[] = {"acc", "accel", "acceleration", "gyr", "gyro", "mag"};
+  for (std::string& word : words) {
+    const std::size_t axis = word.empty() ? std::string_view::npos : letters.find(word.front());
+    const std::string_view stem = std::string_view(word).substr(word.empty() ? 0 : 1);
+    if (axis != std::string_view::npos && std::find(std::begin(behind), std::end(behind), stem) != std::end(behind)) {
+      word.erase(0, 1);
+      return static_cast<int>(axis);
     }
   }
   static constexpr std::string_view stems[] = {
@@ -163,6 +135,10 @@ int turned_about(const Words& words, const std::string& unit) {
 Role triad_role(const Words& w) {
   // "Gravity X" of a phone is what its filter makes of all sensors.
   if (holds(w, {"mag", "gravity"}) || is_one_of(w, {"m", "b", "pos", "position", "lat", "lon", "alt", "quat", "q"})) {
+    return Role::other;
+  }
+  // What a device takes its bias for is no reading.
+  if (is_one_of(w, {"bias"})) {
     return Role::other;
   }
   // What readings scatter by is no reading.
@@ -254,6 +230,18 @@ void add_role_by_unit(NamedColumn& column) {
   }
 }
 
+// "0.1 ms", "1/32768 s", "in/s^2": written as a unit is. A field's number ("x8004") is none.
+bool written_as_unit(std::string_view written) {
+  const bool amount =
+      !written.empty() && is_digit(written.front()) && !std::all_of(written.begin(), written.end(), is_digit);
+  return amount || written.find_first_of("/*") != std::string_view::npos;
+}
+
+// Of a time: a length of its own, which the numbers do not tell. Other words in brackets are none: "(UTC)".
+bool counts_its_own(std::string_view written) {
+  return written_as_unit(written) || holds(words_of(written), {"tick", "cycle", "clock", "clk", "count"});
+}
+
 NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
   NamedColumn column;
   if (trimmed(name).empty()) {
@@ -278,11 +266,13 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     without = std::string(bare.substr(0, open)) + " " + std::string(bare.substr(close + 1));
     bare = without;
   }
+  std::string_view written;  // a unit in brackets
   for (const auto& [open, close] : {std::pair{'[', ']'}, std::pair{'(', ')'}, std::pair{'{', '}'}}) {
     const std::size_t begin = bare.find(open);
     const std::size_t end = begin == std::string_view::npos ? begin : bare.find(close, begin);
     if (end != std::string_view::npos && begin > 0) {
-      column.unit = known_unit(bare.substr(begin + 1, end - begin - 1));
+      written = bare.substr(begin + 1, end - begin - 1);
+      column.unit = known_unit(written);
       bare = bare.substr(0, begin);
       break;
     }
@@ -333,21 +323,21 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     column.unit = unit_among(words, {{"c", "C"}, {"k", "K"}, {"f", "F"}});
   }
   if (column.role == Role::time && column.unit.empty()) {
-    column.unit = unit_among(words, {{"ms", "ms"},
-                                     {"us", "us"},
-                                     {"ns", "ns"},
-                                     {"millis", "ms"},
-                                     {"micros", "us"},
-                                     {"s", "s"},
-                                     {"sec", "s"},
-                                     {"seconds", "s"},
-                                     {"h", "h"},
-                                     {"hours", "h"},
-                                     {"minutes", "min"},
-                                     {"datenum", "d"},
-                                     {"days", "d"},
-                                     {"tow", "s"},
-                                     {"sow", "s"}});
+    column.unit =
+        unit_among(words, {{"ms", "ms"},      {"us", "us"},       {"ns", "ns"},     {"millis", "ms"}, {"micros", "us"},
+                           {"s", "s"},        {"sec", "s"},       {"seconds", "s"}, {"h", "h"},       {"hr", "h"},
+                           {"hrs", "h"},      {"hour", "h"},      {"hours", "h"},   {"min", "min"},   {"mins", "min"},
+                           {"minute", "min"}, {"minutes", "min"}, {"datenum", "d"}, {"days", "d"},    {"tow", "s"},
+                           {"sow", "s"}});
+    const std::string_view said = written.empty() ? unit : written;
+    column.other_unit = !column.unit.empty()     ? std::string()
+                        : counts_its_own(said)   ? std::string(said)
+                        : holds(words, {"tick"}) ? "ticks"
+                                                 : std::string();
+  }
+  const bool of_triad = column.role == Role::gyro || column.role == Role::accelerometer;
+  if (of_triad && column.unit.empty() && written_as_unit(written)) {
+    column.other_unit = std::string(written);
   }
   return column;
 }
@@ -364,36 +354,6 @@ NamedColumn read_name(std::string_view name, std::string_view unit) {
   return column.role == Role::unknown ? read_plain_name(name, unit) : column;
 }
 
-namespace {
-
-bool is_triad(const std::vector<NamedColumn>& all, const std::vector<bool>& among) {
-  std::array<bool, 3> there{};
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if (among[k] && all[k].axis >= 0) {
-      there.at(static_cast<std::size_t>(all[k].axis)) = true;
-    }
-  }
-  return there[0] && there[1] && there[2];
-}
-
-// A phone's "linear acceleration" and "user acceleration" beside its accelerometers are without gravity; alone ROS calls accelerometers so.
-void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
-  std::vector<bool> plain(all.size(), false), linear(all.size(), false);
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    if (all[k].role == Role::accelerometer) {
-      linear[k] = holds(words_of(names[k]), {"linear", "user"});
-      plain[k] = !linear[k];
-    }
-  }
-  if (is_triad(all, plain) && is_triad(all, linear)) {
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      all[k].role = linear[k] ? Role::other : all[k].role;
-    }
-  }
-}
-
-}  // namespace
-
 std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units) {
   std::vector<NamedColumn> all;
   all.reserve(names.size());
@@ -401,6 +361,9 @@ std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const
     all.push_back(read_name(names[k], k < units.size() ? std::string_view(units[k]) : std::string_view{}));
   }
   leave_out_linear(names, all);
+  read_body_rates(names, all);
+  read_directions(names, all, Role::gyro);
+  read_directions(names, all, Role::accelerometer);
   // "rotation.x" beside "rotation.w" is no rate.
   for (const AttitudeColumns& attitude : attitudes_by_name(names, units)) {
     for (const std::size_t column : attitude.columns) {

@@ -15,6 +15,8 @@ struct NamedColumn {
   int axis = -1;           // 0 1 2 for x y z
   bool increment = false;  // the name says so
   std::string unit;        // of units.hpp, "C" "K" "F", "date"; empty: none said
+  std::string
+      other_unit;  // what the name says instead of a known unit: a time's "ticks", "0.1 ms"; a triad's "in/s^2"; empty: nothing so
 };
 
 // NAME without or with a unit ("gx [deg/s]", "acc_x_m_s2"); UNIT from a line of units, may be empty.

@@ -19,8 +19,8 @@ struct Tolerance {
 
 // Hardly anybody writes an IMU's data so: only where a name says it, or where nothing else is as near.
 bool is_rare(std::string_view unit) {
-  return unit == "cm/s^2" || unit == "rpm" || unit == "arcmin" || unit == "rad/h" || unit == "mdeg/s" ||
-         unit == "cm/s" || unit == "mg*s";
+  return unit == "cm/s^2" || unit == "mm/s^2" || unit == "mGal" || unit == "rpm" || unit == "arcmin" ||
+         unit == "rad/h" || unit == "mdeg/s" || unit == "cm/s" || unit == "mg*s";
 }
 
 std::string words(const UnitFit& fit) {
@@ -97,7 +97,15 @@ std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const 
                    {0.08, 0.03});
 }
 
-TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole) {
+double nearness(const TriadColumns& triad) {
+  constexpr double of_counts = 0.01, of_numbers = 0.03;
+  const bool whole = std::all_of(std::begin(triad.column), std::end(triad.column), [](const auto* values) {
+    return std::all_of(values->begin(), values->end(), [](double v) { return v == std::floor(v); });
+  });
+  return whole ? of_counts : of_numbers;
+}
+
+TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole, bool counts) {
   if (claimed == "C" || claimed == "K" || claimed == "F") {
     const double celsius_of = celsius(mean, claimed);
     const bool fits = celsius_of > -60.0 && celsius_of < 130.0;
@@ -105,6 +113,9 @@ TemperatureFit temperature_unit(double mean, const std::string& claimed, bool wh
             fits ? fmt::format("{}, by its name", claimed)
                  : fmt::format("{} by its name: {:.4g} would be {:.4g} C", claimed, mean, celsius_of),
             !fits};
+  }
+  if (whole && counts) {
+    return {"C", fmt::format("{:.4g}: C, or counts as the sensors' are", mean), true};
   }
   if (mean > 200.0) {
     const bool fits = mean < 400.0 && !whole;

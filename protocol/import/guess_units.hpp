@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/import/motion.hpp"
 #include "protocol/import/units.hpp"
 
 namespace selfcal::import {
@@ -28,6 +29,10 @@ std::optional<UnitFit> gyro_unit(double rad_per_sample, double interval_s, const
 // Accelerometers: SIZE is the size of gravity in counts. nullopt: no unit within 8 %.
 std::optional<UnitFit> accelerometer_unit(double size, double interval_s, const UnitClaim& claim);
 
+// ln: a scale error of an instrument in a unit that no name says. Whole numbers are likely to be counts: 1024 of MMA8451's
+// are 1 g, 16.4 of MPU-6050's 1 deg/s.
+double nearness(const TriadColumns& triad);
+
 struct TemperatureFit {
   std::string unit;  // "C", "K", "F"
   std::string words;
@@ -35,7 +40,8 @@ struct TemperatureFit {
 };
 // Of a column with this mean; CLAIMED may be empty.
 // `whole`: all values are whole numbers: 293 may be a register's 29.3 degC as well as 20 degC in K.
-TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole);
+// `counts`: the sensors beside it are counts.
+TemperatureFit temperature_unit(double mean, const std::string& claimed, bool whole, bool counts);
 
 // Units (s, ms, us, ns) in which times with this interval make 1 Hz to 20 kHz, the likeliest first.
 std::vector<std::string> time_units(double interval);

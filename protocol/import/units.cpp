@@ -14,7 +14,7 @@ using units::hour;
 constexpr double g = units::standard_gravity;
 constexpr double foot = 0.3048;  // m, international
 
-constexpr std::array<Unit, 36> table{{
+constexpr std::array<Unit, 38> table{{
     {"rad/s", Quantity::angular_rate, 1.0},
     {"deg/s", Quantity::angular_rate, degree},
     {"deg/h", Quantity::angular_rate, degree / hour},
@@ -36,6 +36,8 @@ constexpr std::array<Unit, 36> table{{
     {"ug", Quantity::acceleration, 1e-6 * g},
     {"ft/s^2", Quantity::acceleration, foot},
     {"cm/s^2", Quantity::acceleration, 1e-2},
+    {"mm/s^2", Quantity::acceleration, 1e-3},
+    {"mGal", Quantity::acceleration, 1e-5},
     {"m/s", Quantity::velocity, 1.0},
     {"g*s", Quantity::velocity, g},
     {"mg*s", Quantity::velocity, 1e-3 * g},

@@ -16,12 +16,12 @@ char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + '
 // Blanks, points, carets and parentheses are taken out first.
 std::string known_unit(std::string_view written) {
   std::string text;
-  constexpr std::string_view degree_sign = "\xC2\xB0";
+  constexpr std::string_view degree_signs[] = {"\xC2\xB0", "\xC2\xBA"};  // and the ordinal that is taken for it
   constexpr std::string_view micro_signs[] = {"\xC2\xB5", "\xCE\xBC"};
-  constexpr std::string_view square = "\xC2\xB2";
+  constexpr std::string_view square = "\xC2\xB2", one = "\xC2\xB9", minus = "\xE2\x81\xBB", times = "\xC2\xB7";
   for (std::size_t k = 0; k < written.size(); ++k) {
     const std::string_view rest = written.substr(k);
-    if (rest.starts_with(degree_sign)) {
+    if (rest.starts_with(degree_signs[0]) || rest.starts_with(degree_signs[1])) {
       text += "deg";
       ++k;
     } else if (rest.starts_with(micro_signs[0]) || rest.starts_with(micro_signs[1])) {
@@ -30,6 +30,14 @@ std::string known_unit(std::string_view written) {
     } else if (rest.starts_with(square)) {
       text += '2';
       ++k;
+    } else if (rest.starts_with(one)) {
+      text += '1';
+      ++k;
+    } else if (rest.starts_with(minus)) {
+      text += '-';
+      k += minus.size() - 1;
+    } else if (rest.starts_with(times)) {
+      ++k;
     } else if (std::string_view(" ^*.()").find(written[k]) == std::string_view::npos) {
       text += lower(written[k]);
     }
@@ -37,7 +45,7 @@ std::string known_unit(std::string_view written) {
   struct Known {
     std::string_view written, unit;
   };
-  static constexpr std::array<Known, 76> known{{
+  static constexpr std::array<Known, 92> known{{
       {"rad/s", "rad/s"},
       {"rads", "rad/s"},
       {"rads-1", "rad/s"},
@@ -50,7 +58,10 @@ std::string known_unit(std::string_view written) {
       {"degs-1", "deg/s"},
       {"deg/s-1", "deg/s"},
       {"degps", "deg/s"},
+      {"degree/s", "deg/s"},
+      {"degrees/s", "deg/s"},
       {"deg/h", "deg/h"},
+      {"deg/hour", "deg/h"},
       {"degh", "deg/h"},
       {"deg/hr", "deg/h"},
       {"dph", "deg/h"},
@@ -83,6 +94,12 @@ std::string known_unit(std::string_view written) {
       {"ft/s2", "ft/s^2"},
       {"cm/s2", "cm/s^2"},
       {"gal", "cm/s^2"},
+      {"mm/s2", "mm/s^2"},
+      {"mgal", "mGal"},
+      {"ft/s/s", "ft/s^2"},
+      {"g's", "g"},
+      {"milli-g", "mg"},
+      {"n/kg", "m/s^2"},
       {"m/s", "m/s"},
       {"mps", "m/s"},
       {"ms-1", "m/s"},
@@ -100,7 +117,14 @@ std::string known_unit(std::string_view written) {
       {"us", "us"},
       {"usec", "us"},
       {"h", "h"},
+      {"hr", "h"},
+      {"hrs", "h"},
+      {"hour", "h"},
       {"hours", "h"},
+      {"min", "min"},
+      {"mins", "min"},
+      {"minute", "min"},
+      {"minutes", "min"},
       {"d", "d"},
       {"days", "d"},
       {"ns", "ns"},

@@ -67,10 +67,11 @@ TEST(Units, TurnsTellRatesFromIncrements) {
 
 // 29.3 degC in a register of 0.1 degC a count, and 20 degC in K.
 TEST(Units, WholeNumbersOfATemperatureMayBeCounts) {
-  EXPECT_TRUE(temperature_unit(293.0, {}, true).doubt);
-  EXPECT_FALSE(temperature_unit(293.1, {}, false).doubt);
-  EXPECT_EQ(temperature_unit(293.1, {}, false).unit, "K");
-  EXPECT_FALSE(temperature_unit(293.0, "K", true).doubt);
+  EXPECT_TRUE(temperature_unit(293.0, {}, true, false).doubt);
+  EXPECT_FALSE(temperature_unit(293.1, {}, false, false).doubt);
+  EXPECT_EQ(temperature_unit(293.1, {}, false, false).unit, "K");
+  EXPECT_FALSE(temperature_unit(293.0, "K", true, false).doubt);
+  EXPECT_TRUE(temperature_unit(31.0, {}, true, true).doubt);
 }
 
 TEST(Units, TimesThatMakeASampleRate) {
@@ -78,6 +79,31 @@ TEST(Units, TimesThatMakeASampleRate) {
   EXPECT_THAT(time_units(10000), ElementsAre("us"));
   EXPECT_THAT(time_units(0.1), ElementsAre("s", "ms"));  // 10 Hz or 10 kHz
   EXPECT_THAT(time_units(1e12), IsEmpty());
+}
+
+TEST(Names, DirectionsAreARightHandedTriad) {
+  const auto axes = [](const std::vector<std::string>& names) {
+    std::vector<int> all;
+    for (const NamedColumn& c : read_names(names, {})) {
+      all.push_back(c.role == Role::accelerometer ? c.axis : -1);
+    }
+    return all;
+  };
+  EXPECT_EQ(axes({"acc_fwd", "acc_left", "acc_up"}), (std::vector<int>{0, 1, 2}));
+  EXPECT_EQ(axes({"Acc Forward (g)", "Acc Right (g)", "Acc Down (g)"}), (std::vector<int>{0, 1, 2}));
+  EXPECT_EQ(axes({"acc_up_g", "acc_right_g", "acc_fwd_g"}), (std::vector<int>{2, 0, 1}));  // right, forward, up
+  EXPECT_EQ(axes({"LongAccel", "LatAccel", "VertAccel"}), (std::vector<int>{0, 1, 2}));
+  EXPECT_EQ(axes({"lat", "long", "alt", "vert_acc"}), (std::vector<int>{-1, -1, -1, -1}));
+}
+
+TEST(Names, WhatATimeCounts) {
+  EXPECT_EQ(read_name("Time [min]", "").unit, "min");
+  EXPECT_EQ(read_name("time_hrs", "").unit, "h");
+  EXPECT_EQ(read_name("Time [ticks]", "").other_unit, "ticks");
+  EXPECT_EQ(read_name("Time (0.1 ms)", "").other_unit, "0.1 ms");
+  EXPECT_EQ(read_name("Time (UTC)", "").other_unit, "");
+  EXPECT_EQ(read_name("Acc X [in/s^2]", "").other_unit, "in/s^2");
+  EXPECT_EQ(read_name("Acc X [mGal]", "").unit, "mGal");
 }
 
 }  // namespace

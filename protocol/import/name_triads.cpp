@@ -1,0 +1,126 @@
+#include "protocol/import/name_triads.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string_view>
+#include <tuple>
+#include <utility>
+
+#include "protocol/import/name_words.hpp"
+#include "protocol/import/units.hpp"
+
+namespace selfcal::import {
+namespace {
+
+bool is_triad(const std::vector<NamedColumn>& all, const std::vector<bool>& among) {
+  std::array<bool, 3> there{};
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (among[k] && all[k].axis >= 0) {
+      there.at(static_cast<std::size_t>(all[k].axis)) = true;
+    }
+  }
+  return there[0] && there[1] && there[2];
+}
+
+// Names by directions of the body: forward, a side, up or down. 0, 1, 2; `sign`: of right and down -1; -1: none.
+struct Direction {
+  int along = -1, sign = 1;
+};
+Direction direction_of(const Words& words) {
+  static constexpr std::array<std::tuple<std::string_view, int, int>, 15> known{{{"fwd", 0, 1},
+                                                                                 {"forward", 0, 1},
+                                                                                 {"front", 0, 1},
+                                                                                 {"long", 0, 1},
+                                                                                 {"longitudinal", 0, 1},
+                                                                                 {"left", 1, 1},
+                                                                                 {"lat", 1, 1},
+                                                                                 {"lateral", 1, 1},
+                                                                                 {"port", 1, 1},
+                                                                                 {"right", 1, -1},
+                                                                                 {"starboard", 1, -1},
+                                                                                 {"up", 2, 1},
+                                                                                 {"vert", 2, 1},
+                                                                                 {"vertical", 2, 1},
+                                                                                 {"down", 2, -1}}};
+  for (const auto& [word, along, sign] : known) {
+    if (is_one_of(words, {word})) {
+      return {along, sign};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
+  std::vector<bool> plain(all.size(), false), linear(all.size(), false);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k].role == Role::accelerometer) {
+      linear[k] = holds(words_of(names[k]), {"linear", "user"});
+      plain[k] = !linear[k];
+    }
+  }
+  if (is_triad(all, plain) && is_triad(all, linear)) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      all[k].role = linear[k] ? Role::other : all[k].role;
+    }
+  }
+}
+
+void read_directions(const std::vector<std::string>& names, std::vector<NamedColumn>& all, Role role) {
+  const auto is = [&](const NamedColumn& c) { return c.role == role && c.axis >= 0; };
+  if (std::any_of(all.begin(), all.end(), is)) {
+    return;
+  }
+  std::array<std::optional<std::size_t>, 3> columns;
+  int handed = 1;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const Words words = words_of(names[k]);
+    const Direction direction = direction_of(words);
+    const bool gyro = holds(words, {"gyr", "omega", "angrate", "turnrate"}) || is_one_of(words, {"rate"});
+    const bool named = role == Role::gyro ? gyro : holds(words, {"acc", "force", "beschl"});
+    if (direction.along < 0 || !named || all[k].axis >= 0) {
+      continue;
+    }
+    std::optional<std::size_t>& column = columns.at(static_cast<std::size_t>(direction.along));
+    if (column) {
+      return;
+    }
+    column = k;
+    handed *= direction.sign;
+  }
+  if (!columns[0] || !columns[1] || !columns[2]) {
+    return;
+  }
+  if (handed < 0) {
+    std::swap(columns[0], columns[1]);
+  }
+  for (std::size_t axis = 0; axis < columns.size(); ++axis) {
+    all[*columns.at(axis)].role = role;
+    all[*columns.at(axis)].axis = static_cast<int>(axis);
+  }
+}
+
+void read_body_rates(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
+  constexpr std::array<std::string_view, 3> letters{"p", "q", "r"};
+  std::array<std::optional<std::size_t>, 3> columns;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (all[k].role == Role::gyro) {
+      return;
+    }
+    const Words words = words_of(std::string_view(names[k]).substr(0, names[k].find_first_of("[(")));
+    const auto unit = find_unit(all[k].unit);
+    for (std::size_t axis = 0; axis < letters.size(); ++axis) {
+      if (!words.empty() && words.front() == letters.at(axis) && unit && unit->quantity == Quantity::angular_rate) {
+        columns.at(axis) = k;
+      }
+    }
+  }
+  for (std::size_t axis = 0; axis < columns.size() && columns[0] && columns[1] && columns[2]; ++axis) {
+    all[*columns.at(axis)].role = Role::gyro;
+    all[*columns.at(axis)].axis = static_cast<int>(axis);
+  }
+}
+
+}  // namespace selfcal::import
