@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <optional>
 
 #include "protocol/import/incomplete_rows.hpp"
 
@@ -26,6 +27,50 @@ bool has_a_clock(const ColumnData& data, const std::vector<bool>& repeated) {
     }
     return falls * most_falls <= v.size();
   });
+}
+
+// The first row of each time.
+std::vector<std::size_t> first_of_stamps(const std::vector<long double>& stamps) {
+  std::vector<std::size_t> firsts;
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    if (k == 0 || stamps[k] != stamps[k - 1]) {
+      firsts.push_back(k);
+    }
+  }
+  return firsts;
+}
+
+// Of a clock much coarser than the rows: how many rows a time has, and how far it is to the next one. Nothing where the rows of a time, but for the
+// first and the last one, are not alike.
+struct Ticks {
+  std::size_t rows = 0;
+  long double length = 0.0L;
+};
+std::optional<Ticks> even_ticks(const std::vector<long double>& stamps, const std::vector<std::size_t>& firsts) {
+  constexpr std::size_t few = 3, least = 4;
+  constexpr double alike = 0.1;
+  if (firsts.size() < least) {
+    return std::nullopt;
+  }
+  std::vector<std::size_t> rows;
+  std::vector<long double> times;
+  for (std::size_t k = 0; k < firsts.size(); ++k) {
+    times.push_back(stamps[firsts[k]]);
+    if (k > 0 && k + 1 < firsts.size()) {
+      rows.push_back(firsts[k + 1] - firsts[k]);
+    }
+  }
+  std::vector<std::size_t> sorted = rows;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t usual = sorted[sorted.size() / 2];
+  const auto other = std::count_if(rows.begin(), rows.end(), [&](std::size_t n) {
+    return std::abs(static_cast<double>(n) - static_cast<double>(usual)) > alike * static_cast<double>(usual);
+  });
+  constexpr std::size_t one_in = 20;  // seconds of which rows were lost
+  if (usual < few || static_cast<std::size_t>(other) * one_in > rows.size()) {
+    return std::nullopt;
+  }
+  return Ticks{usual, median_interval(times)};
 }
 
 }  // namespace
@@ -80,35 +125,75 @@ std::string spread_coarse_stamps(std::vector<long double>& stamps) {
   if (stamps.size() < 3 || !std::is_sorted(stamps.begin(), stamps.end()) || !(stamps.back() > stamps.front())) {
     return {};
   }
-  // Of a clock that stops nobody knows where its rows belong.
-  constexpr int longest = 64;
+  // Of a clock that stops nobody knows where its rows belong; one that shows whole seconds has as many rows in each.
+  constexpr std::size_t longest = 64;
   constexpr long double usual_times = 3.0L;
   const long double interval = (stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1);
-  const std::vector<int> places = place_in_stamp(stamps);
-  std::size_t still = 0;
+  const std::vector<std::size_t> firsts = first_of_stamps(stamps);
+  const std::optional<Ticks> ticks = even_ticks(stamps, firsts);
   std::vector<long double> spread = stamps;
-  for (std::size_t first = 0; first < stamps.size();) {
-    std::size_t next = first + 1;
-    while (next < stamps.size() && places[next] > 0) {
-      ++next;
-    }
-    const auto rows = static_cast<long double>(next - first);
-    const long double step = next < stamps.size() ? (stamps[next] - stamps[first]) / rows : interval;
-    if (rows > longest || (rows > 1 && step > usual_times * interval)) {
+  for (std::size_t k = 0; k < firsts.size(); ++k) {
+    const std::size_t first = firsts[k], next = k + 1 < firsts.size() ? firsts[k + 1] : stamps.size();
+    const std::size_t rows = next - first;
+    const bool last = next == stamps.size();
+    long double step = last ? interval : (stamps[next] - stamps[first]) / static_cast<long double>(rows);
+    long double begin = stamps[first];
+    if (ticks && (k == 0 || last || stamps[next] - stamps[first] > 1.5L * ticks->length)) {
+      step = ticks->length / static_cast<long double>(std::max(ticks->rows, rows));
+      begin = k == 0 && !last ? stamps[first] + ticks->length - static_cast<long double>(rows) * step : begin;
+    } else if ((rows > longest && !ticks) || (rows > 1 && step > usual_times * interval)) {
       return {};
     }
-    for (std::size_t k = first; k < next; ++k) {
-      spread[k] = stamps[first] + static_cast<long double>(k - first) * step;
+    for (std::size_t row = first; row < next; ++row) {
+      spread[row] = begin + static_cast<long double>(row - first) * step;
     }
-    still += next - first - 1;
-    first = next;
   }
   constexpr std::size_t one_in = 100;  // a single stamp that stands twice is a fault of the file
+  const std::size_t still = stamps.size() - firsts.size();
   if (still * one_in < stamps.size()) {
     return {};
   }
   stamps = std::move(spread);
   return fmt::format("{} rows have the time of the row before, of a clock coarser than the rows: spread evenly", still);
+}
+
+std::string put_parts_behind(std::vector<long double>& stamps) {
+  std::vector<std::size_t> begins;
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    if (stamps[k] < stamps[k - 1]) {
+      begins.push_back(k);
+    }
+  }
+  if (begins.empty() || stamps.size() < 3) {
+    return {};
+  }
+  constexpr std::size_t least = 50;                     // rows
+  constexpr long double near = 10.0L, apart = 6000.0L;  // usual intervals
+  const long double usual = median_interval(stamps);
+  std::size_t before = 0, unlike = 0;
+  for (std::size_t k = 0; k <= begins.size(); ++k) {
+    const std::size_t begin = k == 0 ? 0 : begins[k - 1], end = k < begins.size() ? begins[k] : stamps.size();
+    if (end - begin < least || std::abs(stamps[begin] - stamps.front()) > near * usual || !(usual > 0.0L)) {
+      return {};
+    }
+    unlike += k > 0 && end - begin != before ? 1 : 0;
+    before = end - begin;
+  }
+  if (begins.size() == 1 && unlike == 0) {
+    return {};  // two sensors, one under another
+  }
+  long double added = 0.0L, last = stamps.front();
+  auto begin = begins.begin();
+  for (std::size_t k = 0; k < stamps.size(); ++k) {
+    if (begin != begins.end() && *begin == k) {
+      added = last + apart * usual - stamps[k];
+      ++begin;
+    }
+    stamps[k] += added;
+    last = stamps[k];
+  }
+  return fmt::format("the time begins anew {} time{}: parts one after the other, a gap between them", begins.size(),
+                     begins.size() == 1 ? "" : "s");
 }
 
 std::string put_in_order(ColumnData& data) {

@@ -17,8 +17,13 @@ long double median_interval(const std::vector<long double>& stamps);
 std::string continue_full_clocks(std::vector<long double>& stamps);
 
 // A clock coarser than the rows, or one of blocks of rows: stamps that never fall and stand still for a few rows are spread evenly up to the next
-// one. Words on how many; empty: nothing done, for fewer than one in a hundred stands still, or one does for long.
+// one. Words on how many; empty: nothing done, for fewer than one in a hundred stands still, or one does for long. However long where each stamp
+// but the first and the last has as many rows: whole seconds.
 std::string spread_coarse_stamps(std::vector<long double>& stamps);
+// A log that was begun anew for each part, a position say, with a time that begins where it began first: the parts one behind the other, a gap of
+// 6000 intervals between them. Words on how many; empty: nothing done, for the time falls to elsewhere, or two parts have as many rows, as two
+// sensors' have.
+std::string put_parts_behind(std::vector<long double>& stamps);
 // Rows that came by a network, a few of them by another way than those before: put in the order of their stamps where one in fifty and fewer stands
 // up to eight rows behind its place. Words on how many; empty: nothing done.
 std::string put_in_order(ColumnData& data);

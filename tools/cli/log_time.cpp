@@ -108,6 +108,10 @@ Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std
         } else if (rises(rows->data.stamps)) {
           return rows;
         }
+        if (const std::string parts = import::put_parts_behind(rows->data.stamps); !parts.empty()) {
+          rows->notes += (rows->notes.empty() ? "" : "; ") + parts;
+          return rows;
+        }
       }
       first = first ? std::move(first) : std::move(rows);
     }
@@ -126,6 +130,10 @@ Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSourc
   const std::string& said = named[rows.time].unit;
   if (const auto unit = import::find_unit(said); unit && unit->quantity == import::Quantity::time) {
     return said;
+  }
+  if (const std::string& other = named[rows.time].other_unit; !other.empty()) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: nobody says how long one of its {} is: {}", file,
+                                                  source.title(rows.time), other, way_out));
   }
   const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
   const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);

@@ -110,5 +110,38 @@ TEST(TimeSteps, ACoarseSensorAtRestIsNoRowWrittenTwice) {
   EXPECT_EQ(rows_to_leave_out(d, 0.01).repeated, 0);
 }
 
+// 100 rows a second of a clock that shows whole seconds, begun in the middle of one: every row is where it was to half an interval.
+TEST(TimeSteps, WholeSecondsAreSpread) {
+  std::vector<long double> stamps;
+  for (int row = 0; row < 1000; ++row) {
+    stamps.push_back(std::floor(0.605L + 0.01L * row));
+  }
+  EXPECT_NE(spread_coarse_stamps(stamps), "");
+  for (std::size_t row = 0; row < stamps.size(); ++row) {
+    EXPECT_NEAR(static_cast<double>(stamps[row]), 0.605 + 0.01 * static_cast<double>(row), 0.005 + 1e-9);
+  }
+}
+
+TEST(TimeSteps, PartsWhoseTimeBeginsAnew) {
+  const auto parts = [](std::initializer_list<int> rows) {
+    std::vector<long double> stamps;
+    for (const int count : rows) {
+      for (int row = 1; row <= count; ++row) {
+        stamps.push_back(0.01L * row);
+      }
+    }
+    return stamps;
+  };
+  std::vector<long double> three = parts({100, 100, 100});
+  EXPECT_NE(put_parts_behind(three).find("2 times"), std::string::npos);
+  EXPECT_TRUE(std::is_sorted(three.begin(), three.end()));
+  EXPECT_NEAR(static_cast<double>(three[100] - three[99]), 60.0, 1e-9);  // 6000 intervals of 0.01
+  std::vector<long double> sensors = parts({100, 100});                  // one under another
+  EXPECT_EQ(put_parts_behind(sensors), "");
+  std::vector<long double> back = parts({100, 120});
+  back[100] = 0.5L;  // falls to elsewhere
+  EXPECT_EQ(put_parts_behind(back), "");
+}
+
 }  // namespace
 }  // namespace selfcal::import
