@@ -21,6 +21,7 @@
 #include "protocol/import/units.hpp"
 #include "tools/cli/log_counts.hpp"
 #include "tools/cli/log_rows.hpp"
+#include "tools/cli/log_temperature.hpp"
 #include "tools/cli/log_time.hpp"
 #include "tools/cli/log_units.hpp"
 
@@ -29,7 +30,9 @@ namespace selfcal::cli {
 void set_place(std::optional<double> latitude_deg, std::optional<double> height_m, diagnosis::PoseInput& input) {
   if (latitude_deg) {
     input.latitude = *latitude_deg * units::degree;
+    constexpr double heights_m = 500.0, per_m = 3.086e-6;  // sigma of where people work; m/s^2 a metre
     input.gravity = earth::normal_gravity(*input.latitude, height_m.value_or(0.0));
+    input.gravity_sigma = height_m ? 0.0 : heights_m * per_m;
   } else {
     constexpr double over_the_earth = 0.015;  // m/s^2: 9.780 to 9.832 at sea level, as likely anywhere
     input.gravity_sigma = over_the_earth;
@@ -197,6 +200,21 @@ Expected<TimedRows> rows_of(const import::ColumnSource& source, const std::vecto
   return rows;
 }
 
+// Minutes and hours that no name calls so make rates that few sensors have.
+void note_fast(TimedRows& rows, const import::ColumnSource& source, const import::NamedColumn& named,
+               const std::string& unit) {
+  constexpr long double usual_hz = 400.0L;
+  const std::vector<long double>& stamps = rows.data.stamps;
+  constexpr long double calendar_s = 1e7L;  // of those s there is no doubt
+  const long double span = stamps.empty() || stamps.front() > calendar_s ? 0.0L : stamps.back() - stamps.front();
+  if (named.unit.empty() && unit == "s" && span > 0.0L && static_cast<long double>(stamps.size()) > usual_hz * span) {
+    rows.notes =
+        and_also(rows.notes, fmt::format("{} is taken for s, which its name does not say: {:.4g} rows a second",
+                                         source.title(rows.time),
+                                         static_cast<double>(static_cast<long double>(stamps.size()) / span)));
+  }
+}
+
 Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   const auto source = import::open_columns(path);
   if (!source) {
@@ -236,6 +254,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
       return tl::unexpected(found.error());
     }
     unit = std::move(*found);
+    note_fast(*rows, **source, named[rows->time], unit);
   }
   OneLog log;
   PoseInput& input = log.input;
@@ -276,19 +295,17 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
     }
     input.gyro.push_back(rate);
     input.accel.push_back(force);
-    if (thermal > 0) {
-      input.temperature_c.push_back(values[temperature][i]);
-    }
     if (columns.angle > 0) {
       input.outer.push_back(values[angle][i] * angle_unit);
       input.inner.push_back(0.0);
     }
   }
-  // A register's counts are no degrees; what the caller said stays.
-  constexpr double coldest = -60.0, hottest = 150.0;
-  if (columns.temperature == 0 && std::any_of(input.temperature_c.begin(), input.temperature_c.end(),
-                                              [](double t) { return t < coldest || t > hottest; })) {
-    input.temperature_c.clear();
+  if (thermal > 0) {
+    LogTemperature taken =
+        temperature_of(rows->data.values[temperature], named[thermal - 1], (*source)->title(thermal - 1),
+                       columns.temperature > 0, log.gyro_si == 0.0 && log.accel_si == 0.0);
+    input.temperature_c = std::move(taken.celsius);
+    log.notes = and_also(log.notes, taken.notes);
   }
   return log;
 }
