@@ -163,7 +163,9 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
     text += lines_of("misfit:", d.gyros_contradict);
   }
   if (d.accel_reversed) {
-    text += "reversed: all accelerometers, as the Earth's rate shows: they read acceleration\n";
+    text += lines_of("reversed:",
+                     "all accelerometers, as the Earth's rate shows: they read acceleration; or the latitude has the "
+                     "other sign");
   }
   if (text.empty() && d.by_poses) {
     text = d.accel_tested || d.sensors == Sensors::accelerometers

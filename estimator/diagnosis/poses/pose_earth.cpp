@@ -65,8 +65,8 @@ Heading find_heading(const std::vector<Pose>& poses, const std::vector<Vector3>&
 }
 
 // Where nobody says the latitude the Earth still turns at 15.04 deg/h: the likeliest latitude and heading, where they are likelier than no Earth
-// by e^8 and than the other hemisphere by e^6. A vertical part that is the same in all poses stands with the bias.
-EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pose>& poses) {
+// by e^8 and than the other hemisphere by e^6. A vertical part that is the same in all poses stands with the bias. `left_square`: what it leaves.
+EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pose>& poses, double& left_square) {
   EarthInPoses earth;
   earth.rate.assign(poses.size(), Vector3::Zero());
   const std::vector<Vector3> first = carried_direction(input, poses);
@@ -111,6 +111,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
   constexpr double than_none = 8.0, than_other = 6.0;
   earth.heading = likelier(projected(plain, poses).squaredNorm(), best.with) > than_none &&
                   likelier(std::max(of_hemisphere[0], of_hemisphere[1]), best.with) > than_other;
+  left_square = best.with;
   if (!earth.heading) {
     return earth;
   }
@@ -141,7 +142,8 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   }
   constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
   if (!input.latitude) {
-    return carried && poses.size() > enough ? earth_of_any_latitude(input, poses) : earth;
+    double left = HUGE_VAL;
+    return carried && poses.size() > enough ? earth_of_any_latitude(input, poses, left) : earth;
   }
   const Vector3 omega_n = earth::omega_ie_n(*input.latitude) / input.gyro_unit;  // north, up, east
   const auto less_vertical = [&](double up) {
@@ -175,6 +177,16 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   const Heading other = find_heading(poses, less_vertical(-omega_n.y()), first, second, omega_n.x());
   earth.reversed = shows(found.with, other.with);
   found = earth.reversed ? other : found;
+  if (poses.size() > enough) {
+    double left = HUGE_VAL;
+    EarthInPoses any = earth_of_any_latitude(input, poses, left);
+    constexpr double contradicts = 8.0;
+    constexpr double sigmas = 5.0;
+    const bool elsewhere = any.latitude && std::abs(*any.latitude - *input.latitude) > sigmas * any.latitude_sigma;
+    if (elsewhere && 0.5 * free * std::log(found.with / std::max(1e-300, left)) > contradicts) {
+      return any;
+    }
+  }
   earth.heading = shows(found.without, found.with);
   take(earth.reversed ? -omega_n.y() : omega_n.y());
   for (std::size_t k = 0; k < poses.size(); ++k) {

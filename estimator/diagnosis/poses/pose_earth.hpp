@@ -13,9 +13,10 @@ struct EarthInPoses {
   std::vector<Vector3> rate;  // of each pose, sensor axes, raw units; zero where the latitude is not known
   bool reversed =
       false;  // whether it turns the other way about u: accelerometers that read acceleration, no specific force
-  std::optional<double> latitude;  // rad: as the readings show it where nobody says it
-  double latitude_sigma = 0.0;     // rad
-  bool heading = false;  // whether the readings show the heading: likelier by e^6 than without a horizontal part
+  std::optional<double>
+      latitude;  // rad: as the readings show it where nobody says it, or by e^8 likelier than what is told
+  double latitude_sigma = 0.0;  // rad
+  bool heading = false;         // whether the readings show the heading: likelier by e^6 than without a horizontal part
 };
 
 // The vertical part, Omega sin L along the calibrated u, is known where the latitude is. The horizontal part, Omega cos L, points to a north

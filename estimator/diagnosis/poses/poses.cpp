@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/poses/pose_claims.hpp"
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/diagnosis/poses/pose_earth.hpp"
+#include "estimator/diagnosis/poses/pose_headings.hpp"
 #include "estimator/diagnosis/poses/pose_judgement.hpp"
 #include "estimator/diagnosis/poses/pose_motion.hpp"
 #include "estimator/diagnosis/poses/pose_noise.hpp"
@@ -121,27 +122,10 @@ AccelModel calibrate(const PoseInput& input, double alpha, std::vector<Pose>& po
     take_out(*d.settling, input, accel, poses);
     accel = fit();
   }
-  d.accel_parameters = parameters_of(accel);
   d.gravity_span_deg = gravity_span_deg(poses);
   judge_accelerometers(accel, poses, duration_s, d.has_temperature, 0.5 * left, d);
+  d.accel_parameters = parameters_of(accel);
   return accel;
-}
-
-// The poses with the Earth's rate taken out of the gyros' means: beside a sensor that sees it, it goes with the pose as a
-// g-sensitivity does.
-std::vector<Pose> without_earth(const PoseInput& input, const std::vector<Pose>& poses,
-                                const std::vector<std::size_t>& usable, PoseDiagnosis& d) {
-  const bool carried = usable.size() + 1 == poses.size();
-  const EarthInPoses earth = earth_in_poses(input, poses, carried);
-  d.earth_taken_out = earth.heading;
-  d.latitude_seen = earth.latitude;
-  d.latitude_seen_sigma = earth.latitude_sigma;
-  d.accel_reversed = earth.reversed;
-  std::vector<Pose> still = poses;
-  for (std::size_t k = 0; k < still.size(); ++k) {
-    still[k].gyro -= earth.rate[k];
-  }
-  return still;
 }
 
 void judge_poses(const PoseInput& as_told, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
@@ -153,9 +137,11 @@ void judge_poses(const PoseInput& as_told, double alpha, std::vector<Pose>& pose
   }
   const std::vector<std::size_t> turns = usable_turns(as_told, poses, d);
   const PoseInput input = with_unit_by_turns(as_told, poses, turns, d);
-  judge_gyros(input, without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(),
-              d.has_temperature, 0.5 * alpha, d);
-  mark_earth(input, d);
+  if (!judge_free_headings(input, poses, turns, d)) {
+    judge_gyros(input, without_earth(input, poses, turns, d), input.time_s.back() - input.time_s.front(),
+                d.has_temperature, 0.5 * alpha, d);
+    mark_earth(input, d);
+  }
   const bool linear = std::any_of(d.gyro_named.begin(), d.gyro_named.end(),
                                   [](const PoseEffect& p) { return p.effect->linear_in_force; });
   if (d.gyro_axes == input.gyro_axes) {
@@ -199,32 +185,6 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
   if (d.steady_turns > 0 && input.outer.empty() && !has_attitude(d)) {
     d.invisible.push_back("scale factors by " + std::to_string(d.steady_turns) +
                           " stretches that turn steadily: the recording holds no angle of the table");
-  }
-}
-
-// Few headings, as of a sensor that is turned about the vertical by quarters: where the gyros carry the heading and see the Earth's rate, it
-// is taken out of their means, and what is left is their bias.
-void add_bias_by_headings(const PoseInput& input, std::vector<Pose> poses, PoseDiagnosis& d) {
-  for (Pose& p : poses) {
-    p.u = p.accel.normalized();  // a hundredth of g off is a hundredth of the Earth's rate
-  }
-  const EarthInPoses earth = earth_in_poses(input, poses, usable_turns(input, poses, d).size() + 1 == poses.size());
-  if (!earth.heading) {
-    return;
-  }
-  d.earth_taken_out = true;
-  d.accel_reversed = earth.reversed;
-  const auto n = static_cast<double>(poses.size());
-  Vector3 sum = Vector3::Zero(), square = Vector3::Zero();
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    const Vector3 bias = poses[k].gyro - earth.rate[k];
-    sum += bias;
-    square += bias.cwiseAbs2();
-  }
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double variance = std::max(0.0, square(axis) / n - std::pow(sum(axis) / n, 2)) * n / (n - 1.0);
-    d.gyro_bias.at(static_cast<std::size_t>(axis)) = sum(axis) / n;
-    d.gyro_bias_sigma.at(static_cast<std::size_t>(axis)) = std::sqrt(variance / n);
   }
 }
 
