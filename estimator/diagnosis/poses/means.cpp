@@ -113,10 +113,9 @@ OddRow oddest(const AccelModel& model) {
   return odd;
 }
 
-void widen(double freedom, std::vector<PoseParameter>& parameters) {
-  for (PoseParameter& p : parameters) {
-    p.sigma *= student_widening(freedom);
-  }
+// What was taken out by the temperature leaves fewer residuals than the fit counts.
+void widen(double freedom, AccelModel& model) {
+  model.sigma *= student_widening(std::max(least_freedom, freedom)) / student_widening(model.free);
 }
 
 void judge_means(const PoseMeans& means, double alpha, std::vector<Pose>& poses, PoseDiagnosis& d) {
@@ -151,16 +150,16 @@ void judge_means(const PoseMeans& means, double alpha, std::vector<Pose>& poses,
   if (!d.failure.empty()) {
     return;
   }
-  d.accel_parameters = parameters_of(model);
   if (by_rows) {
     double freedom = model.free;
     for (const PoseEffect& e : d.accel_named) {
       freedom -= static_cast<double>(e.value.size());
     }
-    widen(std::max(least_freedom, freedom), d.accel_parameters);
+    widen(freedom, model);
   }
   d.gravity_span_deg = gravity_span_deg(poses);
   judge_accelerometers(model, poses, duration_s, d.has_temperature, 0.25 * alpha, d);
+  d.accel_parameters = parameters_of(model);
   // Rows that say themselves how far they are known say nothing against the model where no effect is asked.
   d.accel_adequate |= by_rows && !d.accel_tested;
   const OddRow odd = oddest(model);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/diagnosis/poses/pose_student.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -112,6 +113,17 @@ double noise_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
   return std::sqrt(square / static_cast<double>(poses.size()));
 }
 
+// What the halves differ by beyond white noise: bias that wanders, or warms up, and goes on from pose to pose. Means of a table have no halves.
+double slow_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
+  double square = 0.0;
+  for (const Pose& p : poses) {
+    const Vector3 along = m.T.transpose() * m.direction(p.accel).normalized();
+    const double half = along.dot(p.accel_half), white = along.cwiseProduct(p.accel_white).squaredNorm();
+    square += white > 0.0 ? half * half - white : 0.0;
+  }
+  return std::sqrt(std::max(0.0, square) / static_cast<double>(poses.size()));
+}
+
 // Of |u|, by what the quantum hides of the poses' means.
 double hidden_of_means(const AccelModel& m, const std::vector<Pose>& poses) {
   double square = 0.0;
@@ -157,12 +169,18 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
     m.free = n - solver.solve(data).trace();
     descend(poses, start, noise, step.cwiseProduct(m.before), m);
     const double seen = std::sqrt(m.residual.squaredNorm() / std::max(1.0, m.free));
-    constexpr double enough = 3.0, least = 1e-7;  // of g
+    constexpr double least = 1e-7;  // of g
     m.noise_of_means = std::hypot(noise_of_means(m, poses), hidden_of_means(m, poses));
-    noise = std::max(least, std::max(m.noise_of_means, m.free >= enough ? seen : 0.0));
+    noise = std::max(least, std::max(m.noise_of_means, m.free >= least_freedom ? seen : 0.0));
     m.weight = weights_of(m, poses, noise);
   }
   linearise(poses, m);
+  // Few residuals are small by chance. Where none shows it, 1/f noise is between poses a few times what it is inside them.
+  constexpr double times = 3.0;
+  const double told = m.free >= least_freedom
+                          ? student_widening(m.free) * std::sqrt(m.residual.squaredNorm() / m.free)
+                          : std::hypot(noise, std::sqrt(times * times - 1.0) * slow_of_means(m, poses));
+  m.sigma = (m.sigma * std::max(1.0, told / noise)).cwiseMin(m.before);
   m.open = m.held.select(m.open, m.sigma);
   return m;
 }

@@ -64,7 +64,8 @@ struct AccelModel {
   Eigen::VectorXd weight;    // of the poses, 1 for one as usual: a mean over a second counts less than one over twenty
   Eigen::VectorXd residual;  // |u| - 1 of the poses, times weight
   Eigen::MatrixXd jacobian;  // of the residual, [poses x 9]: bias, then T's xx yy zz xy xz yz
-  Eigen::Matrix<double, 9, 1> sigma;   // of the nine, noise and what was assumed before together
+  Eigen::Matrix<double, 9, 1>
+      sigma;  // of the nine: noise, as few residuals tell it, and what was assumed before together
   Eigen::Matrix<double, 9, 1> before;  // sigma of what is assumed before
   Eigen::Array<bool, 9, 1> held =
       Eigen::Array<bool, 9, 1>::Constant(false);  // left as assumed: gravity does not reach them

@@ -281,10 +281,28 @@ void add_confounded(const Gyros& gyros, const std::vector<PoseEffect>& tried, Po
   }
 }
 
+// The nine beside an effect that is tried: by how much they move.
+struct Beside {
+  double log_p = 0.0;
+  Eigen::Matrix<double, 9, 1> moved, sigma;
+};
+
+// What the poses may show, named or not, has its part in the nine: each is known no better than the likelier effects let it be.
+void widen(const std::vector<Beside>& beside, double tried, AccelModel& model) {
+  const double may_be = std::log(0.1);
+  for (const Beside& b : beside) {
+    if (log_corrected(b.log_p, tried) < may_be) {
+      model.sigma = model.sigma.cwiseMax((b.moved.cwiseAbs2() + b.sigma.cwiseAbs2()).cwiseSqrt());
+    }
+  }
+  model.sigma = model.sigma.cwiseMin(model.before);
+  model.open = model.held.select(model.open, model.sigma);
+}
+
 }  // namespace
 
-void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s,
-                          bool has_temperature, double alpha, PoseDiagnosis& d) {
+void judge_accelerometers(AccelModel& model, const std::vector<Pose>& poses, double duration_s, bool has_temperature,
+                          double alpha, PoseDiagnosis& d) {
   const auto n = model.residual.size();
   const Regression plain = regress(model.jacobian, model.residual);
   d.accel_rms_g = std::sqrt(model.residual.squaredNorm() / static_cast<double>(n));
@@ -302,6 +320,7 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
     return;
   }
   double tried = 0.0;
+  std::vector<Beside> beside;
   const std::vector<double> time_s = middles(poses);
   for (const Effect& effect : catalogue()) {
     if (!acts_on(effect, false, has_temperature) ||
@@ -316,12 +335,14 @@ void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& pose
       const Comparison c = compare(model.jacobian, model.weight.asDiagonal() * trial.columns, model.residual, time_s,
                                    changes_with_time(effect, duration_s, 3));
       d.accel_tried.push_back(effect_in_force(trial, c, model.jacobian.cols()));
+      beside.push_back({c.log_p, c.with.value.head<9>(), c.with.sigma.head<9>()});
     }
     tried += tests_worth(effect, poses, duration_s, 3);
   }
   for (PoseEffect& p : d.accel_tried) {
     p.log_p = log_corrected(p.log_p, tried);
   }
+  widen(beside, tried, model);
   best_first(d.accel_tried);
   d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
 }

@@ -8,8 +8,8 @@
 namespace selfcal::diagnosis {
 
 // Effects of the accelerometers in |f| - g.
-void judge_accelerometers(const AccelModel& model, const std::vector<Pose>& poses, double duration_s,
-                          bool has_temperature, double alpha, PoseDiagnosis& d);
+void judge_accelerometers(AccelModel& model, const std::vector<Pose>& poses, double duration_s, bool has_temperature,
+                          double alpha, PoseDiagnosis& d);
 // Names of the gyros' effects, one after the other, and what stands in for one another.
 void judge_gyros(const PoseInput& input, const std::vector<Pose>& poses, double duration_s, bool has_temperature,
                  double alpha, PoseDiagnosis& d);
