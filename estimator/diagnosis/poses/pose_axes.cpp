@@ -197,4 +197,36 @@ std::string contradiction(const PoseInput& input, const GyroReading& reading) {
   return words;
 }
 
+std::string turns_elsewhere(const PoseInput& input, const std::vector<Pose>& poses,
+                            const std::vector<std::size_t>& turns, double off) {
+  constexpr std::size_t enough = 5;
+  constexpr double hardly = 0.2;  // of gravity's turn
+  const std::vector<RawTurn> raw = raw_turns(input, poses, turns);
+  if (raw.size() < enough) {
+    return {};
+  }
+  double still = 0.0;
+  for (const RawTurn& turn : raw) {
+    double far = 0.0;
+    for (const Vector3& step : turn.steps) {
+      far += step.norm() * input.gyro_unit;
+    }
+    still += far < hardly * std::acos(std::clamp(turn.from.dot(turn.to), -1.0, 1.0)) ? 1.0 : 0.0;
+  }
+  std::array<char, 240> text{};
+  if (still > most_turns * static_cast<double>(raw.size())) {
+    std::snprintf(
+        text.data(), text.size(),
+        "between %.0f of %zu poses gravity turns and the gyros do not: the turns are not in the log, or were cut out",
+        still, raw.size() + 1);
+  } else {
+    std::snprintf(
+        text.data(), text.size(),
+        "the gyros carry gravity wrong by %.0f deg, and no order or sign of the axes mends it: they stand aslant in "
+        "the accelerometers, or turns are missing in the log",
+        off / units::degree);
+  }
+  return text.data();
+}
+
 }  // namespace selfcal::diagnosis

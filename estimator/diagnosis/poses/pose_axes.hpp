@@ -26,4 +26,9 @@ PoseInput with_unit_by_turns(const PoseInput& input, const std::vector<Pose>& po
 // What contradicts what is said of them: another unit, or other axes; empty: nothing.
 std::string contradiction(const PoseInput& input, const GyroReading& reading);
 
+// What is to be said of turns that end `off` (rad) from where gravity is, and that no other axes or unit mend: the gyros do not turn while gravity
+// does, or they stand aslant in the accelerometers; empty: too few turns to say it.
+std::string turns_elsewhere(const PoseInput& input, const std::vector<Pose>& poses,
+                            const std::vector<std::size_t>& turns, double off);
+
 }  // namespace selfcal::diagnosis

@@ -31,6 +31,7 @@ Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to
 
 struct TurnFit {
   double noise = 0.0;        // rad, of a component
+  bool by_residuals = true;  // whether turns leave a residual that shows it
   Eigen::MatrixXd response;  // of S to the directions' errors, [9 x 3 turns]
   Eigen::Matrix<double, 9, 1> sigma = Eigen::Matrix<double, 9, 1>::Zero();
 };
@@ -85,7 +86,10 @@ TurnFit fit_turns(const PoseInput& input, const std::vector<Pose>& poses, const 
     fit.response = -solver.solve(J.transpose());
     // A turn gives two components of a direction, and the nine take what the turns determine of them.
     const double taken = solver.solve(J.transpose() * J).trace();
-    const double free = std::max(1.0, 2.0 * static_cast<double>(turns.size()) - taken);
+    const double left = 2.0 * static_cast<double>(turns.size()) - taken;
+    constexpr double a_residual = 0.5;
+    fit.by_residuals = left > a_residual;
+    const double free = std::max(1.0, left);
     fit.noise = std::max(1e-6, std::sqrt((r + J * step).squaredNorm() / free));
     fit.sigma =
         Eigen::Matrix<double, 9, 1>(solver.solve(Eigen::Matrix<double, 9, 9>::Identity()).diagonal()).cwiseSqrt() *
@@ -176,6 +180,12 @@ std::vector<std::size_t> without_rounds(const PoseInput& input, const std::vecto
   return turns;
 }
 
+void close_parameters(PoseDiagnosis& d) {
+  for (PoseParameter& p : d.gyro_parameters) {
+    p.determined = false;
+  }
+}
+
 void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
                       const AccelModel& accel, bool linear, PoseDiagnosis& d) {
   for (const bool with : {false, true}) {
@@ -195,18 +205,18 @@ void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, co
     if (with || !linear) {
       const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
       add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
+      if (!fit.by_residuals) {
+        close_parameters(d);
+        d.invisible.push_back("scale factors and misalignment of the gyros by " + std::to_string(turns.size()) +
+                              (turns.size() == 1 ? " turn" : " turns") +
+                              ": they leave nothing over that says how far they are known");
+      }
     }
     if (!with && !linear) {
       d.direction_after = d.direction_before;
       d.direction_after_held_out = d.direction_before_held_out;
       break;
     }
-  }
-}
-
-void close_parameters(PoseDiagnosis& d) {
-  for (PoseParameter& p : d.gyro_parameters) {
-    p.determined = false;
   }
 }
 
@@ -260,6 +270,9 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const s
     close_parameters(d);
     if (const auto reading = read_gyros_by_turns(input, poses, turns); reading && d.gyros_contradict.empty()) {
       d.gyros_contradict = contradiction(input, *reading);
+    }
+    if (d.gyros_contradict.empty() && knows_gyro_unit(input)) {
+      d.gyros_contradict = turns_elsewhere(input, poses, turns, d.direction_after);
     }
   } else if (d.gyro_raw_unit > 0.0) {
     tell_in_raw(d);
