@@ -250,8 +250,7 @@ Estimate amended_estimate(const diagnosis::Diagnosis& diagnosis, const Amendment
     estimate.notes.push_back(story(finding));
   }
   if (diagnosis.instead) {
-    estimate.notes.push_back(
-        fmt::format("in its place {} (odds {:.2g})", laws_words(*diagnosis.instead), diagnosis.instead->odds));
+    estimate.notes.push_back(in_place_words(diagnosis));
   }
   if (explains(found)) {
     estimate.notes.push_back(discovered_figures(*found));

@@ -233,6 +233,24 @@ std::string laws_words(const diagnosis::LawsInstead& instead) {
   return first_of(std::move(all), " and ", " ");
 }
 
+bool in_place_of_some(const diagnosis::Diagnosis& d) {
+  return std::any_of(d.model.begin(), d.model.end(), [&](const diagnosis::ModelEffect& m) {
+    return m.effect->sensor != nullptr &&
+           std::find(d.instead->names.begin(), d.instead->names.end(), m.effect) == d.instead->names.end();
+  });
+}
+
+std::string in_place_words(const diagnosis::Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const diagnosis::Effect* name : d.instead->names) {
+    names.emplace_back(name->id);
+  }
+  return fmt::format(
+      "{} {} (odds {:.2g})",
+      in_place_of_some(d) ? fmt::format("in the place of {}", fmt::join(names, " and ")) : "in its place",
+      laws_words(*d.instead), d.instead->odds);
+}
+
 bool doubtful(const diagnosis::Diagnosis& d) { return d.instead && d.instead->odds > worth_a_word; }
 
 const char* beyond_what(const Discovery& found) {

@@ -41,6 +41,10 @@ std::string discovered_words(const discovery::Discovery& found);
 std::string instead_words(const discovery::OtherExplanation& instead);
 // "gyro_x follows sin(outer)*fx**2 and gyro_y follows t"
 std::string laws_words(const diagnosis::LawsInstead& instead);
+// "in its place gyro_x follows wz (odds 0.2)"; "in the place of gyro_g_sensitivity gyro_x ..." where other names stay. Only where there are any.
+std::string in_place_words(const diagnosis::Diagnosis& diagnosis);
+// Names of sensors stand beside the laws too.
+bool in_place_of_some(const diagnosis::Diagnosis& diagnosis);
 // Whether laws in the place of what is named have odds that are worth a word in the verdict, and an experiment.
 bool doubtful(const diagnosis::Diagnosis& diagnosis);
 // "accel_y: jump per turn, 24.5 +- 4.2 ug; ...; NIS 5.81 becomes 0.99"

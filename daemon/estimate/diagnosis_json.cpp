@@ -95,7 +95,11 @@ ordered_json to_json(const diagnosis::LawsInstead& instead) {
                     {"sigma", law.sigma},
                     {"unit", unit_of_axis(law.place)}});
   }
-  return {{"laws", laws}, {"odds", instead.odds}};
+  ordered_json names = ordered_json::array();
+  for (const diagnosis::Effect* name : instead.names) {
+    names.push_back(name->id);
+  }
+  return {{"laws", laws}, {"names", names}, {"odds", instead.odds}};
 }
 
 ordered_json list(std::vector<diagnosis::Located> places, const std::vector<diagnosis::Located>& by) {

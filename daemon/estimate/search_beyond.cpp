@@ -17,18 +17,32 @@ namespace {
 using diagnosis::Diagnosis;
 using diagnosis::LawsInstead;
 
-// The 24 over both explanations.
-void hold_both(Diagnosis& d, const discovery::Discovery& laws, double odds) {
+// The 24 over both explanations. Beside laws the names that stay are fitted anew.
+void hold_both(Diagnosis& d, const discovery::LawsForNames& rivals, const discovery::LawFit& fit,
+               const std::stop_token& stop) {
   LawsInstead instead;
-  for (std::size_t k = 0; k < laws.fit.terms.size(); ++k) {
-    const discovery::LawTerm& term = laws.fit.terms[k];
+  instead.names = rivals.names;
+  instead.odds = std::exp(rivals.log_odds);
+  discovery::FittedRecording other = fit.recordings.front();
+  Eigen::VectorXd coefficient = fit.coefficient;
+  Eigen::MatrixXd of_coefficient = fit.covariance;
+  if (!rivals.rest.effects().empty()) {
+    const auto joint = rivals.rest.beside(fit.terms, fit.coefficient, stop);
+    if (!joint) {
+      return;
+    }
+    other.parameters = joint->shared.parameters.front();
+    other.covariance = joint->shared.covariance.front();
+    coefficient = joint->shared.coefficient;
+    of_coefficient = joint->shared.coefficient_covariance;
+  }
+  for (std::size_t k = 0; k < fit.terms.size(); ++k) {
+    const discovery::LawTerm& term = fit.terms[k];
     const auto row = static_cast<Eigen::Index>(k);
     instead.laws.push_back({term.axis, std::string(name_of_axis(term.axis)), term.expression.text(term.constants),
-                            laws.fit.coefficient(row), std::sqrt(laws.fit.covariance(row, row))});
+                            coefficient(row), std::sqrt(of_coefficient(row, row))});
   }
-  instead.odds = odds;
-  const double weight = odds / (1.0 + odds);
-  const auto& other = laws.fit.recordings.front();
+  const double weight = instead.odds / (1.0 + instead.odds);
   const ParameterVector apart = other.parameters - d.value;
   d.value += weight * apart;
   d.covariance += weight * (other.covariance - d.covariance) + weight * (1.0 - weight) * apart * apart.transpose();
@@ -36,39 +50,26 @@ void hold_both(Diagnosis& d, const discovery::Discovery& laws, double odds) {
   d.instead = std::move(instead);
 }
 
-// Of names that stand alone: laws that are far likelier, in their place; of one recording others are kept in `first`.
+// Of names that stand alone: laws that are far likelier, in the place of some or all of them; of one recording others are kept in `first`.
 std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::DiagnosedRecording> unit, Diagnosis& first,
                                                 const discovery::DiscoveryOptions& of_laws,
                                                 const discovery::Progress& progress) {
   constexpr double least_odds = 0.01, far_likelier = 10.0;
-  std::vector<discovery::UnitRecording> as_they_are;
-  for (const discovery::DiagnosedRecording& r : unit) {
-    as_they_are.push_back({r.data, r.diagnosis.calibration});
-  }
-  auto rivals = discovery::laws_for_names(unit, as_they_are, std::log(least_odds), of_laws, progress);
+  auto rivals = discovery::laws_for_names(unit, std::log(least_odds), of_laws, progress);
   if (!rivals) {
     return std::nullopt;
   }
-  const discovery::Discovery fitted = rivals->search.fitted();  // telling takes it away
+  const discovery::LawFit fit = rivals->search.fitted().fit;  // telling takes it away
   if (rivals->log_odds >= std::log(far_likelier)) {
-    std::vector<Diagnosis> unnamed;
-    for (const discovery::DiagnosedRecording& r : unit) {
-      unnamed.push_back(discovery::without_names(r.diagnosis));
-      unnamed.back().unexplained = unnamed.back().mismatch = true;
-    }
-    std::vector<discovery::DiagnosedRecording> recordings;
-    for (std::size_t r = 0; r < unit.size(); ++r) {
-      recordings.push_back({unit[r].data, unnamed[r]});
-    }
     discovery::Discovery told = rivals->search.told();
-    auto rest = discovery::UnexplainedRest::of(recordings, of_laws.stop);
-    if (rest && !told.laws.empty() && explains(&told)) {
-      first = std::move(unnamed.front());
-      return BeyondSearch{std::move(*rest), std::move(told)};
+    if (!told.laws.empty() && explains(&told)) {
+      first = std::move(rivals->without.front());
+      first.unexplained = first.mismatch = true;
+      return BeyondSearch{std::move(rivals->rest), std::move(told)};
     }
   }
   if (unit.size() == 1) {
-    hold_both(first, fitted, std::exp(rivals->log_odds));
+    hold_both(first, *rivals, fit, of_laws.stop);
   }
   return std::nullopt;
 }

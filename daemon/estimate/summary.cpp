@@ -109,9 +109,18 @@ std::vector<std::string> kinds_of(const Diagnosis& d) {
   return words;
 }
 
-// Laws in the place of what is named.
+// Laws in the place of what is named, or of some of it.
 std::string or_laws(const Diagnosis& d) {
-  return doubtful(d) ? fmt::format("; or that {}", laws_words(*d.instead)) : std::string();
+  if (!doubtful(d)) {
+    return {};
+  }
+  std::vector<std::string> names;
+  for (const diagnosis::Effect* name : d.instead->names) {
+    names.push_back(effect_words(name->id));
+  }
+  return in_place_of_some(d)
+             ? fmt::format("; or, in the place of {}, that {}", fmt::join(names, " and "), laws_words(*d.instead))
+             : fmt::format("; or that {}", laws_words(*d.instead));
 }
 
 // With the equations that the names leave, or with the word that they leave something.
@@ -145,7 +154,7 @@ std::string named_cause(const Diagnosis& d, const discovery::Discovery* beyond) 
     text += fmt::format("; {:.1f} sigma remain in {}", d.remaining.front().significance, d.remaining.front().words);
   }
   if (d.instead) {
-    text += fmt::format("; in its place {} (odds {:.2g})", laws_words(*d.instead), d.instead->odds);
+    text += "; " + in_place_words(d);
   }
   return text + ".";
 }

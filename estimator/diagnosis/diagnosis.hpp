@@ -78,7 +78,7 @@ struct ModelEffect {
   Eigen::MatrixXd covariance;
 };
 
-// Laws that explain the recording in the place of the names of sensors (discovery/laws_for_names.hpp).
+// Laws that explain the recording in the place of names of sensors, of one, of some or of all (discovery/laws_for_names.hpp).
 struct LawsInstead {
   struct Law {
     int place = 0;  // of the axis: gyro x, y, z, accelerometer x, y, z
@@ -86,7 +86,8 @@ struct LawsInstead {
     double coefficient = 0.0, sigma = 0.0;  // ug or deg/h
   };
   std::vector<Law> laws;
-  double odds = 0.0;  // against the names
+  std::vector<const Effect*> names;  // in whose place; the others stand beside the laws too
+  double odds = 0.0;                 // against these names
 };
 
 struct Undetectable {

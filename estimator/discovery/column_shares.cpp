@@ -4,8 +4,6 @@
 
 namespace selfcal::discovery {
 
-namespace {
-
 double gain_of(const Eigen::MatrixXd& G, const Eigen::VectorXd& b) {
   const Eigen::VectorXd scale = G.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * G * scale.asDiagonal();
@@ -13,8 +11,6 @@ double gain_of(const Eigen::MatrixXd& G, const Eigen::VectorXd& b) {
   const Eigen::VectorXd part = scale.cwiseProduct(b);
   return part.dot(scaled.ldlt().solve(part));
 }
-
-}  // namespace
 
 double gain_of(const ColumnSums& sums, const std::vector<int>& columns) {
   return gain_of(sums.information(columns, columns), sums.score(columns));

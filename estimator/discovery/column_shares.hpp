@@ -8,7 +8,9 @@
 
 namespace selfcal::discovery {
 
-// Square of the residual that `columns` take up.
+// Square that columns of information G and score b take up.
+double gain_of(const Eigen::MatrixXd& G, const Eigen::VectorXd& b);
+// The same of the residual of `sums`, by these columns.
 double gain_of(const ColumnSums& sums, const std::vector<int>& columns);
 
 // Share of the square of `signature` (a combination of the first columns) that `columns` cannot make.

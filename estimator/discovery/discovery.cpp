@@ -25,8 +25,6 @@ constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
 constexpr std::size_t class_size = 40;      // looked at exactly for the class
 constexpr int constant_rounds = 4;
 constexpr std::size_t members_averaged = 8;
-// Time and memory go with the square of the number of pieces: 5,040 columns, 200 MB a matrix.
-constexpr std::size_t most_pieces_of_all = 840;
 // A true law of z sigma gains (z^2 - 1)/2 on what was left out, for each of some forty parts is predicted from the rest; what
 // gains less than half of what it gains in the fit follows the noise.
 constexpr double least_held_out_share = 0.5;
@@ -74,9 +72,6 @@ class LawSearch::Search {
   // Laws first, and beside them what a random process takes up; then processes first. The way of the greater posterior
   // probability is reported: a process can stand for any law, and laws added up can stand for a process.
   void fit() {
-    if (options_.least_gain > 0.0 && shortlist_.largest_gain(*model_, shortlist_size) < options_.least_gain) {
-      return write_down();
-    }
     const ProcessFit alone = best_process();
     const bool may_stand_alone = significant(alone);
     take_laws();
@@ -145,7 +140,7 @@ class LawSearch::Search {
     return work();
   }
 
-  std::size_t pieces_each() const { return std::min(most_pieces, most_pieces_of_all / scenes_.size()); }
+  std::size_t pieces_each() const { return pieces_of_each(scenes_.size()); }
 
   PieceSums sum_scenes() {
     std::vector<PieceSums> all;

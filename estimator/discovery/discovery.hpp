@@ -24,8 +24,6 @@ struct DiscoveryOptions {
   double departure_rate = 0.01;     // of laws of the true form that are described only, for they seem to depart from it
   int most_terms = 6;
   double least_odds = 0.01;  // of a member of a class against the best
-  double least_gain =
-      0.0;  // fall of the residuals' square by the best function alone, below which nothing is looked for
   bool coloured =
       false;  // the sensors' quantum colours the innovations: of what the laws leave whiteness is not judged
   std::stop_token stop;

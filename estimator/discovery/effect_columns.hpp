@@ -37,12 +37,13 @@ class EffectColumns : public ColumnSource {
   int count_ = 0;
 };
 
-// The columns of one source and behind them those of another one that divides the recording alike. Both must outlive it.
+// The columns of one source, active from the start, and behind them those of another one that divides the recording alike. Both must
+// outlive it.
 class TwoSources : public ColumnSource {
  public:
   TwoSources(ColumnSource& first, ColumnSource& second) : first_(first), second_(second) {}
   int count() const override { return first_.count() + second_.count(); }
-  int active(double /*time_s*/) const override { return count(); }
+  int active(double time_s) const override { return first_.count() + second_.active(time_s); }
   bool block_ends_before(std::size_t sample) const override { return first_.block_ends_before(sample); }
   void block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> velocity,
              Eigen::Ref<Eigen::Matrix3Xd> angle) override;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 namespace selfcal::discovery {
 namespace {
@@ -32,20 +34,34 @@ double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double ro
   return cost;
 }
 
-diagnosis::Diagnosis without_names(diagnosis::Diagnosis d) {
-  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
-    return f.source == nullptr || f.source->sensor == nullptr;
-  });
+namespace {
+
+diagnosis::Diagnosis without_those(diagnosis::Diagnosis d, const std::function<bool(const diagnosis::Effect*)>& name) {
+  const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(),
+                                          [&](const diagnosis::Finding& f) { return !name(f.source); });
   d.rejected.insert(d.rejected.begin(), kept, d.findings.end());
   d.findings.erase(kept, d.findings.end());
-  const auto modelled = std::stable_partition(
-      d.model.begin(), d.model.end(), [](const diagnosis::ModelEffect& m) { return m.effect->sensor == nullptr; });
+  const auto modelled = std::stable_partition(d.model.begin(), d.model.end(),
+                                              [&](const diagnosis::ModelEffect& m) { return !name(m.effect); });
   d.rejected_model.insert(d.rejected_model.begin(), modelled, d.model.end());
   d.model.erase(modelled, d.model.end());
   d.rejected_by_remains_alone = false;
   d.remainder.reset();
   d.verdict = d.model.empty() ? diagnosis::DiagnosisVerdict::none_of_the_above : diagnosis::DiagnosisVerdict::named;
   return d;
+}
+
+}  // namespace
+
+diagnosis::Diagnosis without_names(diagnosis::Diagnosis d) {
+  return without_those(std::move(d),
+                       [](const diagnosis::Effect* effect) { return effect != nullptr && effect->sensor != nullptr; });
+}
+
+diagnosis::Diagnosis without_names(diagnosis::Diagnosis d, std::span<const diagnosis::Effect* const> names) {
+  return without_those(std::move(d), [&](const diagnosis::Effect* effect) {
+    return std::find(names.begin(), names.end(), effect) != names.end();
+  });
 }
 
 }  // namespace selfcal::discovery

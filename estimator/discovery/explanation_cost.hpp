@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "estimator/diagnosis/diagnosis.hpp"
@@ -18,5 +19,7 @@ double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double ro
 
 // The diagnosis as it is where no effect of a sensor is named: the names are rejected, those of base and data stay.
 diagnosis::Diagnosis without_names(diagnosis::Diagnosis diagnosis);
+// The same where these effects are not named.
+diagnosis::Diagnosis without_names(diagnosis::Diagnosis diagnosis, std::span<const diagnosis::Effect* const> names);
 
 }  // namespace selfcal::discovery

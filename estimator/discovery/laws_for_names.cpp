@@ -5,18 +5,10 @@
 #include <vector>
 
 #include "estimator/discovery/explanation_cost.hpp"
-#include "estimator/discovery/scene.hpp"
+#include "estimator/discovery/held_names.hpp"
 
 namespace selfcal::discovery {
 namespace {
-
-// Square of the residuals of `less`, the recording with something taken out, in its own noise: squares in two noises cannot be compared.
-double square_in_its_noise(const UnitRecording& recording, const ImuData& less, const std::stop_token& stop) {
-  const Scene scene(recording);
-  PassInput input = scene.input;
-  input.data = &less;
-  return sum_over_pieces(scene.motion, input, trace_pass(input, stop), stop).sums.square;
-}
 
 // Each effect once, as the recording has it that shows it best: one unit has one physics.
 std::vector<diagnosis::ModelEffect> names_of(std::span<const DiagnosedRecording> unit) {
@@ -34,6 +26,118 @@ std::vector<diagnosis::ModelEffect> names_of(std::span<const DiagnosedRecording>
   return all;
 }
 
+// Names that laws may replace together, and twice the logarithm of the odds that one law has at most.
+struct Choice {
+  std::vector<bool> out;
+  double most = 0.0;
+};
+
+class NamesAgainstLaws {
+ public:
+  NamesAgainstLaws(std::span<const DiagnosedRecording> unit, const UnexplainedRest& less,
+                   const DiscoveryOptions& of_laws, const Progress& progress)
+      : unit_(unit), of_laws_(of_laws), progress_(progress), held_(less, of_laws.stop, progress) {
+    const std::vector<diagnosis::ModelEffect> all = names_of(unit);
+    for (const diagnosis::Effect* name : held_.names()) {
+      models_.push_back(
+          *std::find_if(all.begin(), all.end(), [&](const diagnosis::ModelEffect& m) { return m.effect == name; }));
+    }
+  }
+
+  // Each name alone, any two of a few, all together, and those that laws may replace one by one; most probable first.
+  std::vector<Choice> choices(double least) {
+    constexpr std::size_t most_for_pairs = 4;
+    const std::size_t n = models_.size();
+    std::vector<Choice> all;
+    const auto add = [&](std::vector<bool> out) {
+      const double most = most_of(out, least);
+      all.push_back({std::move(out), most});
+    };
+    for (std::size_t k = 0; k < n; ++k) {
+      std::vector<bool> alone(n, false);
+      alone[k] = true;
+      add(alone);
+      for (std::size_t other = 0; other < k && n <= most_for_pairs; ++other) {
+        alone[other] = true;
+        add(alone);
+        alone[other] = false;
+      }
+    }
+    if (n > 2) {
+      add(std::vector<bool>(n, true));
+    }
+    if (auto one_by_one = replaced_one_by_one(all)) {
+      all.push_back(std::move(*one_by_one));
+    }
+    std::erase_if(all, [&](const Choice& c) { return c.most < least; });
+    std::stable_sort(all.begin(), all.end(), [](const Choice& a, const Choice& b) { return a.most > b.most; });
+    return all;
+  }
+
+  std::optional<LawsForNames> search(const std::vector<bool>& out) const {
+    std::vector<const diagnosis::Effect*> names;
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (out[k]) {
+        names.push_back(held_.names()[k]);
+      }
+    }
+    std::vector<diagnosis::Diagnosis> without;
+    for (const DiagnosedRecording& r : unit_) {
+      without.push_back(without_names(r.diagnosis, names));
+    }
+    std::vector<DiagnosedRecording> recordings;
+    for (std::size_t r = 0; r < unit_.size(); ++r) {
+      recordings.push_back({unit_[r].data, without[r]});
+    }
+    auto rest = UnexplainedRest::of(recordings, of_laws_.stop);
+    if (!rest) {
+      return std::nullopt;
+    }
+    LawSearch search(rest->recordings(), of_laws_, progress_);
+    const Discovery& found = search.fitted();
+    if (found.fit.terms.empty() || !found.processes.empty() || of_laws_.stop.stop_requested()) {
+      return std::nullopt;
+    }
+    const double log_odds = 0.5 * (held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size()));
+    return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
+  }
+
+ private:
+  double most_of(const std::vector<bool>& out, double least) {
+    const double more = dearer(out, 1);
+    return held_.most_beyond(out, least + more) - more;
+  }
+  // Of choices of one name those that a law most probably replaces: a law each.
+  std::optional<Choice> replaced_one_by_one(const std::vector<Choice>& all) const {
+    Choice together{std::vector<bool>(models_.size(), false), 0.0};
+    int names = 0;
+    for (const Choice& c : all) {
+      if (c.most > 0.0 && std::count(c.out.begin(), c.out.end(), true) == 1) {
+        together.out[static_cast<std::size_t>(std::find(c.out.begin(), c.out.end(), true) - c.out.begin())] = true;
+        together.most += c.most;
+        ++names;
+      }
+    }
+    return names > 1 ? std::optional(std::move(together)) : std::nullopt;
+  }
+  // By how much more laws cost than these names.
+  double dearer(const std::vector<bool>& out, std::size_t laws) const {
+    std::vector<diagnosis::ModelEffect> names;
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (out[k]) {
+        names.push_back(models_[k]);
+      }
+    }
+    return cost_of_laws(laws, held_.rows()) - cost_of_names(names, held_.rows());
+  }
+
+  std::span<const DiagnosedRecording> unit_;
+  const DiscoveryOptions& of_laws_;
+  const Progress& progress_;
+  HeldNames held_;
+  std::vector<diagnosis::ModelEffect> models_;  // [names]
+};
+
 }  // namespace
 
 bool names_stand_alone(const diagnosis::Diagnosis& d) {
@@ -45,8 +149,7 @@ bool names_stand_alone(const diagnosis::Diagnosis& d) {
          !d.unexplained && !d.remainder;
 }
 
-std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit,
-                                           std::span<const UnitRecording> as_they_are, double least_log_odds,
+std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit, double least_log_odds,
                                            const DiscoveryOptions& of_laws, const Progress& progress) {
   const auto stands = [](const DiagnosedRecording& r) { return names_stand_alone(r.diagnosis); };
   const auto explained = [&](const DiagnosedRecording& r) {
@@ -55,32 +158,25 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
   if (!std::any_of(unit.begin(), unit.end(), stands) || !std::all_of(unit.begin(), unit.end(), explained)) {
     return std::nullopt;
   }
-  // Twice the logarithm of odds, as costs are. What names take up beside each other is more than what each does alone.
-  constexpr double of_all = 0.9;
-  double taken_up = 0.0;
-  for (const DiagnosedRecording& r : unit) {
-    for (const diagnosis::ModelEffect& name : r.diagnosis.model) {
-      taken_up += of_all * square_of(name);
-    }
-  }
-  DiscoveryOptions options = of_laws;
-  options.least_gain = std::max(1.0, taken_up + 2.0 * least_log_odds);
-  LawSearch search(as_they_are, options, progress);
-  const Discovery& found = search.fitted();
-  if (found.fit.terms.empty() || !found.processes.empty() || of_laws.stop.stop_requested()) {
+  const auto less_names = UnexplainedRest::of(unit, of_laws.stop);
+  if (!less_names || less_names->effects().empty()) {
     return std::nullopt;
   }
-  double by_names = cost_of_names(names_of(unit), found.rows);
-  for (std::size_t r = 0; r < unit.size(); ++r) {
-    const auto less_names = UnexplainedRest::of(unit.subspan(r, 1), of_laws.stop);
-    if (!less_names) {
-      return std::nullopt;
+  NamesAgainstLaws against(unit, *less_names, of_laws, progress);
+  constexpr int most_searches = 3;
+  std::optional<LawsForNames> best;
+  int searches = 0;
+  for (const Choice& choice : against.choices(2.0 * least_log_odds)) {
+    if (searches == most_searches || (best && choice.most <= 2.0 * best->log_odds) || of_laws.stop.stop_requested()) {
+      break;
     }
-    by_names += square_in_its_noise(as_they_are[r], less_names->recordings().front().data, of_laws.stop);
+    ++searches;
+    auto found = against.search(choice.out);
+    if (found && found->log_odds >= least_log_odds && (!best || found->log_odds > best->log_odds)) {
+      best.emplace(std::move(*found));
+    }
   }
-  const double by_laws = found.misfit_after + found.rows + cost_of_laws(found.fit.terms.size(), found.rows);
-  const double log_odds = 0.5 * (by_names - by_laws);
-  return log_odds < least_log_odds ? std::nullopt : std::optional(LawsForNames{std::move(search), log_odds});
+  return best;
 }
 
 }  // namespace selfcal::discovery

@@ -37,6 +37,8 @@ class UnexplainedRest {
   std::span<const UnitRecording> recordings() const { return recordings_; }
   // Of the catalogue, each once.
   const std::vector<const diagnosis::Effect*>& taken_out() const { return taken_out_; }
+  // Those of sensors, as they were taken out of each recording.
+  const std::vector<UnitEffect>& effects() const { return start_.effects; }
 
   // What was taken out fitted anew beside these laws, all of it together on all recordings. Failures as above.
   tl::expected<JointFit, std::string> beside(const std::vector<LawTerm>& laws, const Eigen::VectorXd& coefficient,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/plan_search.hpp"
@@ -97,13 +98,21 @@ namespace {
 
 // Laws against the effects in whose place they stand, each as it was fitted.
 struct AgainstNames {
-  PlannedColumns columns;
+  PlannedColumns columns;         // of the laws, these effects, and those that stay
   Eigen::VectorXd laws, effects;  // sizes, as the columns have them
   double log_odds = 0.0;          // of the laws
 
-  // Square of what the other one leaves, fitted in its place.
-  double left_of_laws(const Eigen::MatrixXd& G) const { return left(G, laws, 0, effects.size(), laws.size()); }
-  double left_of_effects(const Eigen::MatrixXd& G) const { return left(G, effects, laws.size(), laws.size(), 0); }
+  // Square of what the other one leaves, fitted in its place beside the effects that stay.
+  double left_of_laws(const Eigen::MatrixXd& G) const {
+    return left(G, laws, 0, range(laws.size(), G.rows() - laws.size()));
+  }
+  double left_of_effects(const Eigen::MatrixXd& G) const {
+    std::vector<Eigen::Index> others = range(0, laws.size());
+    const Eigen::Index behind = laws.size() + effects.size();
+    const std::vector<Eigen::Index> stay = range(behind, G.rows() - behind);
+    others.insert(others.end(), stay.begin(), stay.end());
+    return left(G, effects, laws.size(), others);
+  }
   // The probability that what is not true is excluded, by a rotation of so much more information.
   double told(const Eigen::MatrixXd& now, const Eigen::MatrixXd& with) const {
     const double true_laws = 1.0 / (1.0 + std::exp(-log_odds));
@@ -112,14 +121,18 @@ struct AgainstNames {
   }
 
  private:
-  static double left(const Eigen::MatrixXd& G, const Eigen::VectorXd& size, Eigen::Index at, Eigen::Index others,
-                     Eigen::Index of_others) {
+  static std::vector<Eigen::Index> range(Eigen::Index first, Eigen::Index count) {
+    std::vector<Eigen::Index> all(static_cast<std::size_t>(count));
+    std::iota(all.begin(), all.end(), first);
+    return all;
+  }
+  static double left(const Eigen::MatrixXd& G, const Eigen::VectorXd& size, Eigen::Index at,
+                     const std::vector<Eigen::Index>& others) {
     const Eigen::Index n = size.size();
-    const Eigen::MatrixXd cross = G.block(of_others, at, others, n);
-    Eigen::MatrixXd inner = G.block(of_others, of_others, others, others);
+    Eigen::MatrixXd inner = G(others, others);
     inner.diagonal() *= 1.0 + 1e-9;  // a column that the rotation does not show takes up nothing
     inner.diagonal().array() += 1e-12;
-    const Eigen::VectorXd shown = cross * size;
+    const Eigen::VectorXd shown = G.middleCols(at, n)(others, Eigen::all) * size;
     return std::max(0.0, size.dot(G.block(at, at, n, n) * size) - shown.dot(inner.ldlt().solve(shown)));
   }
 };
@@ -136,15 +149,24 @@ std::optional<AgainstNames> against_names(const diagnosis::Diagnosis& d) {
     a.columns.laws.push_back({law.place, std::move(*expression), {}});
     laws.push_back(law.coefficient);
   }
+  std::vector<EffectTerm> stay;
   for (const diagnosis::ModelEffect& m : d.model) {
     if (m.effect->temperature == diagnosis::TemperatureUse::measured) {
       return std::nullopt;
     }
-    if (m.effect->sensor != nullptr) {
-      a.columns.effects.push_back({m.effect, m.constant, m.size, false});
+    if (m.effect->sensor == nullptr) {
+      continue;
+    }
+    const EffectTerm term{m.effect, m.constant, m.size, false};
+    const std::vector<const diagnosis::Effect*>& replaced = d.instead->names;
+    if (std::find(replaced.begin(), replaced.end(), m.effect) == replaced.end()) {
+      stay.push_back(term);
+    } else {
+      a.columns.effects.push_back(term);
       effects.insert(effects.end(), m.size.begin(), m.size.end());
     }
   }
+  a.columns.effects.insert(a.columns.effects.end(), stay.begin(), stay.end());
   a.laws = Eigen::Map<const Eigen::VectorXd>(laws.data(), static_cast<Eigen::Index>(laws.size()));
   a.effects = Eigen::Map<const Eigen::VectorXd>(effects.data(), static_cast<Eigen::Index>(effects.size()));
   a.log_odds = std::log(d.instead->odds);

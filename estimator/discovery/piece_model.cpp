@@ -111,15 +111,32 @@ void PieceModel::choose(const std::vector<Eigen::VectorXd>& columns) {
   for (std::size_t k = 0; k < columns.size(); ++k) {
     chosen_.col(static_cast<Eigen::Index>(k)) = columns[k];
   }
-  chosen_image_ = information_->all * chosen_;
-  Eigen::MatrixXd A = chosen_.transpose() * chosen_image_;
+  Eigen::MatrixXd image = information_->all * chosen_;
+  Eigen::MatrixXd A = chosen_.transpose() * image;
+  take_off(std::move(image), std::move(A), chosen_.transpose() * score_);
+}
+
+void PieceModel::choose(Eigen::MatrixXd with_pieces, Eigen::MatrixXd information, Eigen::VectorXd score) {
+  chosen_.resize(score_.size(), 0);
+  take_off(std::move(with_pieces), std::move(information), std::move(score));
+}
+
+void PieceModel::take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::VectorXd score) {
+  chosen_image_ = std::move(image);
+  chosen_score_ = std::move(score);
   A.diagonal() *= 1.0 + 1e-9;
   chosen_solver_.compute(A);
-  chosen_score_ = chosen_.transpose() * score_;
   square_ = raw_square_;
-  if (!columns.empty()) {
+  if (chosen_score_.size() > 0) {
     square_ -= chosen_score_.dot(chosen_solver_.solve(chosen_score_));
   }
+}
+
+void PieceModel::look_at(Eigen::VectorXd score, double square) {
+  score_ = std::move(score);
+  raw_square_ = square;
+  score_functions();
+  choose({});
 }
 
 void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
@@ -143,7 +160,7 @@ void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
 std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const Eigen::MatrixXd& means) const {
   Eigen::MatrixXd G = means.transpose() * (information_->own[static_cast<std::size_t>(axis)] * means);
   Eigen::VectorXd b = means.transpose() * own_score(axis);
-  if (chosen_.cols() > 0) {
+  if (chosen_image_.cols() > 0) {
     const Eigen::MatrixXd cross = own_image(axis).transpose() * means;
     G -= cross.transpose() * chosen_solver_.solve(cross);
     b -= cross.transpose() * chosen_solver_.solve(chosen_score_);
@@ -171,7 +188,7 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
     const auto f = static_cast<std::size_t>(axis);
     Eigen::VectorXd information = information_->function[f], score = function_score_[f],
                     partner = information_->partner[f];
-    if (chosen_.cols() > 0) {
+    if (chosen_image_.cols() > 0) {
       const Eigen::MatrixXd cross = own_image(axis).transpose() * D;
       const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
       information -= (cross.array() * solved.array()).colwise().sum().matrix().transpose();

@@ -49,6 +49,10 @@ class PieceModel {
   // The function on the axis as a vector over all columns of the sums.
   Eigen::VectorXd column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const;
   void choose(const std::vector<Eigen::VectorXd>& columns);
+  // Columns that are no vectors over pieces are chosen by their normal equations: those with the pieces, their own, their score.
+  void choose(Eigen::MatrixXd with_pieces, Eigen::MatrixXd information, Eigen::VectorXd score);
+  // Of another residual of the same recordings. Nothing is chosen then.
+  void look_at(Eigen::VectorXd score, double square);
   // Columns X become random with covariance q I and are integrated out (Woodbury).
   void integrate_out(const Eigen::MatrixXd& X, double q);
 
@@ -64,6 +68,8 @@ class PieceModel {
 
  private:
   void score_functions();
+  // Chosen columns by their image, their information and their score.
+  void take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::VectorXd score);
   Eigen::VectorXd own_score(int axis) const { return score_(Eigen::seqN(axis, sums_.piece_dt.size(), axis_count)); }
   // Rows of one axis of the chosen ones' image.
   Eigen::MatrixXd own_image(int axis) const {
@@ -75,7 +81,7 @@ class PieceModel {
   std::shared_ptr<const PieceInformation> information_;
   Eigen::VectorXd score_;
   double square_ = 0.0, raw_square_ = 0.0;
-  Eigen::MatrixXd chosen_, chosen_image_;  // X, G X
+  Eigen::MatrixXd chosen_, chosen_image_;  // X, none where it is no vector over pieces; G X
   Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
   Eigen::VectorXd chosen_score_;
   std::array<Eigen::VectorXd, axis_count> function_score_;  // of every function on every axis before projection

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/discovery/effect_columns.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::discovery {
@@ -103,6 +104,11 @@ class PieceSource : public ColumnSource {
 
 }  // namespace
 
+std::size_t pieces_of_each(std::size_t recordings) {
+  constexpr std::size_t most_of_all = 840;
+  return std::min(most_pieces, most_of_all / recordings);
+}
+
 double unit_of(int axis) { return axis < 3 ? units::degree_per_hour : units::micro_g; }
 
 std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context, std::size_t most) {
@@ -145,6 +151,23 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
   PieceSource source(motion, result);
   result.sums = run_columns(input, trace, source, stop);
   source.finish();
+  return result;
+}
+
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace, ColumnSource& beside,
+                          BesidePieces& sums, const std::stop_token& stop, std::size_t most) {
+  PieceSums result;
+  result.pieces = cut_into_pieces(motion.context(), most);
+  PieceSource source(motion, result);
+  TwoSources both(beside, source);
+  ColumnSums all = run_columns(input, trace, both, stop);
+  source.finish();
+  const int n = beside.count(), pieces = source.count();
+  sums = {all.information.topLeftCorner(n, n), all.information.bottomLeftCorner(pieces, n), all.score.head(n)};
+  all.information = all.information.bottomRightCorner(pieces, pieces).eval();
+  all.score = all.score.tail(pieces).eval();
+  all.shift = all.shift.rightCols(pieces).eval();
+  result.sums = std::move(all);
   return result;
 }
 

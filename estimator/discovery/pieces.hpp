@@ -25,6 +25,8 @@ struct Piece {
 // Dwells are cut ever more coarsely after a turn, turns into equal parts. The time of the pass goes with the square of the
 // number of pieces.
 constexpr std::size_t most_pieces = 280;
+// Of each of so many recordings: time and memory go with the square of the number of all, 5,040 columns, 200 MB a matrix.
+std::size_t pieces_of_each(std::size_t recordings);
 std::vector<Piece> cut_into_pieces(const diagnosis::RecordingContext& context, std::size_t most = most_pieces);
 
 struct PieceSums : NodeTable {
@@ -46,6 +48,16 @@ double unit_of(int axis);
 
 PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace,
                           const std::stop_token& stop = {}, std::size_t most = most_pieces);
+
+// Columns that are carried before those of the pieces, n of them.
+struct BesidePieces {
+  Eigen::MatrixXd information;  // [n x n]
+  Eigen::MatrixXd with_pieces;  // [columns of the pieces x n]
+  Eigen::VectorXd score;        // [n]
+};
+// With the columns of `beside`, which are in `sums` then and not in what is returned.
+PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace, ColumnSource& beside,
+                          BesidePieces& sums, const std::stop_token& stop = {}, std::size_t most = most_pieces);
 
 // Recordings one behind the other: what the states of each take up is projected out of each by itself, so that information
 // between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty. One recording

@@ -202,15 +202,6 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
   return c;
 }
 
-double Shortlist::largest_gain(const PieceModel& model, std::size_t most) const {
-  constexpr double of_pieces = 1.02;
-  double largest = 0.0;
-  for (const Candidate& candidate : best(model, most)) {
-    largest = std::max(largest, of_pieces * candidate.gain);
-  }
-  return largest;
-}
-
 std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most) const {
   constexpr std::size_t looked_at = 12;  // neighbours on the grid of a constant are one law
   // On a plan of equal dwells what turns only is seen at equal times: waves of several periods are then the same.

@@ -41,8 +41,6 @@ class Shortlist {
   // The best `most` laws over the pieces given what the model has chosen, each expression once, constants of greatest
   // gain; best first.
   std::vector<Candidate> best(const PieceModel& model, std::size_t most) const;
-  // Fall of the residuals' square by the best of those: no less than an exact fit would show, for pieces stand for a law to a per cent or so.
-  double largest_gain(const PieceModel& model, std::size_t most) const;
   // A wave with other periods up to one of resolution away, amplitude and phase of greatest gain at each: where little of it is seen, several
   // fit alike, far beyond the sigma of a linearised fit. `wave_step` of the dictionary's periods apart. Of another law none.
   static constexpr double wave_step = 0.1;

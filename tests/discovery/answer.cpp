@@ -128,7 +128,11 @@ DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
       answer.words["names"].push_back(finding.effect);
     }
     if (diagnosis->instead) {
-      answer.words["instead"] = {{"odds", diagnosis->instead->odds}, {"laws", ordered_json::array()}};
+      answer.words["instead"] = {
+          {"odds", diagnosis->instead->odds}, {"laws", ordered_json::array()}, {"names", ordered_json::array()}};
+      for (const diagnosis::Effect* name : diagnosis->instead->names) {
+        answer.words["instead"]["names"].push_back(name->id);
+      }
       for (const auto& law : diagnosis->instead->laws) {
         answer.words["instead"]["laws"].push_back({{"axis", law.axis}, {"expression", law.expression}});
       }

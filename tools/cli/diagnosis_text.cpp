@@ -96,8 +96,12 @@ std::string instead_text(const Diagnosis& d) {
   if (!d.instead) {
     return {};
   }
-  std::string text = fmt::format(
-      "\nin the place of what is named, odds {:.2g} against it; the sigma of the 24 holds both:\n", d.instead->odds);
+  std::vector<std::string_view> names;
+  for (const diagnosis::Effect* name : d.instead->names) {
+    names.emplace_back(name->id);
+  }
+  std::string text = fmt::format("\nin the place of {}, odds {:.2g} against it; the sigma of the 24 holds both:\n",
+                                 fmt::join(names, " and "), d.instead->odds);
   for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
     text += fmt::format("  {}  ({}) * {}\n", law.axis,
                         with_sigma(law.coefficient, law.sigma, std::string(unit_of_axis(law.place))), law.expression);

@@ -283,7 +283,8 @@ class Investigation {
     }
     if (!a.instead().is_null()) {
       for (const ordered_json& law : a.instead().at("laws")) {
-        say(fmt::format("   or in its place {} = ({:.4g} +- {:.2g} {}) * {}, odds {:.2g}\n",
+        say(fmt::format("   or in the place of {} {} = ({:.4g} +- {:.2g} {}) * {}, odds {:.2g}\n",
+                        fmt::join(a.instead().at("names").get<std::vector<std::string>>(), " and "),
                         law.at("axis").get<std::string>(), law.at("coefficient").get<double>(),
                         law.at("sigma").get<double>(), law.at("unit").get<std::string>(),
                         law.at("expression").get<std::string>(), a.instead().at("odds").get<double>()));

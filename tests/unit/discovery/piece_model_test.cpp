@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -100,6 +101,36 @@ TEST(PieceModel, SharesTheInformationOfARecording) {
   d.sums.sums.score = d.Z.transpose() * d.r;
   d.sums.sums.square = d.r.squaredNorm();
   expect_gains(d, PieceModel(d.sums, d.dictionary, information), Eigen::MatrixXd::Identity(rows, rows));
+}
+
+// Columns that are no functions over the pieces, as an effect's are that changes within one, are projected out by their normal equations.
+TEST(PieceModel, ProjectsOutWhatIsNoVectorOverPieces) {
+  const Drawn d;
+  const Eigen::MatrixXd Y = drawn(rows, 3, 7);
+  PieceModel model(d.sums, d.dictionary);
+  model.choose(d.Z.transpose() * Y, Y.transpose() * Y, Y.transpose() * d.r);
+  const Eigen::MatrixXd projector = Y * (Y.transpose() * Y).inverse() * Y.transpose();
+  const Eigen::VectorXd left = d.r - projector * d.r;
+  for (const Ranked& ranked : model.rank(100)) {
+    if (ranked.function == 1) {
+      continue;  // with its partner
+    }
+    const Eigen::MatrixXd of_axis = d.Z(Eigen::all, Eigen::seqN(ranked.axis, pieces, axis_count));
+    const Eigen::VectorXd f = of_axis * d.dictionary.means.col(ranked.function);
+    const Eigen::VectorXd rest = f - projector * f;
+    const double gain = rest.dot(left) * rest.dot(left) / rest.squaredNorm();
+    EXPECT_NEAR(ranked.gain, gain, 1e-6 * std::max(1.0, gain));  // single precision
+  }
+  EXPECT_NEAR(model.square(), left.squaredNorm(), 1e-7);
+}
+
+TEST(PieceModel, LooksAtAnotherResidual) {
+  Drawn d;
+  PieceModel model(d.sums, d.dictionary);
+  model.choose({model.column(0, d.dictionary.means.col(0))});
+  d.r = drawn(rows, 1, 8);
+  model.look_at(d.Z.transpose() * d.r, d.r.squaredNorm());
+  expect_gains(d, model, Eigen::MatrixXd::Identity(rows, rows));
 }
 
 }  // namespace
