@@ -139,6 +139,16 @@ void PieceModel::look_at(Eigen::VectorXd score, double square) {
   choose({});
 }
 
+PieceModel PieceModel::beside(const std::vector<Eigen::VectorXd>& columns) const {
+  std::vector<Eigen::VectorXd> all = columns;
+  for (Eigen::Index k = 0; k < chosen_.cols(); ++k) {
+    all.emplace_back(chosen_.col(k));
+  }
+  PieceModel model = *this;
+  model.choose(all);
+  return model;
+}
+
 void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
   const Eigen::MatrixXd image = information_->all * X;
   Eigen::MatrixXd A = X.transpose() * image;

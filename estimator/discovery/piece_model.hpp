@@ -53,6 +53,8 @@ class PieceModel {
   void choose(Eigen::MatrixXd with_pieces, Eigen::MatrixXd information, Eigen::VectorXd score);
   // Of another residual of the same recordings. Nothing is chosen then.
   void look_at(Eigen::VectorXd score, double square);
+  // The same with these projected out besides.
+  PieceModel beside(const std::vector<Eigen::VectorXd>& columns) const;
   // Columns X become random with covariance q I and are integrated out (Woodbury).
   void integrate_out(const Eigen::MatrixXd& X, double q);
 

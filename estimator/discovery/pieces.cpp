@@ -1,5 +1,6 @@
 #include "estimator/discovery/pieces.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -169,6 +170,59 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
   all.shift = all.shift.rightCols(pieces).eval();
   result.sums = std::move(all);
   return result;
+}
+
+namespace {
+
+Eigen::MatrixXd side_by_side(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
+  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    all.col(static_cast<Eigen::Index>(k)) = columns[k];
+  }
+  return all;
+}
+
+// Means over the pieces of what the 24 multiply on this axis, in each recording by itself, each of information 1.
+void add_known(const PieceSums& sums, int axis, std::vector<Eigen::VectorXd>& columns) {
+  constexpr double rounding = 1e-13;  // of a column's information before projection
+  const auto own = Eigen::seqN(axis, sums.piece_dt.size(), axis_count);
+  const Eigen::MatrixXd G = sums.information(axis, axis);
+  const auto first = static_cast<Eigen::Index>(axis < 3 ? laws::Variable::wx : laws::Variable::fx);
+  for (int recording = 0; recording <= sums.pieces.back().recording; ++recording) {
+    for (Eigen::Index k = -1; k < 3; ++k) {
+      Eigen::VectorXd means = Eigen::VectorXd::Ones(sums.piece_dt.size());
+      if (k >= 0) {
+        means = sums.means(sums.channels.col(first + k));
+      }
+      for (std::size_t p = 0; p < sums.pieces.size(); ++p) {
+        means(static_cast<Eigen::Index>(p)) *= sums.pieces[p].recording == recording ? 1.0 : 0.0;
+      }
+      const double left = means.dot(G * means);
+      if (left > rounding * means.cwiseAbs2().dot(G.diagonal())) {
+        columns.emplace_back(Eigen::VectorXd::Zero(sums.sums.score.size()));
+        columns.back()(own) = means / std::sqrt(left);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Eigen::VectorXd> known_columns(const PieceSums& sums) {
+  constexpr double alike = 1e-6;  // a constant rate is a bias, and one force twice another: such directions count once
+  std::vector<Eigen::VectorXd> columns;
+  for (int axis = 0; axis < axis_count && !sums.pieces.empty(); ++axis) {
+    add_known(sums, axis, columns);
+  }
+  const Eigen::MatrixXd X = side_by_side(columns, sums.sums.score.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> information(X.transpose() * (sums.sums.information * X));
+  std::vector<Eigen::VectorXd> apart;
+  for (Eigen::Index k = 0; k < X.cols(); ++k) {
+    if (information.eigenvalues()(k) > alike) {
+      apart.emplace_back(X * information.eigenvectors().col(k) / std::sqrt(information.eigenvalues()(k)));
+    }
+  }
+  return apart;
 }
 
 namespace {

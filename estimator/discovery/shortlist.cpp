@@ -91,7 +91,8 @@ std::vector<Candidate> best_of(const std::vector<std::vector<Candidate>>& altern
   return best;
 }
 
-Shortlist::Shortlist(const PieceSums& sums, const Dictionary& dictionary) : sums_(sums), dictionary_(dictionary) {}
+Shortlist::Shortlist(const PieceSums& sums, const Dictionary& dictionary)
+    : sums_(sums), dictionary_(dictionary), known_(known_columns(sums)) {}
 
 double Shortlist::gain_of(const PieceModel& model, const LawTerm& term) const {
   const Eigen::ArrayXd values = term.expression.evaluate(sums_.channels, term.constants);
@@ -203,6 +204,26 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
 }
 
 std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most) const {
+  std::vector<Candidate> all = best_over_pieces(model, most);
+  if (known_.empty()) {
+    return all;
+  }
+  const auto of_all = static_cast<std::ptrdiff_t>(all.size());
+  for (Candidate& other : best_over_pieces(model.beside(known_), (most + 2) / 3)) {
+    const auto same = std::find_if(all.begin(), all.begin() + of_all, [&](const Candidate& c) {
+      return c.term.axis == other.term.axis && c.term.expression.text() == other.term.expression.text();
+    });
+    if (same == all.begin() + of_all) {
+      all.push_back(std::move(other));
+    } else {
+      same->gain = std::max(same->gain, other.gain);
+    }
+  }
+  std::sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.merit() > b.merit(); });
+  return all;
+}
+
+std::vector<Candidate> Shortlist::best_over_pieces(const PieceModel& model, std::size_t most) const {
   constexpr std::size_t looked_at = 12;  // neighbours on the grid of a constant are one law
   // On a plan of equal dwells what turns only is seen at equal times: waves of several periods are then the same.
   constexpr std::size_t most_waves = 4;

@@ -39,7 +39,8 @@ class Shortlist {
   Shortlist(const PieceSums& sums, const Dictionary& dictionary);
 
   // The best `most` laws over the pieces given what the model has chosen, each expression once, constants of greatest
-  // gain; best first.
+  // gain; best first. A third as many are added that are best beside the known columns (pieces.hpp). A law's means over the
+  // pieces gain no more than the law does, with the known columns and without: the larger gain counts.
   std::vector<Candidate> best(const PieceModel& model, std::size_t most) const;
   // A wave with other periods up to one of resolution away, amplitude and phase of greatest gain at each: where little of it is seen, several
   // fit alike, far beyond the sigma of a linearised fit. `wave_step` of the dictionary's periods apart. Of another law none.
@@ -51,6 +52,7 @@ class Shortlist {
   std::vector<Constant> constants(const LawTerm& term) const;
 
  private:
+  std::vector<Candidate> best_over_pieces(const PieceModel& model, std::size_t most) const;
   Candidate candidate(const PieceModel& model, const Ranked& ranked) const;
   double longest_of(Kernel kernel) const;
   // Means over the pieces of a wave's sine and cosine of this period; `sine` is the text with the bare sine.
@@ -62,6 +64,7 @@ class Shortlist {
 
   const PieceSums& sums_;
   const Dictionary& dictionary_;
+  std::vector<Eigen::VectorXd> known_;
 };
 
 }  // namespace selfcal::discovery
