@@ -1,11 +1,11 @@
 // Answers one recording of the discovery trial. Links no simulation.
 //
-//   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ...]
-//     [--plan FILE]
+//   selfcal_discovery_answer RECORDING [RECORDING...] [--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ... |
+//     --among FILE] [--plan FILE]
 //
 // One JSON line. Without a way: as `selfcal diagnose` does it, the catalogue and what it leaves; --discover: discovery alone; --form, once
-// for each law: these forms and no others, coefficients and the constants `?` fitted, which is the best that a search can do; the others are
-// rivals (rivals.hpp). Further recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
+// for each law: these forms and no others, coefficients and the constants `?` fitted, which is the best that a search can do; --among: one of
+// the file's forms, a line "AXIS EXPRESSION" each (limit.hpp); the others are rivals (rivals.hpp). Further recordings are of the same unit. --plan writes the schedule of the next experiment, where there is one.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -32,6 +32,7 @@
 #include "estimator/discovery/scene.hpp"
 #include "protocol/recording/recording_file.hpp"
 #include "protocol/schedule_file/schedule_file.hpp"
+#include "tests/discovery/limit.hpp"
 #include "tests/discovery/rivals.hpp"
 
 namespace {
@@ -160,8 +161,25 @@ ordered_json fitted_json(std::span<const discovery::UnitRecording> recordings,
   return j;
 }
 
+// One of the forms that could have been drawn.
+ordered_json among_json(const discovery::UnitRecording& recording, const std::string& path) {
+  std::vector<discovery_trial::PossibleForm> forms;
+  std::ifstream file(path);
+  for (discovery_trial::PossibleForm form; file >> form.axis >> form.expression;) {
+    forms.push_back(form);
+  }
+  const discovery_trial::LimitAnswer best = discovery_trial::best_of_all(recording, forms);
+  ordered_json j = to_json(best.laws);
+  for (ordered_json& law : j["laws"]) {
+    law["gain"] = best.gain;
+    law["carries_over"] = best.carries_over;
+    law["likely"] = best.likely;
+  }
+  return j;
+}
+
 struct Request {
-  std::string way, plan;  // plan: where the schedule of the next experiment goes
+  std::string way, plan, among;  // plan: where the schedule of the next experiment goes; among: a file of forms
   std::vector<discovery::LawTerm> forms;
   std::vector<std::string> files;
 };
@@ -222,6 +240,8 @@ int answer(const Request& request) {
       j["discovery"] = rival_json(request.way, all.front()->data, all.front()->calibration);
     } else if (request.way == "--form") {
       j["discovery"] = fitted_json(recordings, request.forms);
+    } else if (request.way == "--among") {
+      j["discovery"] = among_json(recordings.front(), request.among);
     } else {
       const discovery::Discovery found = discovery::discover(recordings, {});
       j["discovery"] = to_json(found);
@@ -246,6 +266,9 @@ bool parse(std::span<char*> arguments, Request& request) {
     const std::string word = arguments[k];
     if (word == "--plan" && k + 1 < arguments.size()) {
       request.plan = arguments[++k];
+    } else if (word == "--among" && k + 1 < arguments.size()) {
+      request.way = word;
+      request.among = arguments[++k];
     } else if (word == "--form" && k + 2 < arguments.size()) {
       request.way = word;
       const int axis = std::atoi(arguments[++k]);
@@ -275,7 +298,8 @@ int main(int count, char** values) {
     if (!parse(arguments, request)) {
       fmt::print(stderr,
                  "usage: selfcal_discovery_answer RECORDING [RECORDING...] "
-                 "[--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ...] [--plan FILE]\n");
+                 "[--discover | --catalogue | --stepwise | --process | --form AXIS EXPRESSION ... | --among FILE] "
+                 "[--plan FILE]\n");
       return 2;
     }
     return answer(request);

@@ -288,6 +288,17 @@ Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
   return c;
 }
 
+std::vector<sim::Law> possible_laws(const Case& drawn, std::size_t count) {
+  constexpr std::uint64_t stream = 11;
+  Random random(drawn.seed, stream);
+  std::vector<sim::Law> all;
+  for (std::size_t k = 0; k < count; ++k) {
+    all.push_back(draw_law(drawn.kind, random));
+  }
+  all.insert(all.end(), drawn.physics.laws.begin(), drawn.physics.laws.end());
+  return all;
+}
+
 Schedule other_plan() {
   Schedule plan;
   constexpr std::array<std::array<double, 2>, 20> positions = {

@@ -46,6 +46,9 @@ std::vector<Recipe> recipes(const Counts& counts);
 
 [[nodiscard]] Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed);
 
+// Laws as this case's was drawn, each with its axis, the case's own at the end: any of them could have been concealed.
+std::vector<sim::Law> possible_laws(const Case& drawn, std::size_t count);
+
 // The plan that no case is recorded on: 20 positions at 45 and 135 degrees, the base at another attitude.
 Schedule other_plan();
 sim::SimConfig other_installation(const sim::SimConfig& config);

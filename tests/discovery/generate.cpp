@@ -6,6 +6,7 @@
 //                                                            the key as "case", and for the program that asks what is left as "assumed"
 //   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
 //                                                            another schedule: a file, or "random:SECONDS"
+//   selfcal_discovery_generate possible KEY NUMBER COUNT     so many laws as that of the case, drawn in the same way, and its own: "AXIS EXPRESSION"
 //   selfcal_discovery_generate left KEY NUMBER LAWS.toml     share of the misfit's power that these laws leave on a plan
 //                                                            that was never used: |true - told|^2 / |true|^2
 #include <fmt/format.h>
@@ -179,6 +180,13 @@ int draw(std::span<char*> arguments) {
   return write_record(drawn, arguments[10]);
 }
 
+int print_possible(const Case& c, int count) {
+  for (const sim::Law& law : discovery_trial::possible_laws(c, static_cast<std::size_t>(count))) {
+    fmt::print("{} {}\n", law.axis, law.expression);
+  }
+  return 0;
+}
+
 int print_left(const Case& c, const std::string& laws) {
   const auto told = sim::read_physics(laws);
   if (!told) {
@@ -236,7 +244,8 @@ int run(std::span<char*> arguments) {
     return draw(arguments.subspan(2));
   }
   const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
-  if ((again || ((verb == "record" || verb == "left") && arguments.size() == 5)) && to_number(arguments[3])) {
+  const bool of_case = (verb == "record" || verb == "left" || verb == "possible") && arguments.size() == 5;
+  if ((again || of_case) && to_number(arguments[3])) {
     const auto c = case_in(arguments[2], *to_number(arguments[3]));
     if (!c) {
       return complain(c.error());
@@ -244,13 +253,16 @@ int run(std::span<char*> arguments) {
     if (again) {
       return write_again(*c, arguments[4], *to_number(arguments[5]), arguments[6]);
     }
+    if (verb == "possible" && to_number(arguments[4])) {
+      return print_possible(*c, *to_number(arguments[4]));
+    }
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
   fmt::print(stderr,
              "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP FILE | "
              "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP NUMBER FILE | record KEY NUMBER FILE | "
              "again KEY "
-             "NUMBER FILE K PLAN | left KEY NUMBER LAWS.toml\n");
+             "NUMBER FILE K PLAN | possible KEY NUMBER COUNT | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 

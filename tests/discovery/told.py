@@ -18,6 +18,8 @@ def left_elsewhere(programs, key, number, laws, folder):
     return json.loads(done.stdout)
 
 
+POSSIBLE = 50000   # laws drawn for --way limit: most pairs of quantities on an axis are among them
+
 # Constants of the forms that the generator draws, each to be fitted: of a creep, of a warm-up, of a wave.
 CONSTANTS = ((r"exp\(-(t|since)/[0-9.e+-]+\)", r"exp(-\1/?)"), (r"log\(1\+(rest|since)/[0-9.e+-]+\)", r"log(1+\1/?)"),
              (r"sin\(2\*pi\*t/[0-9.e+-]+\+-?[0-9.e+-]+\)", "sin(2*pi*t/?+?)"))
@@ -38,6 +40,14 @@ def answer_of(programs, way, case, recording, folder):
         if not case["laws"] or any(law["process"] for law in case["laws"]):
             return {"seconds": 0.0}
         words = [word for law in case["laws"] for word in ("--form", str(law["axis"]), form_of(law["expression"]))]
+    if way == "limit":
+        if case["kind"] not in ("law", "deep"):
+            return {"seconds": 0.0}
+        key, forms = folder / "case.jsonl", folder / "forms"
+        key.write_text(json.dumps(case) + "\n")
+        with forms.open("w") as out:
+            subprocess.run([f"{programs}/selfcal_discovery_generate", "possible", str(key), str(case["number"]), str(POSSIBLE)], check=True, stdout=out)
+        words = ["--among", str(forms)]
     out = subprocess.run([f"{programs}/selfcal_discovery_answer", str(recording), *words], check=True, capture_output=True, text=True).stdout
     answer = json.loads(out)
     if case["laws"] and not any(law["process"] for law in case["laws"]) and "discovery" in answer:
