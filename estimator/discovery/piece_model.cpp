@@ -11,6 +11,7 @@ namespace {
 // Of a column's information this much must be left after projection: the rest of a function that lies in the span of the
 // chosen ones is rounding and the error of the pieces.
 constexpr double least_left = 1e-4;
+constexpr double rounding = 1e-9;
 
 }  // namespace
 
@@ -55,8 +56,7 @@ void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
   }
 }
 
-std::shared_ptr<const PieceInformation> PieceInformation::less(const Eigen::MatrixXd& W,
-                                                               const Dictionary& dictionary) const {
+std::shared_ptr<PieceInformation> PieceInformation::less(const Eigen::MatrixXd& W, const Dictionary& dictionary) const {
   auto lower = std::make_shared<PieceInformation>(*this);
   lower->all.selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
   lower->all.triangularView<Eigen::StrictlyUpper>() = lower->all.transpose();
@@ -78,6 +78,19 @@ std::shared_ptr<const PieceInformation> PieceInformation::less(const Eigen::Matr
     }
   }
   return lower;
+}
+
+PieceProjection::PieceProjection(std::shared_ptr<const PieceInformation> information, Eigen::MatrixXd columns,
+                                 const Dictionary& dictionary)
+    : of(std::move(information)), X(std::move(columns)) {
+  const Eigen::MatrixXd image = of->all * X;
+  Eigen::MatrixXd A = X.transpose() * image;
+  A.diagonal() *= 1.0 + rounding;
+  root.compute(A);
+  W = root.matrixL().solve(image.transpose()).transpose();
+  auto lower = of->less(W, dictionary);
+  lower->whole = of;
+  left = std::move(lower);
 }
 
 PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary)
@@ -124,8 +137,10 @@ void PieceModel::choose(Eigen::MatrixXd with_pieces, Eigen::MatrixXd information
 void PieceModel::take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::VectorXd score) {
   chosen_image_ = std::move(image);
   chosen_score_ = std::move(score);
-  A.diagonal() *= 1.0 + 1e-9;
-  chosen_solver_.compute(A);
+  chosen_information_ = std::move(A);
+  Eigen::MatrixXd solved = chosen_information_;
+  solved.diagonal() *= 1.0 + rounding;
+  chosen_solver_.compute(solved);
   square_ = raw_square_;
   if (chosen_score_.size() > 0) {
     square_ -= chosen_score_.dot(chosen_solver_.solve(chosen_score_));
@@ -139,13 +154,17 @@ void PieceModel::look_at(Eigen::VectorXd score, double square) {
   choose({});
 }
 
-PieceModel PieceModel::beside(const std::vector<Eigen::VectorXd>& columns) const {
-  std::vector<Eigen::VectorXd> all = columns;
-  for (Eigen::Index k = 0; k < chosen_.cols(); ++k) {
-    all.emplace_back(chosen_.col(k));
-  }
+PieceModel PieceModel::beside(const PieceProjection& columns) const {
   PieceModel model = *this;
-  model.choose(all);
+  const Eigen::VectorXd b = columns.root.matrixL().solve(columns.X.transpose() * score_);
+  model.information_ = columns.left;
+  model.score_ -= columns.W * b;
+  model.raw_square_ -= b.squaredNorm();
+  model.score_functions();
+  const Eigen::MatrixXd c = columns.root.matrixL().solve(columns.X.transpose() * chosen_image_);
+  Eigen::MatrixXd A = chosen_information_ - c.transpose() * c;
+  A.diagonal() += rounding * chosen_information_.diagonal();
+  model.take_off(chosen_image_ - columns.W * c, std::move(A), chosen_score_ - c.transpose() * b);
   return model;
 }
 
@@ -182,7 +201,7 @@ double PieceModel::gain(int axis, const Eigen::MatrixXd& means) const {
   const auto [G, b] = project(axis, means);
   for (Eigen::Index k = 0; k < b.size(); ++k) {
     const auto column = means.col(k);
-    const double before = column.dot(information_->own[static_cast<std::size_t>(axis)] * column);
+    const double before = column.dot(whole().own[static_cast<std::size_t>(axis)] * column);
     if (G(k, k) < least_left * before || G(k, k) <= 0.0) {
       return 0.0;
     }
@@ -208,7 +227,7 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
         partner(k) -= p >= 0 ? cross.col(k).dot(solved.col(p)) : 0.0;
       }
     }
-    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * information_->function[f](k); };
+    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * whole().function[f](k); };
     for (Eigen::Index k = 0; k < D.cols(); ++k) {
       const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
       if (function.second || !seen(k)) {

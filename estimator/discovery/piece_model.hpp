@@ -27,15 +27,27 @@ double cost_of_phase(double gain);
 struct PieceInformation {
   PieceInformation(Eigen::MatrixXd information, const Dictionary& dictionary);
   // Columns X become random: W = G X L'^-1, L L' = X'G X + I/q, is taken off (Woodbury).
-  std::shared_ptr<const PieceInformation> less(const Eigen::MatrixXd& W, const Dictionary& dictionary) const;
+  std::shared_ptr<PieceInformation> less(const Eigen::MatrixXd& W, const Dictionary& dictionary) const;
 
   Eigen::MatrixXd all;
   std::array<Eigen::MatrixXd, axis_count> own;  // [pieces x pieces] blocks of one axis
   // Of every function on every axis before projection; of a wave with its partner.
   std::array<Eigen::VectorXd, axis_count> function, partner;
+  std::shared_ptr<const PieceInformation>
+      whole;  // before columns were projected out of all of it; none where none were
 
  private:
   void of_axis(int axis, const Dictionary& dictionary);
+};
+
+// Columns X projected out of the information of a recording, for all models of it whatever their residual is.
+struct PieceProjection {
+  PieceProjection(std::shared_ptr<const PieceInformation> information, Eigen::MatrixXd columns,
+                  const Dictionary& dictionary);
+
+  std::shared_ptr<const PieceInformation> of, left;
+  Eigen::MatrixXd X, W;              // W = G X L'^-1
+  Eigen::LLT<Eigen::MatrixXd> root;  // L L' = X'G X
 };
 
 // Normal equations over the pieces. Laws are vectors over pieces and axes; what was chosen is projected out, what is a
@@ -53,8 +65,9 @@ class PieceModel {
   void choose(Eigen::MatrixXd with_pieces, Eigen::MatrixXd information, Eigen::VectorXd score);
   // Of another residual of the same recordings. Nothing is chosen then.
   void look_at(Eigen::VectorXd score, double square);
-  // The same with these projected out besides.
-  PieceModel beside(const std::vector<Eigen::VectorXd>& columns) const;
+  // The same with these projected out besides, of the information that this model has.
+  PieceModel beside(const PieceProjection& columns) const;
+  const std::shared_ptr<const PieceInformation>& information() const { return information_; }
   // Columns X become random with covariance q I and are integrated out (Woodbury).
   void integrate_out(const Eigen::MatrixXd& X, double q);
 
@@ -72,6 +85,8 @@ class PieceModel {
   void score_functions();
   // Chosen columns by their image, their information and their score.
   void take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::VectorXd score);
+  // Before what is known was projected out.
+  const PieceInformation& whole() const { return information_->whole ? *information_->whole : *information_; }
   Eigen::VectorXd own_score(int axis) const { return score_(Eigen::seqN(axis, sums_.piece_dt.size(), axis_count)); }
   // Rows of one axis of the chosen ones' image.
   Eigen::MatrixXd own_image(int axis) const {
@@ -84,6 +99,7 @@ class PieceModel {
   Eigen::VectorXd score_;
   double square_ = 0.0, raw_square_ = 0.0;
   Eigen::MatrixXd chosen_, chosen_image_;  // X, none where it is no vector over pieces; G X
+  Eigen::MatrixXd chosen_information_;
   Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
   Eigen::VectorXd chosen_score_;
   std::array<Eigen::VectorXd, axis_count> function_score_;  // of every function on every axis before projection

@@ -174,14 +174,6 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
 
 namespace {
 
-Eigen::MatrixXd side_by_side(const std::vector<Eigen::VectorXd>& columns, Eigen::Index rows) {
-  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    all.col(static_cast<Eigen::Index>(k)) = columns[k];
-  }
-  return all;
-}
-
 // Means over the pieces of what the 24 multiply on this axis, in each recording by itself, each of information 1.
 void add_known(const PieceSums& sums, int axis, std::vector<Eigen::VectorXd>& columns) {
   constexpr double rounding = 1e-13;  // of a column's information before projection
@@ -208,21 +200,20 @@ void add_known(const PieceSums& sums, int axis, std::vector<Eigen::VectorXd>& co
 
 }  // namespace
 
-std::vector<Eigen::VectorXd> known_columns(const PieceSums& sums) {
+Eigen::MatrixXd known_columns(const PieceSums& sums) {
   constexpr double alike = 1e-6;  // a constant rate is a bias, and one force twice another: such directions count once
   std::vector<Eigen::VectorXd> columns;
   for (int axis = 0; axis < axis_count && !sums.pieces.empty(); ++axis) {
     add_known(sums, axis, columns);
   }
-  const Eigen::MatrixXd X = side_by_side(columns, sums.sums.score.size());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> information(X.transpose() * (sums.sums.information * X));
-  std::vector<Eigen::VectorXd> apart;
-  for (Eigen::Index k = 0; k < X.cols(); ++k) {
-    if (information.eigenvalues()(k) > alike) {
-      apart.emplace_back(X * information.eigenvectors().col(k) / std::sqrt(information.eigenvalues()(k)));
-    }
+  Eigen::MatrixXd X(sums.sums.score.size(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    X.col(static_cast<Eigen::Index>(k)) = columns[k];
   }
-  return apart;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> information(X.transpose() * (sums.sums.information * X));
+  const Eigen::Index apart = (information.eigenvalues().array() > alike).count();  // in ascending order
+  return X * information.eigenvectors().rightCols(apart) *
+         information.eigenvalues().tail(apart).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 namespace {

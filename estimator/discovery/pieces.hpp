@@ -62,7 +62,7 @@ PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const
 // What the 24 of each recording multiply (one, the rates, the forces, on each axis) as means over the pieces: columns of the
 // sums with information I, what the sums do not show left out. The filter takes up a scale factor, and of its means over the
 // pieces all but what a rate does within a piece. Beside a law that is a scale factor but for a small part, that is most of it.
-std::vector<Eigen::VectorXd> known_columns(const PieceSums& sums);
+Eigen::MatrixXd known_columns(const PieceSums& sums);
 
 // Recordings one behind the other: what the states of each take up is projected out of each by itself, so that information
 // between pieces of two is zero. A law's coefficient is then common to all. `sums.shift` and `sums.pass` stay empty. One recording

@@ -205,11 +205,14 @@ Candidate Shortlist::candidate(const PieceModel& model, const Ranked& ranked) co
 
 std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most) const {
   std::vector<Candidate> all = best_over_pieces(model, most);
-  if (known_.empty()) {
+  if (known_.cols() == 0) {
     return all;
   }
+  if (!beside_known_ || beside_known_->of != model.information()) {
+    beside_known_.emplace(model.information(), known_, dictionary_);
+  }
   const auto of_all = static_cast<std::ptrdiff_t>(all.size());
-  for (Candidate& other : best_over_pieces(model.beside(known_), (most + 2) / 3)) {
+  for (Candidate& other : best_over_pieces(model.beside(*beside_known_), (most + 2) / 3)) {
     const auto same = std::find_if(all.begin(), all.begin() + of_all, [&](const Candidate& c) {
       return c.term.axis == other.term.axis && c.term.expression.text() == other.term.expression.text();
     });

@@ -1,6 +1,7 @@
 // From the ranking over the pieces to laws: constants refined, doubles left out.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -64,7 +65,8 @@ class Shortlist {
 
   const PieceSums& sums_;
   const Dictionary& dictionary_;
-  std::vector<Eigen::VectorXd> known_;
+  Eigen::MatrixXd known_;
+  mutable std::optional<PieceProjection> beside_known_;  // of the information that was asked last
 };
 
 }  // namespace selfcal::discovery

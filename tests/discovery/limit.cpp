@@ -42,7 +42,8 @@ std::vector<Form> counted(const std::vector<PossibleForm>& forms, const laws::Va
 void gain_over_pieces(const Scene& scene, std::vector<Form>& forms) {
   const PieceSums sums = sum_over_pieces(scene.motion, scene.input, scene.trace);
   const Dictionary dictionary = make_dictionary(sums, scene.motion.available());
-  const PieceModel plain(sums, dictionary), beside = plain.beside(known_columns(sums));
+  const PieceModel plain(sums, dictionary),
+      beside = plain.beside({plain.information(), known_columns(sums), dictionary});
   for (Form& form : forms) {
     const Eigen::ArrayXd values = form.term.expression.evaluate(sums.channels, {});
     if (values.isFinite().all()) {

@@ -70,16 +70,12 @@ TEST(Pieces, KnownColumnsAreThoseOfEachRecording) {
   const Unit unit;
   const Scene scene({unit.ideal.data(), unit.calibration});
   const PieceSums one = sum_over_pieces(scene.motion, scene.input, scene.trace);
-  const auto columns = known_columns(one);
+  const Eigen::MatrixXd columns = known_columns(one);
   const PieceSums two = join({one, one});
-  const auto of_two = known_columns(two);
-  EXPECT_GE(columns.size(), 18U);
-  ASSERT_EQ(of_two.size(), 2 * columns.size());
-  const auto count = static_cast<Eigen::Index>(of_two.size());
-  Eigen::MatrixXd X(two.sums.score.size(), count);
-  for (Eigen::Index k = 0; k < count; ++k) {
-    X.col(k) = of_two[static_cast<std::size_t>(k)];
-  }
+  const Eigen::MatrixXd X = known_columns(two);
+  const Eigen::Index count = X.cols();
+  EXPECT_GE(columns.cols(), 18);
+  ASSERT_EQ(count, 2 * columns.cols());
   const Eigen::MatrixXd information = X.transpose() * (two.sums.information * X);
   EXPECT_LT((information - Eigen::MatrixXd::Identity(count, count)).cwiseAbs().maxCoeff(), 1e-6);
 }
