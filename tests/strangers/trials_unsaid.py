@@ -107,6 +107,21 @@ def aslant(operator, rng):
     check(f"turns of many rounds leave no sharp scale factor: {wrong}", not wrong)
 
 
+def back_and_forth(operator, rng):
+    truth = unsaid.back_and_forth(operator.folder, rng)
+    operator.refused("turns all the time", "poses", "log.csv")   # a rate one way is no bias
+    axes = operator.answer("poses", "log.csv", "--angle-column", 8)["read_outs"]["axes"]
+    for k in range(3):
+        near(f"response {'xyz'[k]}", axes[0]["response"][k], axes[0]["response_sigma"][k], truth["response"][k], 1e-5)
+
+
+def ramp(operator, rng):
+    unsaid.ramp(operator.folder, rng)
+    said = " ".join(operator.run("poses", "log.csv").stdout.split())
+    check("accelerometers: the temperature, or as well the time", "accel_temperature" in said and "or as well accel_bias_ramp" in said)
+    check("gyros: the time, and the temperature does the same", "gyro_temperature does 100 % of the same" in said or "gyro_drift_ramp does 100 % of the same" in said)
+
+
 def squares(operator, rng):
     truth = unsaid.squares(operator.folder, rng)
     for file, a in truth["files"].items():
@@ -116,4 +131,4 @@ def squares(operator, rng):
         check(f"{file}: misfit {answer['mismatch']}; biases off by {numpy.round(off, 1)} of sigma", max(off) < 5)
 
 
-TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, squares: unsaid}
+TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, back_and_forth: unsaid, ramp: unsaid, squares: unsaid}

@@ -3,7 +3,7 @@ import numpy
 
 from parts import by_hand
 from recordings import of, tilted, write
-from sensors import DEG, G0, GRAVITY, UP, fibre, industrial, moved, turn
+from sensors import DEG, EARTH, G0, GRAVITY, UP, fibre, industrial, moved, turn
 from tables import NAMES, write_log
 
 
@@ -68,6 +68,31 @@ def aslant(folder, rng):
     write_log(folder / "fast.csv", 10 * t, g.read(w, 100.0, rng), a.read(f, 100.0, rng))
     g.matrix = g.matrix @ turn([0, 0, 1], numpy.pi / 4)
     write_log(folder / "aslant.csv", t, g.read(w, 100.0, rng), a.read(f, 100.0, rng))
+    return {}
+
+
+def back_and_forth(folder, rng):
+    """A table that turns fibre gyros back and forth by 6 deg/s without a stop, its angle beside them."""
+    g, a = fibre(rng)
+    t = (numpy.arange(60000) + 1) / 50
+    phase = t % 120 / 120
+    angle = numpy.where(phase < 0.5, 720 * phase - 180, 540 - 720 * phase) * DEG
+    kernel = numpy.hanning(52)[1:-1]
+    angle = numpy.convolve(numpy.pad(angle, 25, "edge"), kernel / kernel.sum(), "same")[25:-25]
+    c_bn = numpy.array([turn([0, 0, 1], x) for x in angle]).transpose(0, 2, 1)
+    w = c_bn @ EARTH + numpy.gradient(angle, t)[:, None] * [0, 0, 1]
+    write(folder / "log.csv", ["t_s", *NAMES, "angle_deg"], [t, *of(g.read(w, 50.0, rng), DEG), *of(a.read(c_bn @ [0, 0, GRAVITY], 50.0, rng), G0), angle / DEG],
+          ["%.2f"] + ["%.7f"] * 6 + ["%.4f"])
+    return {"response": g.matrix[:, 2]}
+
+
+def ramp(folder, rng):
+    """Poses by hand while the temperature does nothing but rise with time; both triads follow it."""
+    g, a, t, f, w = by_hand(rng, industrial, 24)
+    warm = (20 + 30 * t / t[-1])[:, None]
+    rate = g.read(w, 100.0, rng, (warm - 35) * numpy.array([0.003, -0.004, 0.002]) * DEG)
+    force = a.read(f, 100.0, rng, (warm - 35) * numpy.array([200, -150, 100]) * 1e-6 * G0)
+    write(folder / "log.csv", ["t_s", *NAMES, "temp_C"], [t, *of(rate, DEG), *of(force, G0), warm[:, 0]], ["%.2f"] + ["%.5f"] * 3 + ["%.6f"] * 3 + ["%.3f"])
     return {}
 
 

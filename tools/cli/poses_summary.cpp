@@ -412,7 +412,7 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
   if (steady) {
     const auto of = [](const Vector3& v) { return std::array{v.x(), v.y(), v.z()}; };
     text += text_of(
-        {{"", {"x", "y", "z"}}, gyro_row("bias", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {true, true, true})});
+        {{"", {"x", "y", "z"}}, gyro_row("mean", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {true, true, true})});
   }
   return text;
 }

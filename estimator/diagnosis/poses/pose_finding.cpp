@@ -241,6 +241,23 @@ Vector3 rate_at_rest(const std::vector<Pose>& poses, const Vector3& alike) {
       ->rate;
 }
 
+// A sensor that turns back and forth without a stop has no rest: what it reads one way it reads the other way with the other
+// sign, which no bias does.
+bool turns_both_ways(const std::vector<Pose>& poses, const Vector3& rest, const Vector3& alike) {
+  constexpr double like = 0.3, as_long = 0.5;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    double one = 0.0, other = 0.0;
+    for (const Pose& p : poses) {
+      one += std::abs(p.gyro(axis) - rest(axis)) <= alike(axis) ? p.length_s : 0.0;
+      other += std::abs(p.gyro(axis) + rest(axis)) <= like * std::abs(rest(axis)) ? p.length_s : 0.0;
+    }
+    if (std::abs(rest(axis)) > alike(axis) && other > as_long * one) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // A steady turn is as quiet as a pose. Gyros that read a degree a second, and twenty times the usual deviation, away from
 // where they mostly are turn; so do read-outs that move. Biases of one sensor in SI differ by less than a degree a second:
 // where most stretches differ by more they turn, and where they rest follows from them. Of gyros alone, whose unit need not be known, ten times the noise of a sample counts as much
@@ -264,6 +281,10 @@ void drop_steady_turns(const PoseInput& input, std::vector<Pose>& poses) {
   if (si && (spread.array() > least.array()).any()) {
     middle = rate_at_rest(poses, least);
     spread.setZero();
+  }
+  if (si && turns_both_ways(poses, middle, least)) {
+    poses.clear();
+    return;
   }
   constexpr double deviations = 20.0, read_out = 0.1 * units::degree;
   std::erase_if(poses, [&](const Pose& p) {

@@ -288,10 +288,10 @@ struct Beside {
 };
 
 // What the poses may show, named or not, has its part in the nine: each is known no better than the likelier effects let it be.
-void widen(const std::vector<Beside>& beside, double tried, AccelModel& model) {
-  const double may_be = std::log(0.1);
+void widen(const std::vector<Beside>& beside, AccelModel& model) {
+  const double may_be = std::log(0.1);  // each by itself: nobody has to name it
   for (const Beside& b : beside) {
-    if (log_corrected(b.log_p, tried) < may_be) {
+    if (b.log_p < may_be) {
       model.sigma = model.sigma.cwiseMax((b.moved.cwiseAbs2() + b.sigma.cwiseAbs2()).cwiseSqrt());
     }
   }
@@ -342,7 +342,7 @@ void judge_accelerometers(AccelModel& model, const std::vector<Pose>& poses, dou
   for (PoseEffect& p : d.accel_tried) {
     p.log_p = log_corrected(p.log_p, tried);
   }
-  widen(beside, tried, model);
+  widen(beside, model);
   best_first(d.accel_tried);
   d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
 }

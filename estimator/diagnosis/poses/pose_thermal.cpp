@@ -39,6 +39,32 @@ Eigen::MatrixXd columns_beside(const PoseEffect* without, const std::vector<Pose
   return known;
 }
 
+// What changes with time does as much of it where the temperature does nothing but rise with time: the order of the poses does not tell.
+void add_rivals_of_time(const AccelModel& model, const std::vector<Pose>& poses, double duration_s, PoseEffect& named) {
+  constexpr double all_of_it = 0.95;  // of the square of each column beside the nine
+  const Eigen::MatrixXd columns = columns_of(trial_of(*named.effect, NAN, poses, duration_s, 3), model);
+  for (const Effect& rival : catalogue()) {
+    if (follows_channel(rival) || !acts_on(rival, false, true) || !changes_with_time(rival, duration_s, 3)) {
+      continue;
+    }
+    const std::vector<double> constants = rival.constant.tried();
+    const bool does = std::any_of(constants.begin(), constants.end(), [&](double constant) {
+      const Trial trial = trial_of(rival, constant, poses, duration_s, 3);
+      const Eigen::MatrixXd beside = joined(model.jacobian, columns_of(trial, model));
+      for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+        const Eigen::VectorXd column = columns.col(k);
+        if (regress(beside, column).square > (1.0 - all_of_it) * regress(model.jacobian, column).square) {
+          return false;
+        }
+      }
+      return trial.columns.cols() > 0;
+    });
+    if (does) {
+      named.equivalent.push_back(&rival);
+    }
+  }
+}
+
 }  // namespace
 
 bool take_temperatures(const PoseInput& input, std::vector<Pose>& poses) {
@@ -111,6 +137,9 @@ std::vector<PoseEffect> name_thermal(const AccelModel& model, const std::vector<
     const double log_p = p.log_p;
     p = attempt(*p.effect, columns_beside(&p, named, model, poses, duration_s), model, poses, duration_s);
     p.log_p = log_p;
+  }
+  for (PoseEffect& p : named) {
+    add_rivals_of_time(model, poses, duration_s, p);
   }
   return named;
 }

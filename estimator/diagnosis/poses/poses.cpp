@@ -412,8 +412,11 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     add_rest(input, left, poses, d);
   }
   if (!d.by_poses && !d.read_outs && !d.rest && !has_attitude(d)) {
-    d.failure = about_attitude(d) + "fewer than 6 static poses: " + std::to_string(poses.size()) +
-                ", and too little rest in them";
+    d.failure = about_attitude(d) +
+                (poses.empty() && d.steady_turns > 0
+                     ? "it turns all the time, steadily in " + counted(d.steady_turns, "part") +
+                           ": no rest, and no angle of a table"
+                     : "fewer than 6 static poses: " + std::to_string(poses.size()) + ", and too little rest in them");
     return d;
   }
   if (d.by_poses) {
