@@ -71,6 +71,15 @@ def units(operator, rng):
     check("so are ticks", "time.unit" in (operator.folder / "ticks.toml").read_text(encoding="utf-8"))
 
 
+def intervals(operator, rng):
+    truth = unsaid.intervals(operator.folder, rng)
+    for file in ("s.csv", "ms.csv", "us.csv"):
+        answer = operator.answer("poses", file, *SITE)
+        accelerometers(answer, truth["a"], 4e-5)
+        check(f"{file}: three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+        check("said", "the sum of the intervals" in operator.run("import", file, "--guess", "--map", f"{file}.toml").stdout)
+
+
 def directions(operator, rng):
     truth = unsaid.directions(operator.folder, rng)
     for file in ("frd.csv", "rfu.csv", "mixed.csv", "vehicle.csv", "pqr.csv", "vbox.csv"):
@@ -131,4 +140,4 @@ def squares(operator, rng):
         check(f"{file}: misfit {answer['mismatch']}; biases off by {numpy.round(off, 1)} of sigma", max(off) < 5)
 
 
-TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, back_and_forth: unsaid, ramp: unsaid, squares: unsaid}
+TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, intervals: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, back_and_forth: unsaid, ramp: unsaid, squares: unsaid}

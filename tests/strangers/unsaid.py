@@ -34,6 +34,21 @@ def units(folder, rng):
     return {"g": g, "a": a}
 
 
+def intervals(folder, rng):
+    """No time but that from row to row: in s with jitter, in whole ms, in us behind the values; 40 rows lost in the fifth pose."""
+    g, a, t, f, w = by_hand(rng, industrial, 14)
+    rate, force = g.read(w, 100.0, rng), a.read(f, 100.0, rng)
+    lost = numpy.searchsorted(t, t[-1] * 0.35)
+    keep = numpy.r_[0:lost, lost + 40:len(t)]
+    t, values = t[keep], [*of(rate[keep], DEG), *of(force[keep], G0)]
+    stamps = t + rng.normal(0, 2e-5, len(t))
+    forms = ["%.5f"] * 3 + ["%.6f"] * 3
+    write(folder / "s.csv", ["dt", *NAMES], [numpy.diff(stamps, prepend=stamps[0]), *values], ["%.7f", *forms])
+    write(folder / "ms.csv", ["Delta time [ms]", *NAMES], [numpy.round(numpy.diff(t, prepend=t[0] - 0.01) * 1e3), *values], ["%d", *forms])
+    write(folder / "us.csv", [*NAMES, "dt_us"], [*values, numpy.round(numpy.diff(stamps, prepend=stamps[0] - 0.01) * 1e6)], [*forms, "%d"])
+    return {"g": g, "a": a}
+
+
 def directions(folder, rng):
     """Names of vehicles: forward, right, down; right, forward, up; long, lat, vert with rates of roll, pitch, yaw; p, q, r; VBOX, yaw first."""
     g, a, t, f, w = by_hand(rng, industrial, 14)
