@@ -157,9 +157,36 @@ bool may_be_a_law(const diagnosis::Diagnosis& d) {
   return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
 }
 
+namespace {
+
+// Both walk and jump are fitted in the search; an instability is not, and is left alone.
+bool jumps_in_place_of_walks(const Discovery& found, const diagnosis::Diagnosis& d) {
+  constexpr double far_likelier = 10.0;
+  double ahead = 0.0;
+  for (const DiscoveredProcess& p : found.processes) {
+    ahead += p.kind == discovery::ProcessKind::jump_per_turn ? p.ahead : -p.ahead;
+  }
+  const auto jumps = [&found](bool gyro) {
+    return std::any_of(found.processes.begin(), found.processes.end(),
+                       [gyro](const DiscoveredProcess& p) { return (p.axis < 3) == gyro; });
+  };
+  const auto walks = [&d](const char* name) {
+    return std::any_of(d.findings.begin(), d.findings.end(),
+                       [name](const diagnosis::Finding& f) { return f.effect == name; });
+  };
+  const bool others = std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
+    return f.process && f.effect != "gyro_random_walk" && f.effect != "accel_random_walk";
+  });
+  return !others && ahead >= std::log(far_likelier) && jumps(true) == walks("gyro_random_walk") &&
+         jumps(false) == walks("accel_random_walk");
+}
+
+}  // namespace
+
 bool replaces_process(const Discovery& found, const diagnosis::Diagnosis& d) {
-  return may_be_a_law(d) && !found.laws.empty() && found.processes.empty() && found.described.empty() &&
-         explains(&found);
+  const bool alone = found.laws.empty() != found.processes.empty();  // equations, or processes
+  return may_be_a_law(d) && alone && found.described.empty() && explains(&found) &&
+         (found.processes.empty() || jumps_in_place_of_walks(found, d));
 }
 
 void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {

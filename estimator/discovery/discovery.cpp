@@ -260,7 +260,7 @@ class LawSearch::Search {
       model_->integrate_out(process.columns, process.size * process.size);
       state_.half_log_determinant += 0.5 * (before - model_->square()) - process.log_likelihood_gain;
       state_.processes.push_back(
-          {process.kind, process.axis, process.size, process.sigma, process.log_likelihood_gain});
+          {process.kind, process.axis, process.size, process.sigma, process.log_likelihood_gain, process.ahead});
     }
   }
 
@@ -269,11 +269,9 @@ class LawSearch::Search {
     for (int axis = 0; axis < axis_count; ++axis) {
       const bool there = std::any_of(state_.processes.begin(), state_.processes.end(),
                                      [&](const DiscoveredProcess& p) { return p.axis == axis; });
-      for (const ProcessKind kind : {ProcessKind::jump_per_turn, ProcessKind::random_walk}) {
-        if (!there) {
-          ProcessFit fit = fit_process(*model_, sums_, kind, axis);
-          best = fit.log_likelihood_gain > best.log_likelihood_gain ? std::move(fit) : best;
-        }
+      if (!there) {
+        ProcessFit fit = likelier_process(*model_, sums_, axis);
+        best = fit.log_likelihood_gain > best.log_likelihood_gain ? std::move(fit) : best;
       }
     }
     return best;

@@ -73,6 +73,7 @@ struct DiscoveredProcess {
   int axis = 0;
   double size = 0.0, sigma = 0.0;  // unit_of(axis), per sqrt(h) for a walk
   double log_likelihood_gain = 0.0;
+  double ahead = 0.0;  // of the other kind's on the axis: logarithm of the odds between the two
 };
 
 // What explains the recordings in the place of all that is told: a walk may stand for a drift, and laws added up for a walk.

@@ -71,6 +71,15 @@ ProcessFit fit_process(const PieceModel& model, const PieceSums& sums, ProcessKi
   return fit;
 }
 
+ProcessFit likelier_process(const PieceModel& model, const PieceSums& sums, int axis) {
+  ProcessFit jump = fit_process(model, sums, ProcessKind::jump_per_turn, axis);
+  ProcessFit walk = fit_process(model, sums, ProcessKind::random_walk, axis);
+  const double ahead = jump.log_likelihood_gain - walk.log_likelihood_gain;
+  ProcessFit likelier = ahead > 0.0 ? std::move(jump) : std::move(walk);
+  likelier.ahead = std::abs(ahead);
+  return likelier;
+}
+
 double absorbed(const PieceModel& model, const ProcessFit& process) {
   const Eigen::MatrixXd means =
       process.columns(Eigen::seqN(process.axis, process.columns.rows() / axis_count, axis_count), Eigen::all);
