@@ -22,8 +22,10 @@ void cut_dwell(double start_s, double end_s, int dwell, bool coarse, std::vector
   for (std::size_t k = 0; k < dwell_edges_s.size(); k += coarse ? 2 : 1) {
     edges.push_back(start_s + dwell_edges_s[k]);
   }
-  for (double t = edges.back() + later_step_s; t < end_s; t += (coarse ? 2.0 : 1.0) * later_step_s) {
-    edges.push_back(t);
+  double next_s = edges.back() + later_step_s;
+  while (next_s < end_s) {
+    edges.push_back(next_s);
+    next_s += (coarse ? 2.0 : 1.0) * later_step_s;
   }
   while (edges.size() > 1 && edges.back() > end_s - least_piece_s) {
     edges.pop_back();
