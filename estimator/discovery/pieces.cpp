@@ -208,6 +208,9 @@ Eigen::MatrixXd known_columns(const PieceSums& sums) {
   for (int axis = 0; axis < axis_count && !sums.pieces.empty(); ++axis) {
     add_known(sums, axis, columns);
   }
+  if (columns.empty()) {
+    return Eigen::MatrixXd(sums.sums.score.size(), 0);
+  }
   Eigen::MatrixXd X(sums.sums.score.size(), static_cast<Eigen::Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k) {
     X.col(static_cast<Eigen::Index>(k)) = columns[k];

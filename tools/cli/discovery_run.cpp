@@ -82,8 +82,11 @@ Expected<void> plan_and_write(const std::string& file, std::span<const discovery
     return {};
   }
   if (!result.next) {
-    fmt::print(stderr, "selfcal diagnose: {} is not written: no equations that another rotation would tell apart\n",
-               file);
+    fmt::print(
+        stderr,
+        "selfcal diagnose: {} is not written: no equations that another rotation would tell apart; for effects of the "
+        "catalogue --split-schedule plans one\n",
+        file);
     return {};
   }
   return write_file_atomically(
