@@ -228,11 +228,15 @@ class LawSearch::Search {
 
   // Logarithm of the posterior probability, but for a constant.
   double log_posterior() const {
-    double costs = std::log(process_count) * static_cast<double>(state_.processes.size());
+    double costs = cost_of_processes();
     for (const double cost : state_.costs) {
       costs += cost;
     }
-    return -0.5 * model_->square() - state_.half_log_determinant - costs;
+    return -0.5 * model_->square() - costs;
+  }
+
+  double cost_of_processes() const {
+    return state_.half_log_determinant + std::log(process_count) * static_cast<double>(state_.processes.size());
   }
 
   bool significant(const ProcessFit& process) const {
@@ -438,6 +442,7 @@ class LawSearch::Search {
 
   void write_down() {
     result_.processes = state_.processes;
+    result_.cost_of_processes = 2.0 * cost_of_processes();
     result_.log_p_remaining = state_.log_p_remaining;
     result_.refused = state_.refused;
     result_.fit = state_.fit;

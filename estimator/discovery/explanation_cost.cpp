@@ -20,8 +20,6 @@ double cost_of_laws(std::size_t laws, double rows) {
   return (of_a_law + of_a_coefficient(rows)) * static_cast<double>(laws);
 }
 
-double cost_of_processes(std::size_t processes) { return of_a_law * static_cast<double>(processes); }
-
 double cost_of_a_name(double rows) { return of_a_name + of_a_coefficient(rows); }
 
 double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows) {

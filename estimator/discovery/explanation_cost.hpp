@@ -12,7 +12,6 @@ namespace selfcal::discovery {
 
 // `rows`: of the recording that is explained.
 double cost_of_laws(std::size_t laws, double rows);
-double cost_of_processes(std::size_t processes);
 double cost_of_a_name(double rows);
 // Of a name's coefficients those count that the recording shows.
 double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows);

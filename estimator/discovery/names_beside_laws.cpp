@@ -51,7 +51,7 @@ struct Laws {
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
   // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
   return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
-         cost_of_processes(found.processes.size()) + cost_of_names(names, found.rows);
+         found.cost_of_processes + cost_of_names(names, found.rows);
 }
 
 // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
@@ -161,8 +161,13 @@ const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
 class Guesses {
  public:
   Guesses(const Together& together, const UnitRecording& recording, const std::vector<ModelEffect>& rejected,
-          const Laws& alone, const std::stop_token& stop)
-      : together_(together), recording_(recording), rejected_(rejected), alone_(alone), stop_(stop) {
+          const Laws& alone, bool processes, const std::stop_token& stop)
+      : together_(together),
+        recording_(recording),
+        rejected_(rejected),
+        alone_(alone),
+        processes_(processes),
+        stop_(stop) {
     all_.emplace_back([this] { return not_made_by_rejected(); });
     if (const ModelEffect* name = strongest(rejected)) {
       all_.emplace_back([this, name] { return beside(*name); });
@@ -199,7 +204,8 @@ class Guesses {
     return any ? std::optional(alone_.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
   }
   std::optional<Laws> beside(const ModelEffect& name) {
-    return reach().largest_share(*name.effect) < least_share_of_laws ? std::nullopt : together_.laws_beside(name);
+    return !processes_ && reach().largest_share(*name.effect) < least_share_of_laws ? std::nullopt
+                                                                                    : together_.laws_beside(name);
   }
   template <typename Kept>
   std::optional<Laws> where(Kept kept) {
@@ -214,6 +220,7 @@ class Guesses {
   const UnitRecording& recording_;
   const std::vector<ModelEffect>& rejected_;
   const Laws& alone_;
+  bool processes_;  // beside the laws: they may stand for any part of a name
   const std::stop_token& stop_;
   std::vector<std::function<std::optional<Laws>()>> all_;
   std::optional<CatalogueReach> reach_;
@@ -225,7 +232,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
                                                  const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                  const DiscoveryOptions& of_laws, const Progress& progress) {
-  if (!d.unexplained || !d.model.empty() || alone.fit.terms.size() + alone.processes.size() < 2) {
+  if (!d.unexplained || !d.model.empty() || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
     return std::nullopt;
   }
   const Together together(data, d, of_catalogue, of_laws, progress);
@@ -235,7 +242,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   const double least = cost_of(alone, {});
   const Laws laws_alone = Laws::fitted(alone.fit);
   std::vector<std::string> tried;
-  const Guesses guesses(together, searched, rejected, laws_alone, of_laws.stop);
+  const Guesses guesses(together, searched, rejected, laws_alone, !alone.processes.empty(), of_laws.stop);
   for (const auto& guess : guesses.all()) {
     const std::optional<Laws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {

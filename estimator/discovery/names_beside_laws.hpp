@@ -15,9 +15,9 @@ struct NamesBesideLaws {
   Discovery laws;                  // of that
 };
 
-// `alone`: what the search fitted on `searched`, the recording as it was calibrated, with nothing taken out. None where one law or
-// process was enough, where no name stands, or where name and laws together say more than the laws alone. A diagnosis and a search each
-// are made up to five times.
+// `alone`: what the search fitted on `searched`, the recording as it was calibrated, with nothing taken out. None where one law was
+// enough without a process, where no name stands, or where name and laws together say more than the laws alone. A diagnosis and a search
+// each are made up to five times.
 std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                                  const UnitRecording& searched, const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
