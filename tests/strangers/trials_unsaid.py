@@ -6,7 +6,7 @@ import numpy
 import apart
 import unsaid
 from answers import SITE, accelerometers, bias, check, gyro_scales, names, near, parameters
-from sensors import DEG, LATITUDE_DEG
+from sensors import DEG, G0, LATITUDE_DEG
 
 
 def ring_lasers(operator, rng):
@@ -140,4 +140,18 @@ def squares(operator, rng):
         check(f"{file}: misfit {answer['mismatch']}; biases off by {numpy.round(off, 1)} of sigma", max(off) < 5)
 
 
-TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, intervals: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, back_and_forth: unsaid, ramp: unsaid, squares: unsaid}
+def fall(operator, rng):
+    truth = unsaid.fall(operator.folder, rng)
+    answer = operator.answer("poses", "log.csv", *SITE)
+    jump = answer["accelerometers"]["jump"]
+    check(f"a jump of the accelerometers at {truth['time']:.0f} s: {jump and (jump['from_s'], jump['to_s'])}",
+          bool(jump) and jump["from_s"] <= truth["time"] <= jump["to_s"] and answer["mismatch"] and "accel_bias_ramp" not in names(answer))
+    known = parameters(answer, "accelerometers")
+    for k, x in enumerate("xyz"):   # which of the two biases it is nobody says: sigma holds both
+        for bias in (truth["bias"][k], truth["bias"][k] + truth["jump"][k]):
+            check(f"bias {x}", abs(known[f"bias_{x}"]["value"] - bias) < 5 * known[f"bias_{x}"]["sigma"])
+        if jump:
+            near(f"jump {x}, mg", jump["size_g"][k], jump["sigma_g"][k], truth["jump"][k] / G0, 0, 1e3)
+
+
+TRIALS = {ring_lasers: apart, restarts: apart, whole_seconds: apart, temperatures: unsaid, units: unsaid, intervals: unsaid, directions: unsaid, places: unsaid, aslant: unsaid, back_and_forth: unsaid, ramp: unsaid, fall: unsaid, squares: unsaid}

@@ -2,7 +2,7 @@
 import numpy
 
 from parts import by_hand
-from recordings import of, tilted, write
+from recordings import anywhere, of, tilted, write
 from sensors import DEG, EARTH, G0, GRAVITY, UP, fibre, industrial, moved, turn
 from tables import NAMES, write_log
 
@@ -109,6 +109,17 @@ def ramp(folder, rng):
     force = a.read(f, 100.0, rng, (warm - 35) * numpy.array([200, -150, 100]) * 1e-6 * G0)
     write(folder / "log.csv", ["t_s", *NAMES, "temp_C"], [t, *of(rate, DEG), *of(force, G0), warm[:, 0]], ["%.2f"] + ["%.5f"] * 3 + ["%.6f"] * 3 + ["%.3f"])
     return {}
+
+
+def fall(folder, rng):
+    """Poses by hand; while it is turned it knocks against the table, and each accelerometer's bias is another by 2 to 4 mg from then on."""
+    g, a = industrial(rng)
+    stops = [(anywhere(rng), rng.uniform(6, 11), rng.uniform(1, 2)) for _ in range(24)]
+    time = sum(rest + move for _, rest, move in stops[:rng.integers(7, 17)]) - 0.5
+    t, f, w = moved(100.0, stops, rng, 0.4)
+    jump = rng.uniform(2e-3, 4e-3, 3) * rng.choice([-1, 1], 3) * G0
+    write_log(folder / "log.csv", t, g.read(w, 100.0, rng), a.read(f, 100.0, rng, (t > time)[:, None] * jump))
+    return {"time": time, "bias": a.bias, "jump": jump}
 
 
 def squares(folder, rng):

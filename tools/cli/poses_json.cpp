@@ -89,6 +89,15 @@ std::array<bool, 3> axes_with_bias(const diagnosis::PoseDiagnosis& d) {
 
 Json array(const Vector3& v) { return Json{v.x(), v.y(), v.z()}; }
 
+Json jump_json(const diagnosis::AccelJump& j) {
+  return {{"from_pose", j.from_pose},
+          {"to_pose", j.to_pose},
+          {"from_s", j.from_s},
+          {"to_s", j.to_s},
+          {"size_g", {j.size_g.x(), j.size_g.y(), j.size_g.z()}},
+          {"sigma_g", {j.sigma_g.x(), j.sigma_g.y(), j.sigma_g.z()}}};
+}
+
 Json to_json(const std::vector<diagnosis::BiasJump>& jumps) {
   Json all = Json::array();
   for (const diagnosis::BiasJump& j : jumps) {
@@ -200,6 +209,9 @@ Json verdict_of(const diagnosis::PoseDiagnosis& d) {
     verdict = d.gyro_jumps.front().gap ? "The gyros' bias is another behind a gap of the log."
                                        : "The gyros' bias is another from one pose on.";
     next = "Give the parts of the log by themselves.";
+  } else if (d.accel_jump) {
+    verdict = "The accelerometers' bias is another from one pose on.";
+    next = "Give the parts of the log by themselves.";
   } else if (d.by_poses && !d.accel_adequate) {
     verdict = fmt::format("Bias, scale factor and misalignment leave {:.2g} mg rms of the accelerometers.",
                           1e3 * d.accel_rms_g);
@@ -255,6 +267,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"accelerometers",
            {{"adequate", d.accel_adequate},
             {"tested", d.accel_tested},
+            {"jump", d.accel_jump ? jump_json(*d.accel_jump) : Json()},
             {"noise_at_rest", noise_json(d.accel_noise)},
             {"rms_g", d.accel_rms_g},
             {"held_out_rms_g", d.accel_held_out_rms_g},

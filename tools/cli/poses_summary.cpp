@@ -88,6 +88,11 @@ std::string heading(const PoseDiagnosis& d) {
   return text + "\n";
 }
 
+std::string cell(double value, double sigma) {
+  const QuantityText t = quantity_text(value, sigma);
+  return fmt::format("{} +- {}", t.value, t.sigma);
+}
+
 double log10_of(double log_p) { return log_p / std::log(10.0); }
 
 // What does half and more of the same over these poses, in their order; empty where nothing does.
@@ -138,7 +143,15 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
     text += lines_of("named:", fmt::format("accel_relaxation (log10 p {:.1f}): settling after each turn with {:.0f} s",
                                            log10_of(d.settling->log_p), d.settling->tau_s));
   }
-  if (d.by_poses && !d.accel_adequate) {
+  if (d.accel_jump) {
+    const auto& [from_pose, to_pose, from_s, to_s, size, sigma] = *d.accel_jump;
+    text += lines_of("misfit:",
+                     fmt::format("between poses {} and {} ({:.0f} to {:.0f} s) the accelerometers' bias jumps by "
+                                 "{}/{}/{} mg, which no effect of the catalogue does: give both parts by "
+                                 "themselves",
+                                 from_pose, to_pose, from_s, to_s, cell(1e3 * size.x(), 1e3 * sigma.x()),
+                                 cell(1e3 * size.y(), 1e3 * sigma.y()), cell(1e3 * size.z(), 1e3 * sigma.z())));
+  } else if (d.by_poses && !d.accel_adequate) {
     const std::string near = d.accel_tried.empty()
                                  ? std::string()
                                  : fmt::format(", nearest {} (log10 p {:.1f})", d.accel_tried.front().effect->id,
@@ -201,11 +214,6 @@ std::string left_out(const PoseDiagnosis& d) {
 const PoseParameter* find(const std::vector<PoseParameter>& all, const std::string& name) {
   const auto it = std::find_if(all.begin(), all.end(), [&](const PoseParameter& p) { return p.name == name; });
   return it == all.end() || !it->determined ? nullptr : &*it;
-}
-
-std::string cell(double value, double sigma) {
-  const QuantityText t = quantity_text(value, sigma);
-  return fmt::format("{} +- {}", t.value, t.sigma);
 }
 
 struct Row {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/poses/pose_accel_jump.hpp"
 #include "estimator/diagnosis/poses/pose_regression.hpp"
 #include "estimator/statistics/distributions.hpp"
 
@@ -344,7 +345,10 @@ void judge_accelerometers(AccelModel& model, const std::vector<Pose>& poses, dou
   }
   widen(beside, model);
   best_first(d.accel_tried);
-  d.accel_adequate = d.accel_tried.empty() || d.accel_tried.front().log_p > std::log(alpha);
+  const double of_effect = d.accel_tried.empty() ? 0.0 : d.accel_tried.front().log_p;
+  constexpr double share = 0.1;  // of the alarms, beside them: Bonferroni's count of the steps is cautious
+  d.accel_jump = find_accel_jump(poses, std::log(share * alpha), of_effect, model);
+  d.accel_adequate = !d.accel_jump && of_effect > std::log(alpha);
 }
 
 void judge_gyros(const PoseInput& input, const std::vector<Pose>& poses, double duration_s, bool has_temperature,

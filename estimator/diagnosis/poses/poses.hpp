@@ -147,6 +147,14 @@ struct BiasJump {
   Vector3 size, sigma;  // raw
 };
 
+// No effect of the catalogue: between two poses the accelerometers' bias became another.
+struct AccelJump {
+  // It is somewhere behind `from_pose` and before `to_pose`, counted from 1. They follow one another where one step alone is likely.
+  int from_pose = 0, to_pose = 0;
+  double from_s = 0.0, to_s = 0.0;  // since the start: where the one begins and the other ends
+  Vector3 size_g, sigma_g;
+};
+
 struct PoseDiagnosis {
   Sensors sensors = Sensors::both;
   std::array<bool, 3> gyro_axes{true, true, true};  // which axes of gyros the log holds
@@ -163,6 +171,7 @@ struct PoseDiagnosis {
   // nominal scale M_ii in raw/g and M_ij / M_ii.
   double accel_rms_g = 0.0, accel_held_out_rms_g = 0.0;
   bool accel_tested = false;  // whether there are poses enough to test what the model leaves
+  std::optional<AccelJump> accel_jump;
   bool accel_adequate = false;
   double force_at_rest_g = 0.0;   // mean of |f| in nominal units; 0: the unit is not known
   double gravity_span_deg = 0.0;  // the largest angle between directions of gravity in the sensor
