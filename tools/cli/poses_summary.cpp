@@ -131,6 +131,22 @@ std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit
   return lines_of("named:", words + confounded_clause(d, e));
 }
 
+// The experiment that parts what is named from what does the same.
+std::string what_decides(const PoseDiagnosis& d) {
+  bool order = false, wanders = false;
+  for (const PoseEffect& e : d.gyro_named) {
+    order |= !e.equivalent.empty() || !confounded_clause(d, e).empty();
+    wanders |= e.may_be_flicker;
+  }
+  for (const PoseEffect& e : d.accel_named) {
+    order |= !e.equivalent.empty();
+  }
+  return order || wanders
+             ? lines_of("decides:", fmt::format("the same poses once more{}{}", order ? " in another order" : "",
+                                                wanders ? ", just switched on" : ""))
+             : std::string();
+}
+
 std::string findings(const PoseDiagnosis& d, const Units& shown) {
   std::string text;
   for (const PoseEffect& e : d.gyro_named) {
@@ -165,6 +181,7 @@ std::string findings(const PoseDiagnosis& d, const Units& shown) {
                                           j.gap ? "behind the gap at" : "from", j.time_s, j.size.x() / shown.gyro,
                                           j.size.y() / shown.gyro, j.size.z() / shown.gyro, shown.gyro_name));
   }
+  text += what_decides(d);
   if (!d.forces_of_another_zero.empty()) {
     const auto [least, most] = std::minmax_element(d.forces_of_another_zero.begin(), d.forces_of_another_zero.end());
     text += lines_of("zero:",
@@ -338,7 +355,8 @@ std::string table(const PoseDiagnosis& d, const Units& shown) {
   }
   add_row(d.accel_parameters, "accel. xy xz yz", {"misalignment_xy", "misalignment_xz", "misalignment_yz"}, "%",
           percent, rows);
-  if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0) {
+  const bool known = std::any_of(d.gyro_bias_sigma.begin(), d.gyro_bias_sigma.end(), [](double s) { return s != 0.0; });
+  if (d.sensors != Sensors::accelerometers && !d.rest && d.poses > 0 && known) {
     const bool si = std::string_view(shown.gyro_short) == "deg/s";
     rows.push_back(gyro_row(d.earth_taken_out ? "bias" : "mean", d.gyro_bias, d.gyro_bias_sigma,
                             d.earth_taken_out ? of_headings(si) : shown, d.gyro_axes));
