@@ -144,6 +144,10 @@ Field kind_of(std::string_view field, char decimal) {
   if (number_of(field, decimal)) {
     return Field::number;
   }
+  if (const std::string whole = decimal == ',' ? without_thousands(field) : std::string();
+      !whole.empty() && number_of(whole, decimal)) {
+    return Field::number;
+  }
   if (date_of(field)) {
     return Field::date;
   }

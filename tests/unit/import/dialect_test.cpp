@@ -33,6 +33,16 @@ TEST(Dialect, DecimalCommasBetweenSemicolonsTabsBlanksAndQuotes) {
   }
 }
 
+// Only few rows have thousands, and the names stand above those that have none.
+TEST(Dialect, PointsBetweenThousandsEndNoTable) {
+  const auto d =
+      dialect_of({"Zeit [ms];ax [mg]", "980;410,39", "990;911,40", "1.000;1.001,27", "1.010;-1.002,5", "1.020;12,5"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->decimal, ',');
+  EXPECT_EQ(d->header_line, 1U);
+  EXPECT_EQ(d->first_line, 2U);
+}
+
 TEST(Dialect, ACommaAndABlankAreACommaAndABlank) {
   const auto d = dialect_of({"1, 5, 2", "3, 4, 5"});
   ASSERT_TRUE(d);
