@@ -10,6 +10,7 @@
 #include "protocol/import/split_time.hpp"
 #include "protocol/import/summed_intervals.hpp"
 #include "protocol/import/text_source.hpp"
+#include "protocol/import/word_halves.hpp"
 #include "protocol/recording/atomic_file.hpp"
 #include "protocol/recording/hdf5.hpp"
 
@@ -125,7 +126,7 @@ Expected<std::unique_ptr<ColumnSource>> open_columns(const std::filesystem::path
                                                      const std::optional<TextDialect>& dialect,
                                                      const std::optional<std::string>& topic) {
   try {
-    return open_any(file, dialect, topic).map(with_whole_time).map(with_summed_intervals);
+    return open_any(file, dialect, topic).map(with_whole_time).map(with_summed_intervals).map(with_whole_words);
   } catch (const std::bad_alloc&) {
     return fail(ErrorKind::bad_input, fmt::format("{}: does not fit into memory", file.string()));
   }

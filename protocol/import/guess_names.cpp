@@ -10,6 +10,7 @@
 #include "protocol/import/name_words.hpp"
 #include "protocol/import/text_dialect.hpp"
 #include "protocol/import/units.hpp"
+#include "protocol/import/word_halves.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -96,7 +97,7 @@ int take_axis(Words& words) {
     }
   }
   // "xAccel"
-  static constexpr std::string_view behind[] = {"acc", "accel", "acceleration", "gyr", "gyro", "mag"};
+  static constexpr std::string_view behind[] = {"acc", "accel", "acceleration", "gyr", "gyro", "mag", "out"};
   for (std::string& word : words) {
     const std::size_t axis = word.empty() ? std::string_view::npos : letters.find(word.front());
     const std::string_view stem = std::string_view(word).substr(word.empty() ? 0 : 1);
@@ -345,6 +346,11 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
 }  // namespace
 
 NamedColumn read_name(std::string_view name, std::string_view unit) {
+  if (name.ends_with(low_half)) {
+    NamedColumn column;
+    column.role = Role::other;
+    return column;
+  }
   // "/robot/imu.angular_velocity.x": the field of a ROS message; the topic is somebody's choice, and is asked last.
   const std::size_t field = name.starts_with('/') ? name.find('.') : std::string_view::npos;
   if (field == std::string_view::npos) {

@@ -3,7 +3,7 @@ import json
 import re
 import subprocess
 
-from sensors import DEG, G0, HEIGHT_M, LATITUDE_DEG
+from sensors import DEG, G0, GRAVITY, HEIGHT_M, LATITUDE_DEG
 
 SITE = [f"--latitude={LATITUDE_DEG}", f"--height={HEIGHT_M}"]
 
@@ -24,13 +24,19 @@ class Operator:
     def run(self, *arguments):
         return subprocess.run([self.program, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, check=False)
 
-    def settled(self, file, asked=()):
-        """Guesses; takes the words off `unsettled` after looking that nothing but `asked` stands in it."""
+    def doubts(self, file):
+        """What a guess leaves open, in map.toml."""
         (self.folder / "map.toml").unlink(missing_ok=True)
         done = self.run("import", file, "--guess", "--map", "map.toml", "--longitude=11.6", *SITE)
+        check(f"guessed {done.stderr.strip()[-100:] if done.returncode > 1 else ''}", done.returncode in (0, 1))
         text = (self.folder / "map.toml").read_text(encoding="utf-8")
-        doubts = set(re.findall(r'"(.*?)"', re.search(r"(?ms)^unsettled = \[(.*?)\]", text)[1]))
-        check(f"doubts {sorted(doubts)}, at most {sorted(asked)}", done.returncode in (0, 1) and doubts <= set(asked))
+        return set(re.findall(r'"(.*?)"', re.search(r"(?ms)^unsettled = \[(.*?)\]", text)[1]))
+
+    def settled(self, file, asked=()):
+        """Guesses; takes the words off `unsettled` after looking that nothing but `asked` stands in it."""
+        doubts = self.doubts(file)
+        text = (self.folder / "map.toml").read_text(encoding="utf-8")
+        check(f"doubts {sorted(doubts)}, at most {sorted(asked)}", doubts <= set(asked))
         if doubts & {"gyro.axes", "accelerometer.axes"}:   # as all of these were written
             text = re.sub(r"(?m)^axes = .*$", 'axes = ["x", "y", "z"]', text)
         (self.folder / "map.toml").write_text(re.sub(r"(?ms)^unsettled = \[.*?\]", "unsettled = []", text), encoding="utf-8")
@@ -104,3 +110,13 @@ def gyro_scales(answer, g, per_rad_s=None):
             truth = g.matrix[k, k] * per_rad_s if per_rad_s else g.matrix[k, k] - 1
             near(f"gyro scale {axis}", p["value"], p["sigma"], truth, 1e-4 * (per_rad_s or 1))
     return sum(f"scale_{axis}" in known for axis in "xyz")
+
+
+def in_counts(answer, truth):
+    """Accelerometers in counts, whose scale factors are counts per g."""
+    known = parameters(answer, "accelerometers")
+    for k, axis in enumerate("xyz"):
+        p = known[f"scale_{axis}"]
+        near(f"counts per g {axis}", p["value"], p["sigma"], truth["a"].matrix[k, k] * truth["per_g"] * GRAVITY, 3e-5 * p["value"])
+        p = known[f"bias_{axis}"]
+        near(f"bias {axis}, counts", p["value"], p["sigma"], truth["a"].bias[k] * truth["per_g"], truth["per_g"] * 1e-4 * G0)
