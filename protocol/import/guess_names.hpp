@@ -1,6 +1,7 @@
 // What the names of columns say: which quantity, which axis, which unit. Names are claims, which the numbers then check.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,6 +25,18 @@ NamedColumn read_name(std::string_view name, std::string_view unit);
 
 // As people write units, to as units.hpp does ("m.s^-2", "dps"); empty: none that is known.
 std::string known_unit(std::string_view written);
+
+// Columns that are named so, without increments where rates stand beside them: the first x, y and z, the second ones, and so on.
+struct NamedTriads {
+  std::vector<std::array<std::size_t, 3>> all;
+  std::size_t most = 0;  // columns of the axis that has most
+};
+NamedTriads triads_by_name(const std::vector<NamedColumn>& named, Role role);
+
+// Of several triads that stand side by side that which the sensor itself gives: the only one that is called raw or uncalibrated, or the only one
+// that is not called calibrated, corrected or filtered. Nothing: names do not tell.
+std::optional<std::size_t> raw_one_of(const std::vector<std::string>& names,
+                                      const std::vector<std::array<std::size_t, 3>>& triads);
 
 std::vector<NamedColumn> read_names(const std::vector<std::string>& names, const std::vector<std::string>& units);
 

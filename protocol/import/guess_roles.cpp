@@ -136,7 +136,6 @@ class Assigner {
     several = most > 1;
     return triads;
   }
-
   std::optional<Triad> triad_by_name(Role role, const char* key) {
     bool several = false;
     std::vector<Triad> triads = triads_by_name(role, several);
@@ -156,16 +155,17 @@ class Assigner {
         several = false;
       }
     }
-    const Triad& triad = triads.front();
+    const auto raw = raw_one_of(source_.names(), triads);
+    const Triad triad = triads[several && raw ? *raw : 0];
     for (const std::size_t k : triad) {
       take(k);
     }
     const std::string which =
         fmt::format("{}, {}, {}", source_.title(triad[0]), source_.title(triad[1]), source_.title(triad[2]));
-    const char* words = several ? ": the first of several that are named so"
-                        : named_so > 1
-                            ? ": of several that are named so the only ones whose size is gravity's throughout"
-                            : ", by their names";
+    const char* words = several && raw ? ": of several the sensor's own by its name"
+                        : several      ? ": the first of several that are named so"
+                        : named_so > 1 ? ": of several that are named so the only ones of gravity's size throughout"
+                                       : ", by their names";
     remarks_.push_back({fmt::format("{}.columns", key), which + words, several});
     return triad;
   }

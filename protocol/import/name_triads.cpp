@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <optional>
 #include <string_view>
 #include <tuple>
@@ -52,6 +53,53 @@ Direction direction_of(const Words& words) {
 }
 
 }  // namespace
+
+NamedTriads triads_by_name(const std::vector<NamedColumn>& named, Role role) {
+  std::array<std::vector<std::size_t>, 3> found;
+  const auto is = [role](const NamedColumn& c) { return c.role == role && c.axis >= 0; };
+  const bool rates =
+      std::count_if(named.begin(), named.end(), [&](const NamedColumn& c) { return is(c) && !c.increment; }) >= 3;
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (is(named[k]) && !(rates && named[k].increment)) {
+      found.at(static_cast<std::size_t>(named[k].axis)).push_back(k);
+    }
+  }
+  NamedTriads triads;
+  triads.most = std::max({found[0].size(), found[1].size(), found[2].size()});
+  for (std::size_t k = 0; k < std::min({found[0].size(), found[1].size(), found[2].size()}); ++k) {
+    triads.all.push_back({found[0][k], found[1][k], found[2][k]});
+  }
+  return triads;
+}
+
+std::optional<std::size_t> raw_one_of(const std::vector<std::string>& names,
+                                      const std::vector<std::array<std::size_t, 3>>& triads) {
+  // How many of a triad's names say so.
+  const auto called = [&](const std::array<std::size_t, 3>& triad, std::initializer_list<std::string_view> words) {
+    return std::count_if(triad.begin(), triad.end(),
+                         [&](std::size_t column) { return is_one_of(words_of(names[column]), words); });
+  };
+  std::vector<std::size_t> raw, plain;
+  for (std::size_t k = 0; k < triads.size(); ++k) {
+    const auto as_raw = called(
+        triads[k], {"raw", "uncal", "uncalibrated", "unc", "uncomp", "uncompensated", "unfiltered", "uncorrected"});
+    const auto as_done = called(triads[k], {"cal", "calib", "calibrated", "comp", "compensated", "corr", "corrected",
+                                            "filt", "filtered", "lpf", "smooth", "smoothed"});
+    constexpr std::ptrdiff_t all = 3;
+    if ((as_raw != 0 && as_raw != all) || (as_done != 0 && as_done != all) || (as_raw != 0 && as_done != 0)) {
+      return std::nullopt;
+    }
+    (as_raw == all ? raw : plain).push_back(k);
+    if (as_done == all) {
+      plain.pop_back();
+    }
+  }
+  if (raw.size() == 1) {
+    return raw.front();
+  }
+  const bool one_plain = raw.empty() && plain.size() == 1 && triads.size() > 1;
+  return one_plain ? std::optional(plain.front()) : std::nullopt;
+}
 
 void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
   std::vector<bool> plain(all.size(), false), linear(all.size(), false);

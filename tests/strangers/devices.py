@@ -1,8 +1,8 @@
-"""What devices and their loggers write beside or in the place of plain readings: halves of words."""
+"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated."""
 import numpy
 
 from parts import by_hand
-from recordings import write
+from recordings import of, write
 from sensors import DEG, G0, consumer, industrial
 
 
@@ -32,3 +32,27 @@ def halves(folder, rng):
     write(folder / "ranges.csv", ["time_ms", *[f"gyro_{x}" for x in "xyz"], *[f"acc_low_{x}" for x in "xyz"], *[f"acc_high_{x}" for x in "xyz"]],
           [ms, *high[:, :3].T, *ranges.T], ["%d"] * 10)
     return {"g": g, "a": a, "raw_per_rad_s": 40 * 65536 / DEG, "per_g": 4000 * 65536 / G0, "bytes": {"a": consumers, "per_g": 8192 / G0}}
+
+
+def side_by_side(folder, rng):
+    """Raw and calibrated sets in one file: raw counts behind the calibrated ones, before them, Android's uncalibrated gyros, a plain set beside a filtered one.
+    Two sensors that no name tells apart; two of which one is filtered in x alone."""
+    g, a, t, f, w = by_hand(rng, industrial, 16)
+    rate, force = g.read(w, 100.0, rng), a.read(f, 100.0, rng)
+    other = by_hand(rng, industrial, 2)
+    rate2, force2 = other[0].read(w, 100.0, rng), other[1].read(f, 100.0, rng)
+    clean = (numpy.linalg.solve(g.matrix, (rate - g.bias).T).T, numpy.linalg.solve(a.matrix, (force - a.bias).T).T)
+    counts = [*of(numpy.round(rate / DEG * 400)), *of(numpy.round(force / G0 * 16000))]
+    si = [*of(clean[0]), *of(clean[1])]
+
+    def put(file, titles, columns, forms):
+        names = [title % axis for title in titles for axis in "xyz"]
+        write(folder / file, ["t_s", *names], [t, *columns], ["%.2f", *[form for form in forms for _ in range(3)]])
+    put("behind.csv", ("gyr_%s_rad_s", "acc_%s_m_s2", "gyr_raw_%s", "acc_raw_%s"), si + counts, ("%.7f", "%.6f", "%d", "%d"))
+    put("before.csv", ("raw_gyr_%s", "raw_acc_%s", "cal_gyr_%s", "cal_acc_%s"), counts + si, ("%d", "%d", "%.7f", "%.6f"))
+    put("android.csv", ("acc_%s_m_s2", "gyro_uncalibrated_%s_rad_s", "gyro_%s_rad_s"), [*of(force), *of(rate), *si[:3]], ("%.6f", "%.7f", "%.7f"))
+    put("filtered.csv", ("gyro_%s_rad_s", "acc_%s_m_s2", "gyro_filtered_%s_rad_s", "acc_filtered_%s_m_s2"), [*of(rate), *of(force), *si], ("%.7f", "%.6f", "%.7f", "%.6f"))
+    put("two.csv", ("gyro1_%s_rad_s", "acc1_%s_m_s2", "gyro2_%s_rad_s", "acc2_%s_m_s2"), [*of(rate2), *of(force2), *of(rate), *of(force)], ("%.7f", "%.6f", "%.7f", "%.6f"))
+    write(folder / "one.csv", ["t_s", *[f"gyro_{x}_rad_s" for x in "xyz"], "acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2", "acc_x_filtered_m_s2", "acc_y_m_s2", "acc_z_m_s2"],
+          [t, *of(rate), *of(force), *of(force2)], ["%.2f"] + ["%.7f"] * 3 + ["%.6f"] * 6)
+    return {"g": g, "a": a, "raw_per_rad_s": 400 / DEG, "per_g": 16000 / G0}

@@ -1,6 +1,7 @@
 """What devices write beside or in the place of plain readings, held against the truth."""
 import devices
-from answers import SITE, check, gyro_scales, in_counts
+from answers import SITE, accelerometers, check, gyro_scales, in_counts, near, parameters
+from sensors import G0
 
 
 def halves(operator, rng):
@@ -17,4 +18,28 @@ def halves(operator, rng):
     check("words put together bring units as a doubt", operator.doubts("adis.csv") <= {"gyro.unit", "accelerometer.unit", "gyro.axes", "accelerometer.axes"})
 
 
-TRIALS = {halves: devices}
+def side_by_side(operator, rng):
+    truth = devices.side_by_side(operator.folder, rng)
+    for file in ("behind.csv", "before.csv"):
+        answer = operator.answer("poses", file, *SITE)
+        in_counts(answer, truth)
+        check(f"{file}: three gyro scale factors in counts", gyro_scales(answer, truth["g"], truth["raw_per_rad_s"]) == 3)
+        check("said", "of 2 sets of accelerometers what the sensor itself gives" in operator.run("poses", file).stderr)
+        doubts = operator.doubts(file)
+        check(f"doubted in a map: {sorted(doubts)}", {"gyro.columns", "accelerometer.columns"} <= doubts)
+    of_other = ("--gyro-columns", "8,9,10", "--accelerometer-columns", "acc2_x_m_s2, acc2_y_m_s2, acc2_z_m_s2")
+    for file, arguments in (("android.csv", ()), ("filtered.csv", ()), ("two.csv", of_other)):
+        answer = operator.answer("poses", file, *arguments, *SITE)
+        accelerometers(answer, truth["a"], 4e-5)
+        check(f"{file}: three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+    calibrated = operator.answer("poses", "behind.csv", "--gyro-columns", "2,3,4", "--accelerometer-columns", "5,6,7", *SITE)
+    known = parameters(calibrated, "accelerometers")
+    for axis in "xyz":
+        near(f"bias {axis} of the calibrated set, mg", known[f"bias_{axis}"]["value"], known[f"bias_{axis}"]["sigma"], 0.0, 4e-5 * G0, 1e3 / G0)
+    operator.refused("2 sets of gyros, x in column 2 (gyro1_x_rad_s), column 8 (gyro2_x_rad_s): --gyro-columns says which", "poses", "two.csv")
+    operator.refused("2 sets of accelerometers", "poses", "one.csv")
+    operator.refused("--gyro-columns: 'gx' is none of its 13 columns", "poses", "two.csv", "--gyro-columns", "gx,gy,gz")
+    operator.refused("--gyro-columns: 2 columns, x, y and z are wanted", "poses", "two.csv", "--gyro-columns", "2,3")
+
+
+TRIALS = {halves: devices, side_by_side: devices}

@@ -28,7 +28,7 @@ struct PosesArguments {
   double gyro_unit = 1.0;
   double false_alarm_rate = 0.01;
   bool json = false, details = false;
-  std::string only;
+  std::string only, gyro_columns, accelerometer_columns;
   std::optional<std::uint64_t> angle_column, temperature_column;
   AttitudeChoice attitude;
 };
@@ -40,6 +40,8 @@ RawColumns raw_columns(const PosesArguments& arguments) {
   }
   columns.rate_hz = arguments.rate_hz;
   columns.raw_gyros = arguments.gyro_unit != 1.0;
+  columns.gyros = arguments.gyro_columns;
+  columns.accelerometers = arguments.accelerometer_columns;
   columns.angle = arguments.angle_file.empty() ? static_cast<std::size_t>(arguments.angle_column.value_or(0)) : 0;
   columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
@@ -52,6 +54,7 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
   }
   const bool of_columns = !arguments.only.empty() || arguments.angle_column || arguments.temperature_column ||
                           !arguments.gyros.empty() || !arguments.angle_file.empty() || arguments.rate_hz ||
+                          !arguments.gyro_columns.empty() || !arguments.accelerometer_columns.empty() ||
                           arguments.latitude_deg || arguments.height_m;
   if (is_recording && (of_columns || arguments.files.size() > 1)) {
     return fail(ErrorKind::usage,
@@ -178,6 +181,9 @@ CommandRun configure(Options& options) {
   options.choice("--only", arguments->only, {"gyros", "accelerometers"},
                  "gyros or accelerometers: the log holds these alone, time in s and then x y z; or one gyro");
   options.text("--gyros", arguments->gyros, "the gyros' own file, of a logger that writes one file a sensor");
+  options.text("--gyro-columns", arguments->gyro_columns,
+               "gyros x, y, z, of a log that holds several sets: numbers from 1 or names, commas between");
+  options.text("--accelerometer-columns", arguments->accelerometer_columns, "accelerometers x, y, z, likewise");
   options.number("--rate", arguments->rate_hz, range::sample_rate, "rows a second, of a log without a time");
   options.number("--latitude", arguments->latitude_deg, range::latitude, "of the place, deg: gravity, Earth's rate");
   options.number("--height", arguments->height_m, range::height, "of the place, m");

@@ -15,6 +15,7 @@
 #include "protocol/import/guess_names.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/units.hpp"
+#include "tools/cli/column_list.hpp"
 #include "tools/cli/log_time.hpp"
 
 namespace selfcal::cli {
@@ -33,31 +34,15 @@ std::string titles(const import::ColumnSource& source, const std::vector<std::si
   return fmt::format("{} to {}", source.title(*first), source.title(*last));
 }
 
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(' ');
-  return first == std::string_view::npos ? std::string()
-                                         : std::string(text.substr(first, text.find_last_not_of(' ') - first + 1));
-}
-
 // "8,9,10,11" or names.
 Expected<AttitudeColumns> named_columns(const std::string& path, const import::ColumnSource& source,
                                         const std::string& list) {
-  AttitudeColumns chosen;
-  const auto& names = source.names();
-  for (std::size_t begin = 0; begin <= list.size();) {
-    const std::size_t end = std::min(list.find(',', begin), list.size());
-    const std::string word = trimmed(std::string_view(list).substr(begin, end - begin));
-    begin = end + 1;
-    const bool number = !word.empty() && word.size() < 5 && word.find_first_not_of("0123456789") == std::string::npos;
-    const auto found =
-        std::find_if(names.begin(), names.end(), [&](const auto& name) { return trimmed(name) == word; });
-    const std::size_t column = number ? std::stoul(word) - 1 : static_cast<std::size_t>(found - names.begin());
-    if (column >= names.size()) {
-      return fail(ErrorKind::bad_input,
-                  fmt::format("{}: --attitude-columns: '{}' is none of its {} columns", path, word, names.size()));
-    }
-    chosen.columns.push_back(column);
+  Expected<std::vector<std::size_t>> columns = listed_columns(path, source, "--attitude-columns", list);
+  if (!columns) {
+    return tl::unexpected(columns.error());
   }
+  AttitudeColumns chosen;
+  chosen.columns = std::move(*columns);
   const std::size_t n = chosen.columns.size();
   if (n != 3 && n != 4 && n != 9) {
     return fail(ErrorKind::bad_input,
@@ -68,7 +53,7 @@ Expected<AttitudeColumns> named_columns(const std::string& path, const import::C
   chosen.form = n == 3 ? AttitudeForm::angles : n == 4 ? AttitudeForm::quaternion : AttitudeForm::matrix;
   chosen.order_known = n != 4;
   // Names that say which is w settle the order.
-  for (const AttitudeColumns& by_name : import::attitudes_by_name(names, source.units())) {
+  for (const AttitudeColumns& by_name : import::attitudes_by_name(source.names(), source.units())) {
     std::vector<std::size_t> asked = chosen.columns, has = by_name.columns;
     std::sort(asked.begin(), asked.end());
     std::sort(has.begin(), has.end());

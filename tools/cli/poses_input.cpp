@@ -279,7 +279,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
                                                 full.size() > 1 ? "s" : "", fmt::join(full, ", ")));
   }
   log.notes = and_also(and_also(log.notes, (*source)->put_together()), rows->notes);
-  log.notes = and_also(log.notes, layout_words(*layout, rows->time, unit, columns));
+  log.notes = and_also(and_also(log.notes, layout->notes), layout_words(*layout, rows->time, unit, columns));
   const std::vector<std::vector<double>>& values = rows->data.values;
   if (layout->only_axis >= 0) {
     input.gyro_axes = {layout->only_axis == 0, layout->only_axis == 1, layout->only_axis == 2};

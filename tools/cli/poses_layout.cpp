@@ -4,12 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <utility>
 
 #include "protocol/import/median.hpp"
+#include "tools/cli/column_list.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -18,28 +20,62 @@ using diagnosis::Sensors;
 using import::NamedColumn;
 using import::Role;
 
+using Triad = std::array<std::size_t, 3>;
+
+std::vector<std::size_t> as_vector(const Triad& triad) { return {triad.begin(), triad.end()}; }
+
+// The columns of one sensor by their names, or as the caller lists them.
 struct Triads {
   std::vector<std::size_t> first;  // x, y, z; empty: none is complete
   std::size_t several = 0;         // of the axis that has most columns
+  std::string which;               // of several sets: words on them
 };
 
-Triads triads_of(const std::vector<NamedColumn>& named, Role role) {
-  std::array<std::vector<std::size_t>, 3> found;
-  // Rates where increments of the same sensor stand beside them.
-  const auto is = [&](const NamedColumn& c) { return c.role == role && c.axis >= 0; };
-  const bool rates =
-      std::count_if(named.begin(), named.end(), [&](const NamedColumn& c) { return is(c) && !c.increment; }) >= 3;
-  for (std::size_t k = 0; k < named.size(); ++k) {
-    if (is(named[k]) && !(rates && named[k].increment)) {
-      found.at(static_cast<std::size_t>(named[k].axis)).push_back(k);
-    }
-  }
+// Columns of `role`, for what the names call so; 'x' alone is called nothing.
+Triads triads_of(const import::ColumnSource& source, const std::vector<NamedColumn>& named, Role role, Role called) {
+  const import::NamedTriads by_name = import::triads_by_name(named, called);
   Triads triads;
-  triads.several = std::max({found[0].size(), found[1].size(), found[2].size()});
-  if (!found[0].empty() && !found[1].empty() && !found[2].empty()) {
-    triads.first = {found[0].front(), found[1].front(), found[2].front()};
+  triads.several = by_name.most;
+  if (by_name.all.empty()) {
+    return triads;
   }
+  triads.first = as_vector(by_name.all.front());
+  if (triads.several == 1) {
+    return triads;
+  }
+  const std::string what = role == Role::gyro ? "gyros" : "accelerometers";
+  const std::string option = role == Role::gyro ? "--gyro-columns" : "--accelerometer-columns";
+  const auto raw = by_name.all.size() == by_name.most ? import::raw_one_of(source.names(), by_name.all) : std::nullopt;
+  if (raw) {
+    triads.first = as_vector(by_name.all[*raw]);
+    triads.several = 1;
+    triads.which =
+        fmt::format("of {} sets of {} what the sensor itself gives by its name, from {} on; {} takes another",
+                    by_name.all.size(), what, source.title(triads.first.front()), option);
+    return triads;
+  }
+  std::vector<std::string> begins;
+  for (const Triad& triad : by_name.all) {
+    begins.push_back(source.title(triad.front()));
+  }
+  triads.which =
+      fmt::format("{} sets of {}, x in {}: {} says which", by_name.most, what, fmt::join(begins, ", "), option);
   return triads;
+}
+
+// Errors (bad_input): LIST names other columns than three.
+Expected<Triads> told_or_named(const import::ColumnSource& source, const std::vector<NamedColumn>& named, Role role,
+                               const std::string& list, const std::string& file) {
+  if (list.empty()) {
+    return triads_of(source, named, role, role);
+  }
+  const char* option = role == Role::gyro ? "--gyro-columns" : "--accelerometer-columns";
+  Expected<std::vector<std::size_t>> columns = listed_columns(file, source, option, list);
+  if (columns && columns->size() != 3) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {}: {} columns, x, y and z are wanted", file, option, columns->size()));
+  }
+  return columns.map([](std::vector<std::size_t> three) { return Triads{std::move(three), 1, {}}; });
 }
 
 bool all_nameless(const import::ColumnSource& source) {
@@ -213,10 +249,13 @@ Expected<PoseLayout> layout_by_names(const std::vector<NamedColumn>& named, Tria
     }
     if (wanted && triads->several > 1) {
       return fail(ErrorKind::bad_input,
-                  fmt::format("{}: by the names of its columns it holds {} sets of {}: poses that stand side by side, "
-                              "or several sensors; one set under another is read (cut and cat make such a file)",
-                              file, triads->several, what));
+                  fmt::format("{}: by the names of its columns it holds {}; poses that stand side by side are read one "
+                              "under another (cut and cat make such a file)",
+                              file, triads->which));
     }
+  }
+  for (const auto& [wanted, triads] : {std::pair{gyros, &gyro}, std::pair{accels, &accel}}) {
+    layout.notes += wanted && !triads->which.empty() ? (layout.notes.empty() ? "" : "; ") + triads->which : "";
   }
   layout.gyro = gyros ? std::move(gyro.first) : std::vector<std::size_t>{};
   layout.accel = accels ? std::move(accel.first) : std::vector<std::size_t>{};
@@ -260,11 +299,17 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
   if (const std::string mixed = source.mixed_rows(); !mixed.empty()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, mixed));
   }
-  Triads gyro = triads_of(named, Role::gyro), accel = triads_of(named, Role::accelerometer);
+  Expected<Triads> of_gyros = told_or_named(source, named, Role::gyro, columns.gyros, file);
+  Expected<Triads> of_accels = told_or_named(source, named, Role::accelerometer, columns.accelerometers, file);
+  if (!of_gyros || !of_accels) {
+    return tl::unexpected((of_gyros ? of_accels : of_gyros).error());
+  }
+  Triads &gyro = *of_gyros, &accel = *of_accels;
   const Sensors sensors = columns.sensors.value_or(Sensors::both);
   // "x", "y", "z" of a phone's file of one sensor.
   if (columns.sensors && gyro.several + accel.several == 0) {
-    (sensors == Sensors::gyros ? gyro : accel) = triads_of(named, Role::unknown);
+    const bool gyros = sensors == Sensors::gyros;
+    (gyros ? gyro : accel) = triads_of(source, named, gyros ? Role::gyro : Role::accelerometer, Role::unknown);
   }
   if (!gyro.first.empty() || !accel.first.empty()) {
     return layout_by_names(named, std::move(gyro), std::move(accel), columns, file);

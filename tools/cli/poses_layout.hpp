@@ -19,6 +19,7 @@ struct RawColumns {
   std::size_t angle = 0;                      // its column, from 1, in deg; 0: none
   std::size_t temperature = 0;                // its column, from 1, in degC; 0: none
   bool raw_gyros = false;                     // the caller knows their unit: as they are
+  std::string gyros, accelerometers;          // their columns as an option lists them; empty: by their names
 };
 
 struct PoseLayout {
@@ -27,6 +28,7 @@ struct PoseLayout {
   std::vector<std::size_t> gyro, accel;  // x, y, z; gyros alone may be one axis; empty: not read
   int only_axis = -1;                    // of one axis alone: which it is, x where no name says it
   bool by_names = false;
+  std::string notes;  // which of several sets
 };
 
 // Errors (bad_input): names that say another thing than three gyros and three accelerometers, too few columns.
