@@ -152,19 +152,26 @@ bool acts_on(const Effect& effect, bool gyro, bool has_temperature) {
          effect.triad == (gyro ? Triad::gyro : Triad::accelerometer);
 }
 
-Regression regress(const Eigen::MatrixXd& X, const Eigen::VectorXd& y) {
+Regression regress(const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
+  // Columns of one length: beside counts of 4e6 a g that of a bias is a 1e13th of that of a scale factor, which no rank would see.
+  Eigen::VectorXd length = columns.colwise().norm();
+  length = (length.array() > 0.0).select(length, 1.0);
+  const Eigen::MatrixXd X = columns * length.cwiseInverse().asDiagonal();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
   Regression r;
   r.rank = qr.rank();
-  r.value = qr.solve(y);
-  const Eigen::VectorXd e = y - X * r.value;
+  const Eigen::VectorXd scaled = qr.solve(y);
+  const Eigen::VectorXd e = y - X * scaled;
   const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ()).leftCols(r.rank);
   r.square = e.squaredNorm();
   const Eigen::ArrayXd leverage = Q.rowwise().squaredNorm();
   r.held_out_rms = std::sqrt((e.array() / (1.0 - leverage).max(1e-9)).square().mean());
   const double variance = r.square / static_cast<double>(std::max<Eigen::Index>(1, y.size() - r.rank));
   const Eigen::MatrixXd G = X.transpose() * X;
-  r.sigma = (G.completeOrthogonalDecomposition().pseudoInverse().diagonal() * variance).cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd square =
+      (G.completeOrthogonalDecomposition().pseudoInverse().diagonal() * variance).cwiseMax(0.0);
+  r.value = scaled.cwiseQuotient(length);
+  r.sigma = square.cwiseSqrt().cwiseQuotient(length);
   return r;
 }
 

@@ -100,6 +100,31 @@ TEST(Poses, NamesNothingWhereNothingIs) {
   EXPECT_TRUE(d.gyro_named.empty());
 }
 
+// Counts of a maker may be a thousandth of ug: what is found is the same in any unit.
+TEST(Poses, TheSizeOfACountChangesNoTest) {
+  PoseInput input = hand_turned(Matrix3::Zero(), 2);
+  input.time_s.resize(8000);  // 14 poses: few residuals, where a rank that is one too small is much
+  input.gyro.resize(8000);
+  input.accel.resize(8000);
+  const PoseDiagnosis coarse = diagnose_poses(input, 0.01);
+  for (std::array<double, 3>& row : input.accel) {
+    for (double& value : row) {
+      value *= 65536.0;
+    }
+  }
+  const PoseDiagnosis fine = diagnose_poses(input, 0.01);
+  ASSERT_EQ(fine.accel_tried.size(), coarse.accel_tried.size());
+  for (std::size_t k = 0; k < fine.accel_tried.size(); ++k) {
+    EXPECT_EQ(fine.accel_tried[k].effect, coarse.accel_tried[k].effect);
+    // The fit ends where a step is 1e-6 of its sigma, or so.
+    EXPECT_NEAR(fine.accel_tried[k].log_p, coarse.accel_tried[k].log_p, 1e-3);
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_NEAR(fine.accel_parameters[k].sigma / 65536.0, coarse.accel_parameters[k].sigma,
+                1e-3 * coarse.accel_parameters[k].sigma);
+  }
+}
+
 TEST(Poses, AnswersFivePosesByRest) {
   PoseInput input = hand_turned(Matrix3::Zero(), 3);
   input.time_s.resize(3000);
