@@ -7,6 +7,7 @@
 
 #include "protocol/import/array_source.hpp"
 #include "protocol/import/bag.hpp"
+#include "protocol/import/novatel.hpp"
 #include "protocol/import/split_time.hpp"
 #include "protocol/import/summed_intervals.hpp"
 #include "protocol/import/text_source.hpp"
@@ -62,15 +63,11 @@ Expected<std::unique_ptr<ColumnSource>> open_bag(const std::filesystem::path& fi
 struct Stranger {
   std::string_view magic, words;
 };
-constexpr std::string_view novatel =
-    "a NovAtel log; `sed -n '/^[%#]RAWIMU/{s/^[^;]*;//;s/[*].*//;p}'` makes columns of its lines";
 constexpr std::string_view ardupilot =
     "a log of ArduPilot; `sed -n '/^IMU, [0-9]*, [1-9],/d;s/^FMT.*, IMU, [A-Za-z]*, //p;s/^IMU, //p'` makes columns of "
     "its first sensor's lines";
-constexpr std::array<Stranger, 6> strangers{
+constexpr std::array<Stranger, 4> strangers{
     {{"FMT, ", ardupilot},
-     {"%RAWIMU", novatel},
-     {"#RAWIMU", novatel},
      {"\x89MCAP", "an MCAP file, which this program does not read; `ros2 bag convert` writes it with SQLite storage"},
      {"#ROSRECORD", "a ROS bag of version 1, which this program does not read; version 2.0 is read"},
      {"\x28\xB5\x2F\xFD", "compressed with zstd; `zstd -d` unpacks it"}}};
@@ -117,7 +114,8 @@ Expected<std::unique_ptr<ColumnSource>> open_any(const std::filesystem::path& fi
       return fail(ErrorKind::bad_input, fmt::format("{}: {}", file.string(), stranger.words));
     }
   }
-  return open_text(file, dialect);
+  Expected<std::unique_ptr<ColumnSource>> novatel = open_novatel(file);
+  return !novatel || *novatel ? std::move(novatel) : open_text(file, dialect);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated."""
+"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences."""
 import numpy
 
 from parts import by_hand
@@ -56,3 +56,46 @@ def side_by_side(folder, rng):
     write(folder / "one.csv", ["t_s", *[f"gyro_{x}_rad_s" for x in "xyz"], "acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2", "acc_x_filtered_m_s2", "acc_y_m_s2", "acc_z_m_s2"],
           [t, *of(rate), *of(force), *of(force2)], ["%.2f"] + ["%.7f"] * 3 + ["%.6f"] * 6)
     return {"g": g, "a": a, "raw_per_rad_s": 400 / DEG, "per_g": 16000 / G0}
+
+
+def checksum(text):
+    """NovAtel's 32 bits, bit by bit."""
+    register = 0
+    for byte in text.encode():
+        register ^= byte
+        for _ in range(8):
+            register = (register >> 1) ^ (0xEDB88320 if register & 1 else 0)
+    return f"{register:08x}"
+
+
+def novatel(folder, rng):
+    """NovAtel's logs: RAWIMUS among positions, a week that ends, a line that was damaged; RAWIMUX with long headers.
+    What the receiver corrected; all lines damaged; positions alone."""
+    g, a, t, f, w = by_hand(rng, industrial, 14, 125.0)
+    per_s, angle, velocity = 125, 1e-9, 2e-8   # counts of an IMU of theirs
+    counts = numpy.round(numpy.column_stack([a.read(f, 125.0, rng) / velocity, g.read(w, 125.0, rng) / angle]) / per_s).astype(numpy.int64)
+    seconds = 604800 - t[len(t) // 2] + t
+    weeks, seconds = 2209 + (seconds >= 604800), seconds % 604800
+    raw = [f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}" for c in counts]
+    damaged = int(rng.integers(3000, len(t) - 100))
+
+    def line(mark, head, fields, wrong=False):
+        text = f"{head};{fields}"
+        return f"{mark}{text}*{checksum(text + ' ' * wrong)}\r\n"
+
+    def short(name, k, fields, wrong=False):
+        return line("%", f"{name},{weeks[k]},{seconds[k]:.3f}", fields, wrong)
+    position = "SOL_COMPUTED,PPP,48.30000000000,11.60000000000,480.0000,46.0000,WGS84,0.0119,0.0107,0.0198"
+
+    def positions(k):
+        return line("#", f"BESTPOSA,COM1,0,65.0,FINESTEERING,{weeks[k]},{seconds[k]:.3f},02000020,cdba,16809", position) if k % 125 == 0 else ""
+
+    def put(file, row, count=len(t)):
+        (folder / file).write_text("[COM1]<OK\r\n" + "".join(row(k) for k in range(count)), encoding="ascii", newline="")
+    put("rawimus.gps", lambda k: positions(k) + short("RAWIMUSA", k, f"{weeks[k]},{seconds[k]:.9f},ea5afe00,{raw[k]}", k == damaged))
+    put("rawimux.log", lambda k: line("#", f"RAWIMUXA,USB1,0,64.5,FINESTEERING,{weeks[k]},{seconds[k]:.3f},02000020,0dc5,16809",
+                                      f"04,41,{weeks[k]},{seconds[k]:.9f},ea5afe00,{raw[k]}"))
+    put("corrected.txt", lambda k: positions(k) + short("IMURATECORRIMUSA", k, f"{weeks[k]},{seconds[k]:.9f},0.000105592,-0.000227975,-0.000027416,-0.002454522,-0.000917886,-0.004175763"), 500)
+    put("damaged.txt", lambda k: short("RAWIMUSA", k, f"{weeks[k]},{seconds[k]:.9f},ea5afe00,{raw[k]}", True), 500)
+    put("positions.txt", lambda k: positions(125 * k), 50)
+    return {"g": g, "a": a, "raw_per_rad_s": 1 / angle / per_s, "per_g": 1 / velocity / per_s}

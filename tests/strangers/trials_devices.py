@@ -1,6 +1,6 @@
 """What devices write beside or in the place of plain readings, held against the truth."""
 import devices
-from answers import SITE, accelerometers, check, gyro_scales, in_counts, near, parameters
+from answers import SITE, accelerometers, check, gyro_scales, in_counts, names, near, parameters
 from sensors import G0
 
 
@@ -42,4 +42,22 @@ def side_by_side(operator, rng):
     operator.refused("--gyro-columns: 2 columns, x, y and z are wanted", "poses", "two.csv", "--gyro-columns", "2,3")
 
 
-TRIALS = {halves: devices, side_by_side: devices}
+def novatel(operator, rng):
+    truth = devices.novatel(operator.folder, rng)
+    for file in ("rawimus.gps", "rawimux.log"):
+        answer = operator.answer("poses", file, *SITE)
+        check(f"{file}: {answer['poses']} poses, nothing named: {names(answer)}", answer["poses"] == 14 and not names(answer))
+        in_counts(answer, truth)
+        check("three gyro scale factors in counts, no axis reversed", gyro_scales(answer, truth["g"], truth["raw_per_rad_s"]) == 3
+              and not answer["gyros"]["contradict"])
+        check("said", "y of both triads is the log's -y" in operator.run("poses", file).stderr)
+        operator.settled(file, ("gyro.unit", "accelerometer.unit", "accelerometer.axes"))
+    said = operator.run("poses", "rawimus.gps").stderr
+    check(f"the damaged line is left out: {said.strip()[-200:]}", "1 row without a time is left out" in said)
+    for file, words in (("corrected.txt", "IMURATECORRIMUSA: the receiver has taken gravity"), ("damaged.txt", "the checksum is another than the line's"),
+                        ("positions.txt", "without lines of RAWIMU")):
+        operator.refused(words, "poses", file)
+        operator.refused(words, "import", file, "--guess")
+
+
+TRIALS = {halves: devices, side_by_side: devices, novatel: devices}

@@ -18,18 +18,23 @@
 namespace selfcal::cli {
 namespace {
 
-void leave_out_timeless(import::ColumnData& data) {
+void leave_out_timeless(TimedRows& rows) {
   std::vector<bool> timeless;
-  for (const long double stamp : data.stamps) {
+  for (const long double stamp : rows.data.stamps) {
     timeless.push_back(!std::isfinite(stamp));
   }
-  import::leave_out(timeless, data);
+  if (const auto count = std::count(timeless.begin(), timeless.end(), true); count > 0) {
+    rows.notes =
+        fmt::format("{} row{} without a time {} left out", count, count > 1 ? "s" : "", count > 1 ? "are" : "is");
+  }
+  import::leave_out(timeless, rows.data);
 }
 
 void take_once(TimedRows& rows) {
   const std::vector<bool> repeated = import::repeated_rows(rows.data);
   if (const auto count = std::count(repeated.begin(), repeated.end(), true); count > 0) {
-    rows.notes = fmt::format("{} rows are the row before once more and are taken once", count);
+    rows.notes += (rows.notes.empty() ? "" : "; ") +
+                  fmt::format("{} rows are the row before once more and are taken once", count);
     import::leave_out(repeated, rows.data);
   }
 }
@@ -89,7 +94,7 @@ Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std
       });
       if (rows) {
         if (request.tolerant) {
-          leave_out_timeless(rows->data);
+          leave_out_timeless(*rows);
         }
         take_once(*rows);
         const std::string continued = import::continue_full_clocks(rows->data.stamps);
