@@ -7,6 +7,7 @@
 
 #include "protocol/import/array_source.hpp"
 #include "protocol/import/bag.hpp"
+#include "protocol/import/clock_digits.hpp"
 #include "protocol/import/novatel.hpp"
 #include "protocol/import/split_time.hpp"
 #include "protocol/import/summed_intervals.hpp"
@@ -124,7 +125,11 @@ Expected<std::unique_ptr<ColumnSource>> open_columns(const std::filesystem::path
                                                      const std::optional<TextDialect>& dialect,
                                                      const std::optional<std::string>& topic) {
   try {
-    return open_any(file, dialect, topic).map(with_whole_time).map(with_summed_intervals).map(with_whole_words);
+    return open_any(file, dialect, topic)
+        .map(with_whole_time)
+        .map(with_clock_digits)
+        .map(with_summed_intervals)
+        .map(with_whole_words);
   } catch (const std::bad_alloc&) {
     return fail(ErrorKind::bad_input, fmt::format("{}: does not fit into memory", file.string()));
   }

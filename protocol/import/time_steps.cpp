@@ -73,6 +73,27 @@ std::optional<Ticks> even_ticks(const std::vector<long double>& stamps, const st
   return Ticks{usual, median_interval(times)};
 }
 
+// The row at which the second of two ticks with one stamp begins, where one tick alone has twice the rows: a leap second of a clock that shows
+// whole ones.
+std::optional<std::size_t> second_of_two(const std::vector<long double>& stamps, const std::vector<std::size_t>& firsts,
+                                         const Ticks& ticks) {
+  constexpr double alike = 0.1;
+  std::optional<std::size_t> found;
+  for (std::size_t k = 1; k + 1 < firsts.size(); ++k) {
+    const std::size_t rows = firsts[k + 1] - firsts[k];
+    const bool twice = std::abs(static_cast<double>(rows) - 2.0 * static_cast<double>(ticks.rows)) <=
+                       alike * static_cast<double>(ticks.rows);
+    const long double length = stamps[firsts[k + 1]] - stamps[firsts[k]];
+    if (twice && std::abs(length - ticks.length) < 0.1L * ticks.length) {
+      if (found) {
+        return std::nullopt;
+      }
+      found = firsts[k] + rows / 2;
+    }
+  }
+  return found;
+}
+
 }  // namespace
 
 long double median_interval(const std::vector<long double>& stamps) {
@@ -86,11 +107,52 @@ long double median_interval(const std::vector<long double>& stamps) {
   return *middle;
 }
 
+namespace {
+
+// Of those that are none: a clock coarser than the rows stands still in most of them.
+long double median_step(const std::vector<long double>& stamps) {
+  std::vector<long double> steps;
+  for (std::size_t k = 1; k < stamps.size(); ++k) {
+    if (stamps[k] > stamps[k - 1]) {
+      steps.push_back(stamps[k] - stamps[k - 1]);
+    }
+  }
+  if (steps.empty()) {
+    return 0.0L;
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+// Where the only fall is by a second less an interval: a second stands twice, as a leap second does in UTC, and its rows go on.
+std::string continue_repeated_second(std::vector<long double>& stamps) {
+  constexpr std::array<long double, 4> seconds{1.0L, 1e3L, 1e6L, 1e9L};  // in s, ms, us, ns
+  constexpr long double slowest = 0.2L, fastest = 5e-5L, about = 0.5L;   // intervals, s
+  const long double usual = median_step(stamps);
+  const auto* const second = std::find_if(
+      seconds.begin(), seconds.end(), [usual](long double s) { return usual <= slowest * s && usual >= fastest * s; });
+  const auto falls = [](long double a, long double b) { return b < a; };
+  const auto fall = std::adjacent_find(stamps.begin(), stamps.end(), falls);
+  if (second == seconds.end() || fall == stamps.end() ||
+      std::adjacent_find(std::next(fall), stamps.end(), falls) != stamps.end() ||
+      std::abs(*std::next(fall) + *second - *fall - usual) > about * usual) {
+    return {};
+  }
+  std::string words = fmt::format("a second stands twice, from {:.10g} to {:.10g}, as a leap second does: continued",
+                                  static_cast<double>(*fall), static_cast<double>(*std::next(fall)));
+  std::for_each(std::next(fall), stamps.end(), [second](long double& s) { s += *second; });
+  return words;
+}
+
+}  // namespace
+
 std::string continue_full_clocks(std::vector<long double>& stamps) {
   if (stamps.size() < 3) {
     return {};
   }
-  const long double usual = median_interval(stamps);
+  const long double usual = median_step(stamps);
+  constexpr long double most_lost = 20.0L;  // rows that may lack where it begins again
   long double added = 0.0L, before = stamps.front();
   std::size_t places = 0;
   std::string words;
@@ -98,7 +160,9 @@ std::string continue_full_clocks(std::vector<long double>& stamps) {
     const long double stamp = stamps[k];
     const auto* const end = std::find_if(full.begin(), full.end(), [&](long double size) {
       const long double step = stamp + size - before;
-      return stamp < before && before < size + usual && step > 0.5L * usual && step < 1.5L * usual;
+      const long double end_zone = std::min(most_lost * usual, 0.01L * size);
+      const bool near_end = stamp < end_zone && size - before < end_zone;
+      return stamp < before && before < size + usual && step > 0.5L * usual && (step < 1.5L * usual || near_end);
     });
     if (usual > 0.0L && end != full.end()) {
       added += *end;
@@ -110,7 +174,9 @@ std::string continue_full_clocks(std::vector<long double>& stamps) {
     before = stamp;
     stamps[k] = stamp + added;
   }
-  return places > 1 ? words + fmt::format(", so in {} places", places) : words;
+  words += places > 1 ? fmt::format(", so in {} places", places) : "";
+  const std::string twice = continue_repeated_second(stamps);
+  return words + (words.empty() || twice.empty() ? "" : "; ") + twice;
 }
 
 std::vector<int> place_in_stamp(const std::vector<long double>& stamps) {
@@ -129,8 +195,14 @@ std::string spread_coarse_stamps(std::vector<long double>& stamps) {
   constexpr std::size_t longest = 64;
   constexpr long double usual_times = 3.0L;
   const long double interval = (stamps.back() - stamps.front()) / static_cast<long double>(stamps.size() - 1);
-  const std::vector<std::size_t> firsts = first_of_stamps(stamps);
+  std::vector<std::size_t> firsts = first_of_stamps(stamps);
   const std::optional<Ticks> ticks = even_ticks(stamps, firsts);
+  const auto twice = ticks ? second_of_two(stamps, firsts, *ticks) : std::nullopt;
+  if (twice) {
+    std::for_each(stamps.begin() + static_cast<std::ptrdiff_t>(*twice), stamps.end(),
+                  [&ticks](long double& s) { s += ticks->length; });
+    firsts = first_of_stamps(stamps);
+  }
   std::vector<long double> spread = stamps;
   for (std::size_t k = 0; k < firsts.size(); ++k) {
     const std::size_t first = firsts[k], next = k + 1 < firsts.size() ? firsts[k + 1] : stamps.size();
@@ -154,7 +226,9 @@ std::string spread_coarse_stamps(std::vector<long double>& stamps) {
     return {};
   }
   stamps = std::move(spread);
-  return fmt::format("{} rows have the time of the row before, of a clock coarser than the rows: spread evenly", still);
+  return fmt::format("{} rows have the time of the row before, of a clock coarser than the rows: spread evenly{}",
+                     still,
+                     twice ? ", one time for two, which stands in twice as many rows, as a leap second does" : "");
 }
 
 std::string put_parts_behind(std::vector<long double>& stamps) {

@@ -13,12 +13,13 @@ namespace selfcal::import {
 long double median_interval(const std::vector<long double>& stamps);
 
 // Clocks and counters that begin again where they are full: 2^16, 2^24, 2^32 ticks, a day or a GPS week in s or ms. Where a stamp falls by
-// so much that with one of these added it is the usual interval behind the one before, it goes on from there. Words on where; empty: nowhere.
+// so much that with one of these added it is the usual interval behind the one before, or up to twenty where it falls to its beginning, it goes on
+// from there. So does a second that stands twice, as a leap second does in UTC, where that is the only fall. Words on where; empty: nowhere.
 std::string continue_full_clocks(std::vector<long double>& stamps);
 
 // A clock coarser than the rows, or one of blocks of rows: stamps that never fall and stand still for a few rows are spread evenly up to the next
 // one. Words on how many; empty: nothing done, for fewer than one in a hundred stands still, or one does for long. However long where each stamp
-// but the first and the last has as many rows: whole seconds.
+// but the first and the last has as many rows: whole seconds, of which one alone with twice as many is two, as a leap second is in UTC.
 std::string spread_coarse_stamps(std::vector<long double>& stamps);
 // A log that was begun anew for each part, a position say, with a time that begins where it began first: the parts one behind the other, a gap of
 // 6000 intervals between them. Words on how many; empty: nothing done, for the time falls to elsewhere, or two parts have as many rows, as two

@@ -1,9 +1,10 @@
-"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences."""
+"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences, clocks of UTC."""
 import numpy
 
 from parts import by_hand
 from recordings import of, write
 from sensors import DEG, G0, consumer, industrial
+from tables import NAMES
 
 
 def halves(folder, rng):
@@ -99,3 +100,32 @@ def novatel(folder, rng):
     put("damaged.txt", lambda k: short("RAWIMUSA", k, f"{weeks[k]},{seconds[k]:.9f},ea5afe00,{raw[k]}", True), 500)
     put("positions.txt", lambda k: positions(125 * k), 50)
     return {"g": g, "a": a, "raw_per_rad_s": 1 / angle / per_s, "per_g": 1 / velocity / per_s}
+
+
+def clocks(folder, rng):
+    """One log through a leap second in POSIX and UTC, in whole seconds too; through midnight with rows lost there, in whole seconds, as hhmmss; through a GPS week's end.
+    A clock that was set back by three seconds."""
+    g, a, t, f, w = by_hand(rng, industrial, 16)
+    forms = ["%.5f"] * 3 + ["%.6f"] * 3
+    values = [*of(g.read(w, 100.0, rng), DEG), *of(a.read(f, 100.0, rng), G0)]
+    t = numpy.round(t - t[int(len(t) * rng.uniform(0.3, 0.7))], 2)   # zero where the day, the second or the week ends
+    late, ten_ms = (t >= 0), numpy.round(t * 100).astype(int)
+    lost = (ten_ms >= -2) & (ten_ms < 5)
+
+    def day(k):
+        return f"{k // 360000:02d}:{k // 6000 % 60:02d}:{k % 6000 / 100:05.2f}"
+
+    def put(file, name, stamps, form, keep=slice(None)):
+        write(folder / file, [name, *NAMES], [numpy.asarray(stamps)[keep], *[v[keep] for v in values]], [form, *forms])
+    put("posix.csv", "unix_time", 1483228800 + t - late, "%.2f")   # the last second of 2016 stands twice
+    put("posix_ms.csv", "timestamp_ms", 1483228800000 + ten_ms * 10 - 1000 * late, "%d")
+    put("whole.csv", "unix_time", numpy.floor(1483228800 + t - late), "%d")
+    leap = (ten_ms >= 0) & (ten_ms < 100)
+    put("utc.csv", "time_utc", [f"2016-12-31T23:59:60.{k:02d}Z" if x else f"2016-12-31T{day(8640000 + k)}Z" if k < 0 else f"2017-01-01T{day(k - 100)}Z"
+                                for k, x in zip(ten_ms, leap)], "%s")
+    put("midnight.csv", "time", [day(k % 8640000) for k in ten_ms], "%s", ~lost)
+    put("seconds.csv", "time", [day(k % 8640000)[:8] for k in ten_ms], "%s")
+    put("digits.csv", "utc", [day(k % 8640000).replace(":", "") for k in ten_ms], "%s")
+    put("week.csv", "gps_tow_s", (604800 + t) % 604800, "%.2f", ~lost)
+    put("back.csv", "time_s", 5000 + t - 3 * late, "%.2f")
+    return {"g": g, "a": a}

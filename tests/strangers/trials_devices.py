@@ -60,4 +60,19 @@ def novatel(operator, rng):
         operator.refused(words, "import", file, "--guess")
 
 
-TRIALS = {halves: devices, side_by_side: devices, novatel: devices}
+def clocks(operator, rng):
+    truth = devices.clocks(operator.folder, rng)
+    for file, said in (("posix.csv", "a second stands twice"), ("posix_ms.csv", "a second stands twice"), ("whole.csv", "as a leap second does"),
+                       ("utc.csv", "a second stands twice"), ("midnight.csv", "begins again"), ("seconds.csv", "begins again"),
+                       ("digits.csv", "is a time of the day, hhmmss"), ("week.csv", "begins again")):
+        answer = operator.answer("poses", file, *SITE)
+        accelerometers(answer, truth["a"], 4e-5)
+        check(f"{file}: three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
+        words = operator.run("poses", file).stderr
+        check(f"said: {words.strip()[-150:]}", said in words)
+        if file not in ("whole.csv", "seconds.csv"):   # a recording wants a time of each row
+            operator.settled(file, ("accelerometer.axes",))
+    operator.refused("is not after", "poses", "back.csv")
+
+
+TRIALS = {halves: devices, side_by_side: devices, novatel: devices, clocks: devices}

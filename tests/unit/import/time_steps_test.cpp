@@ -34,6 +34,38 @@ TEST(TimeSteps, FullClocksGoOn) {
   }
 }
 
+TEST(TimeSteps, RowsMayBeLostWhereAClockBeginsAgain) {
+  std::vector<long double> stamps = clock(86399.0L, 0.01L, 86400.0L, 1000);
+  stamps.erase(stamps.begin() + 98, stamps.begin() + 105);
+  EXPECT_NE(continue_full_clocks(stamps), "");
+  EXPECT_NEAR(static_cast<double>(stamps[98] - stamps[97]), 0.08, 1e-6);
+  std::vector<long double> whole;  // 50 rows a second of a clock that shows whole ones
+  for (int row = 0; row < 1000; ++row) {
+    whole.push_back(std::fmod(std::floor(86390.0L + 0.02L * row), 86400.0L));
+  }
+  EXPECT_NE(continue_full_clocks(whole), "");
+  EXPECT_EQ(whole.back(), 86409.0L);
+}
+
+// In s, in ms, and in ns since 1970: the second before midnight stands twice.
+TEST(TimeSteps, ALeapSecondGoesOn) {
+  for (const long double unit : {1.0L, 1e3L, 1e9L}) {
+    std::vector<long double> stamps = clock(1483228798.0L * unit, 0.01L * unit, 1e30L, 600);
+    for (std::size_t k = 250; k < stamps.size(); ++k) {
+      stamps[k] -= unit;
+    }
+    EXPECT_NE(continue_full_clocks(stamps).find("leap second"), std::string::npos);
+    for (std::size_t k = 1; k < stamps.size(); ++k) {
+      ASSERT_NEAR(static_cast<double>((stamps[k] - stamps[k - 1]) / unit), 0.01, 1e-6) << k;
+    }
+  }
+  std::vector<long double> often = clock(5000.0L, 0.01L, 1e9L, 1000);  // what falls twice is no leap second
+  for (std::size_t k = 0; k < often.size(); ++k) {
+    often[k] -= k >= 300 ? k >= 700 ? 2.0L : 1.0L : 0.0L;
+  }
+  EXPECT_EQ(continue_full_clocks(often), "");
+}
+
 TEST(TimeSteps, AClockThatIsSetBackStaysBack) {
   for (const long double back : {0.5L, 94.0L, 3600.0L}) {
     std::vector<long double> stamps = clock(5000.0L, 0.01L, 1e9L, 1000);
@@ -117,6 +149,17 @@ TEST(TimeSteps, WholeSecondsAreSpread) {
     stamps.push_back(std::floor(0.605L + 0.01L * row));
   }
   EXPECT_NE(spread_coarse_stamps(stamps), "");
+  for (std::size_t row = 0; row < stamps.size(); ++row) {
+    EXPECT_NEAR(static_cast<double>(stamps[row]), 0.605 + 0.01 * static_cast<double>(row), 0.005 + 1e-9);
+  }
+}
+
+TEST(TimeSteps, AWholeSecondThatStandsTwiceIsTwo) {
+  std::vector<long double> stamps;
+  for (int row = 0; row < 3000; ++row) {
+    stamps.push_back(std::floor(0.605L + 0.01L * row) - (row >= 940 ? 1.0L : 0.0L));
+  }
+  EXPECT_NE(spread_coarse_stamps(stamps).find("leap second"), std::string::npos);
   for (std::size_t row = 0; row < stamps.size(); ++row) {
     EXPECT_NEAR(static_cast<double>(stamps[row]), 0.605 + 0.01 * static_cast<double>(row), 0.005 + 1e-9);
   }
