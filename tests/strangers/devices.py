@@ -1,9 +1,9 @@
-"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences, clocks of UTC."""
+"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences, clocks of UTC, modules of few axes."""
 import numpy
 
 from parts import by_hand
-from recordings import of, write
-from sensors import DEG, G0, consumer, industrial
+from recordings import of, tilted, write
+from sensors import DEG, G0, UP, consumer, industrial, moved
 from tables import NAMES
 
 
@@ -129,3 +129,21 @@ def clocks(folder, rng):
     put("week.csv", "gps_tow_s", (604800 + t) % 604800, "%.2f", ~lost)
     put("back.csv", "time_s", 5000 + t - 3 * late, "%.2f")
     return {"g": g, "a": a}
+
+
+def few_axes(folder, rng):
+    """Modules that lack axes, at rest: two accelerometers and one gyro, of a car; three accelerometers and one gyro, turned by hand; two accelerometers beside three gyros.
+    Two accelerometers alone; two of each."""
+    g, a = industrial(rng)
+    t, f, w = moved(100.0, [(tilted(UP["+z"], rng, 0.05), 200.0, 0)], rng)
+    rate, force = g.read(w, 100.0, rng) / DEG, a.read(f, 100.0, rng) / G0
+    plane = ["t_s", "ax_g", "ay_g", "yaw_rate_dps"]
+    write(folder / "plane.csv", plane, [t, *force[:, :2].T, rate[:, 2]], ["%.2f"] + ["%.6f"] * 3)
+    write(folder / "three.csv", [*plane[:3], "gx_dps", "gy_dps", "gz_dps"], [t, *force[:, :2].T, *rate.T], ["%.2f"] + ["%.6f"] * 5)
+    write(folder / "two.csv", plane[:3], [t, *force[:, :2].T], ["%.2f"] + ["%.6f"] * 2)
+    write(folder / "four.csv", [*plane[:3], "gx_dps", "gy_dps"], [t, *force[:, :2].T, *rate[:, :2].T], ["%.2f"] + ["%.6f"] * 4)
+    g2, a2, t2, f2, w2 = by_hand(rng, industrial, 16)
+    write(folder / "spatial.csv", ["t_s", "ax_g", "ay_g", "az_g", "rate_x_dps"], [t2, *of(a2.read(f2, 100.0, rng), G0), g2.read(w2, 100.0, rng)[:, 0] / DEG],
+          ["%.2f"] + ["%.6f"] * 4)
+    at_rest = w.mean(0) @ g.matrix.T + g.bias
+    return {"a": a2, "mean": at_rest, "asd": g.asd, "wander": 2 * g.instability}

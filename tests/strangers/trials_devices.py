@@ -1,7 +1,7 @@
 """What devices write beside or in the place of plain readings, held against the truth."""
 import devices
 from answers import SITE, accelerometers, check, gyro_scales, in_counts, names, near, parameters
-from sensors import G0
+from sensors import DEG, G0
 
 
 def halves(operator, rng):
@@ -75,4 +75,24 @@ def clocks(operator, rng):
     operator.refused("is not after", "poses", "back.csv")
 
 
-TRIALS = {halves: devices, side_by_side: devices, novatel: devices, clocks: devices}
+def few_axes(operator, rng):
+    truth = devices.few_axes(operator.folder, rng)
+    for file, axes in (("plane.csv", "z"), ("three.csv", "xyz")):
+        answer = operator.answer("poses", file)
+        found = answer["rest"]["axes"]
+        check(f"{file}: gyros {axes} alone, nothing named: {names(answer)}", len(found) == len(axes) and not answer["mismatch"] and answer["sensors"] == "gyros")
+        for axis, one in zip(axes, found):
+            near(f"mean {axis}, deg/h", one["mean"]["value"] * DEG / 3600, one["mean"]["sigma"] * DEG / 3600, truth["mean"]["xyz".index(axis)], truth["wander"], 3600 / DEG)
+            white = one["white_noise"]["value"] * DEG / 60 / truth["asd"]
+            check(f"white noise {white:.3f} of the data sheet's", 0.85 < white < 1.25)
+        said = operator.run("poses", file).stderr
+        check(f"said: {said.strip()[:150]}", "column 2 (ax_g), column 3 (ay_g): left alone, for bias and scale factors by gravity" in said)
+    accelerometers(operator.answer("poses", "spatial.csv", *SITE), truth["a"], 4e-5)
+    check("one gyro is left alone", "column 5 (rate_x_dps): left alone" in operator.run("poses", "spatial.csv").stderr)
+    check("and told by itself", operator.answer("poses", "spatial.csv", "--only", "gyros")["gyros"]["bias"].count(None) == 2)
+    for file in ("two.csv", "four.csv"):
+        operator.refused("no x, y and z of either", "poses", file)
+    operator.refused("three gyros and three accelerometers are expected", "import", "plane.csv", "--guess")
+
+
+TRIALS = {halves: devices, side_by_side: devices, novatel: devices, clocks: devices, few_axes: devices}

@@ -287,6 +287,36 @@ std::optional<PoseLayout> one_named_gyro(const std::vector<NamedColumn>& named, 
   return columns.rate_hz || !layout.times.empty() ? std::optional(std::move(layout)) : std::nullopt;
 }
 
+// What the names call one of `role` where x, y and z are not all there: "column 5 (gz_dps)"; empty: none.
+std::string incomplete_triad(const import::ColumnSource& source, const std::vector<NamedColumn>& named, Role role) {
+  std::vector<std::string> columns;
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == role && named[k].axis >= 0) {
+      columns.push_back(source.title(k));
+    }
+  }
+  return fmt::format("{}", fmt::join(columns, ", "));
+}
+
+// Of a planar module, say: what a log holds less than three of is left alone, and said.
+std::string left_alone(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
+                       const PoseLayout& layout) {
+  const std::string gyros = layout.gyro.empty() ? incomplete_triad(source, named, Role::gyro) : std::string();
+  const std::string accels =
+      layout.accel.empty() ? incomplete_triad(source, named, Role::accelerometer) : std::string();
+  std::string words;
+  if (!accels.empty()) {
+    words =
+        fmt::format("{}: left alone, for bias and scale factors by gravity take accelerometers of x, y and z", accels);
+  }
+  if (!gyros.empty()) {
+    words +=
+        (words.empty() ? "" : "; ") +
+        fmt::format("{}: left alone, for turns take gyros of x, y and z; --only gyros answers for one gyro", gyros);
+  }
+  return words;
+}
+
 }  // namespace
 
 Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
@@ -311,13 +341,27 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
     const bool gyros = sensors == Sensors::gyros;
     (gyros ? gyro : accel) = triads_of(source, named, gyros ? Role::gyro : Role::accelerometer, Role::unknown);
   }
-  if (!gyro.first.empty() || !accel.first.empty()) {
-    return layout_by_names(named, std::move(gyro), std::move(accel), columns, file);
-  }
-  if (sensors == Sensors::gyros) {
-    if (std::optional<PoseLayout> one = one_named_gyro(named, columns)) {
-      return std::move(*one);
+  const auto saying = [&](PoseLayout layout) {
+    if (const std::string words = columns.sensors ? std::string() : left_alone(source, named, layout); !words.empty()) {
+      layout.notes += (layout.notes.empty() ? "" : "; ") + words;
     }
+    return layout;
+  };
+  const bool of_one_gyro = sensors == Sensors::gyros || (!columns.sensors && accel.several > 0 && accel.first.empty());
+  if (gyro.first.empty() && of_one_gyro) {
+    if (std::optional<PoseLayout> one = one_named_gyro(named, columns)) {
+      return saying(std::move(*one));
+    }
+  }
+  if (!gyro.first.empty() || !accel.first.empty()) {
+    return layout_by_names(named, std::move(gyro), std::move(accel), columns, file).map(saying);
+  }
+  const auto no_triad =
+      fail(ErrorKind::bad_input,
+           fmt::format("{}: some columns are called gyros or accelerometers, but no x, y and z of either", file));
+  const bool some_named = !all_nameless(source) && gyro.several + accel.several > 0;
+  if (some_named && sensors != Sensors::gyros) {
+    return no_triad;
   }
   // A layout of the columns that hold numbers, and then of all.
   const std::vector<std::size_t> numeric = numeric_columns(source);
@@ -325,9 +369,11 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
   if (layout && layout->only_axis >= 0) {
     layout->only_axis = std::max(0, named[layout->gyro.front()].axis);
   }
-  if (layout && !all_nameless(source) && gyro.several + accel.several > 0 && layout->only_axis < 0) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: some columns are called gyros or accelerometers, but no x, y and z of either", file));
+  if (layout) {
+    layout->names_unread = !all_nameless(source);
+  }
+  if (layout && some_named && layout->only_axis < 0) {
+    return no_triad;
   }
   return layout;
 }
@@ -342,10 +388,12 @@ std::string layout_words(const PoseLayout& layout, std::size_t time, const std::
   };
   const bool plain = (layout.gyro.empty() || layout.gyro == columns_from(1, layout.gyro.size())) &&
                      (layout.accel.empty() || layout.accel == columns_from(layout.gyro.empty() ? 1 : 4, 3));
-  if (plain && time == 0 && unit_of_time == "s" && !columns.rate_hz) {
+  if (plain && time == 0 && unit_of_time == "s" && !columns.rate_hz && !layout.names_unread) {
     return {};
   }
-  std::string words = layout.by_names ? "by the names " : "no names: ";
+  std::string words = layout.by_names       ? "by the names "
+                      : layout.names_unread ? "no name says what the columns are, in their order "
+                                            : "no names: ";
   words += columns.rate_hz ? fmt::format("rows follow one another at {} Hz", *columns.rate_hz)
                            : fmt::format("time is column {} in {}", time + 1, unit_of_time);
   words += layout.gyro.empty()     ? std::string()

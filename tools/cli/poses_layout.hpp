@@ -28,7 +28,8 @@ struct PoseLayout {
   std::vector<std::size_t> gyro, accel;  // x, y, z; gyros alone may be one axis; empty: not read
   int only_axis = -1;                    // of one axis alone: which it is, x where no name says it
   bool by_names = false;
-  std::string notes;  // which of several sets
+  bool names_unread = false;  // there are names, and none says what a column is
+  std::string notes;          // which of several sets
 };
 
 // Errors (bad_input): names that say another thing than three gyros and three accelerometers, too few columns.
