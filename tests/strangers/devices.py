@@ -1,10 +1,10 @@
-"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences, clocks of UTC, modules of few axes."""
+"""What devices and their loggers write beside or in the place of plain readings: halves of words, sets that were calibrated, a receiver's sentences, clocks of UTC, modules of few axes, few poses while it warms up."""
 import numpy
 
 from parts import by_hand
-from recordings import of, tilted, write
+from recordings import anywhere, of, tilted, write
 from sensors import DEG, G0, UP, consumer, industrial, moved
-from tables import NAMES
+from tables import NAMES, write_log
 
 
 def halves(folder, rng):
@@ -147,3 +147,14 @@ def few_axes(folder, rng):
           ["%.2f"] + ["%.6f"] * 4)
     at_rest = w.mean(0) @ g.matrix.T + g.bias
     return {"a": a2, "mean": at_rest, "asd": g.asd, "wander": 2 * g.instability}
+
+
+def warming_up(folder, rng):
+    """Nine poses by hand, as many as there are unknowns, in the minutes in which accelerometers warm up by 3 to 6 mg; a ramp of 1 to 2 mg; the same poses of a warm one."""
+    g, a = industrial(rng)
+    t, f, w = moved(100.0, [(anywhere(rng), rng.uniform(6, 11), rng.uniform(1, 2)) for _ in range(9)], rng, 0.4)
+    passed, way = (t / t[-1])[:, None], rng.uniform(3, 6, 3) * rng.choice([-1, 1], 3) * 1e-3 * G0
+    files = {"warm.csv": 0 * passed * way, "ramp.csv": passed * way / 3, "warming.csv": (1 - numpy.exp(-passed * rng.uniform(1, 5))) * way}
+    for name, extra in files.items():
+        write_log(folder / name, t, g.read(w, 100.0, rng), a.read(f, 100.0, rng, extra))
+    return {"a": a, "files": {name: extra.mean(0) for name, extra in files.items()}}

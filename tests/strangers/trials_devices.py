@@ -1,4 +1,6 @@
 """What devices write beside or in the place of plain readings, held against the truth."""
+import numpy
+
 import devices
 from answers import SITE, accelerometers, check, gyro_scales, in_counts, names, near, parameters
 from sensors import DEG, G0
@@ -95,4 +97,19 @@ def few_axes(operator, rng):
     operator.refused("three gyros and three accelerometers are expected", "import", "plane.csv", "--guess")
 
 
-TRIALS = {halves: devices, side_by_side: devices, novatel: devices, clocks: devices, few_axes: devices}
+def warming_up(operator, rng):
+    truth = devices.warming_up(operator.folder, rng)
+    sigma = {}
+    for file, drift in truth["files"].items():
+        answer = operator.answer("poses", file, *SITE)
+        known = parameters(answer, "accelerometers")
+        sigma[file] = max((known[f"bias_{x}"]["sigma"] for x in "xyz" if f"bias_{x}" in known), default=numpy.inf)
+        for k, axis in enumerate("xyz"):   # a bias that goes on is told as what it is in the mean
+            if p := known.get(f"bias_{axis}"):
+                near(f"{file}: bias {axis}, mg", p["value"], p["sigma"], truth["a"].bias[k] + drift[k], 4e-5 * G0, 1e3 / G0)
+            if p := known.get(f"scale_{axis}"):
+                near(f"{file}: scale {axis}, ppm", p["value"], p["sigma"], truth["a"].matrix[k, k] - 1, 4e-5, 1e6)
+    check(f"sigma of the warm one is the least: {sigma}", sigma["warm.csv"] < min(sigma["ramp.csv"], sigma["warming.csv"]))
+
+
+TRIALS = {halves: devices, side_by_side: devices, novatel: devices, clocks: devices, few_axes: devices, warming_up: devices}

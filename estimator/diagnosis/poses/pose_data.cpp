@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/diagnosis/poses/pose_drift.hpp"
 #include "estimator/diagnosis/poses/pose_student.hpp"
 #include "estimator/geometry/units.hpp"
 
@@ -181,6 +182,9 @@ AccelModel fit_accelerometers(const PoseInput& input, const std::vector<Pose>& p
                           ? student_widening(m.free) * std::sqrt(m.residual.squaredNorm() / m.free)
                           : std::hypot(noise, std::sqrt(times * times - 1.0) * slow_of_means(m, poses));
   m.sigma = (m.sigma * std::max(1.0, told / noise)).cwiseMin(m.before);
+  if (m.free < least_freedom) {
+    hold_drift(poses, m);
+  }
   m.open = m.held.select(m.open, m.sigma);
   return m;
 }
