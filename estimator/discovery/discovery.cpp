@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/constant_spread.hpp"
@@ -23,20 +24,10 @@ namespace {
 
 constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
 constexpr std::size_t class_size = 40;      // looked at exactly for the class
-constexpr int constant_rounds = 4;
 constexpr std::size_t members_averaged = 8;
-// A true law of z sigma gains (z^2 - 1)/2 on what was left out, for each of some forty parts is predicted from the rest; what
-// gains less than half of what it gains in the fit follows the noise.
-constexpr double least_held_out_share = 0.5;
-// Costs are minus the logarithms of probabilities that add up to 1 over all functions and axes, so that p times their
-// exponential is corrected for all of them. Laws and processes take half of the false-alarm rate each.
-constexpr double shares = 2.0;
 constexpr double process_count = 2.0 * axis_count;
 
-double log_p_of_law(const Candidate& c) {
-  const double degrees = 1.0 + static_cast<double>(c.term.constants.size() > 1 ? 1 : 0);
-  return log_chi_squared_tail(c.gain, degrees) + c.cost + std::log(shares);
-}
+double log_p(const Candidate& c) { return log_p_of_law(c.gain, c.term.constants.size(), c.cost); }
 
 // The 24 where no law is.
 FittedRecording without_any_law(const CalibrationResult& calibration) {
@@ -93,22 +84,10 @@ class LawSearch::Search {
       settle_class(k, laws[k]);  // which may put another equation in the place of one
     }
     write_down();
-    auto at = static_cast<Eigen::Index>(state_.terms.size());
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
-      const auto row = static_cast<Eigen::Index>(k);
       DiscoveredLaw& law = laws[k];
-      law.term = state_.terms[k];
-      law.expression = state_.terms[k].expression.text(state_.terms[k].constants);
-      law.coefficient = state_.fit.coefficient(row);
-      law.sigma = std::sqrt(state_.fit.covariance(row, row));
-      law.gain = state_.fit.gain[k];
-      law.held_out_gain = state_.fit.held_out_gain[k];
+      write_numbers(law, state_, k, shortlist_.constants(state_.terms[k]));
       law.share = std::min(1.0, law.gain / std::max(1.0, result_.misfit_before));
-      law.constants = shortlist_.constants(state_.terms[k]);
-      for (Constant& constant : law.constants) {
-        constant.sigma = std::sqrt(std::max(0.0, state_.fit.covariance(at, at)));
-        ++at;
-      }
       if (const auto spread = spread_over_constant(laws_on_, state_.fit, k, options_.stop)) {
         // Where the range of the search cuts off probable values, the spread is too small.
         law.sigma = std::max(law.sigma, spread->coefficient);
@@ -116,9 +95,6 @@ class LawSearch::Search {
       }
       law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
       law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
-      const double degrees = law.constants.size() > 1 ? 2.0 : 1.0;
-      law.significance =
-          sigma_from_log_p(std::min(0.0, log_chi_squared_tail(law.gain, degrees) + state_.costs[k] + std::log(shares)));
     }
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
@@ -183,15 +159,30 @@ class LawSearch::Search {
            !options_.stop.stop_requested();
   }
 
+  // Score, residual and model of the recordings with their laws in.
+  void unsettle() {
+    if (raw_score_.size() > 0) {
+      sums_.sums.score = raw_score_;
+      sums_.sums.square = raw_square_;
+      raw_model_.reset();
+    }
+    model_ = model_of_sums();
+  }
+
   // Of a law of 30 sigma the pieces leave what a process could take up. Score and residual become those without the laws.
   void settle() {
     if (state_.terms.empty()) {
+      if (raw_model_) {
+        unsettle();
+      }
       return;
     }
     const PieceSums settled = said("what the laws leave", [&] { return sum_what_is_left(); });
-    raw_score_ = sums_.sums.score;
-    raw_square_ = sums_.sums.square;
-    raw_model_ = std::move(model_);
+    if (!raw_model_) {
+      raw_score_ = sums_.sums.score;
+      raw_square_ = sums_.sums.square;
+      raw_model_ = std::move(model_);
+    }
     sums_.sums.score = settled.sums.score;
     sums_.sums.square = settled.sums.square;
     model_ = model_of_sums();
@@ -203,12 +194,7 @@ class LawSearch::Search {
     const SearchState laws_first = state_;
     const double laws_first_posterior = log_posterior();
     state_ = empty_;
-    if (raw_score_.size() > 0) {
-      sums_.sums.score = raw_score_;
-      sums_.sums.square = raw_square_;
-      raw_model_.reset();
-    }
-    model_ = model_of_sums();
+    unsettle();
     take_processes();
     take_laws();
     const double ahead = state_.processes.empty() ? -1.0 : log_posterior() - laws_first_posterior;
@@ -227,13 +213,7 @@ class LawSearch::Search {
   }
 
   // Logarithm of the posterior probability, but for a constant.
-  double log_posterior() const {
-    double costs = cost_of_processes();
-    for (const double cost : state_.costs) {
-      costs += cost;
-    }
-    return -0.5 * model_->square() - costs;
-  }
+  double log_posterior() const { return -0.5 * model_->square() - cost_of_processes() - cost_of_laws(state_); }
 
   double cost_of_processes() const {
     return state_.half_log_determinant + std::log(process_count) * static_cast<double>(state_.processes.size());
@@ -250,10 +230,7 @@ class LawSearch::Search {
   // Whether the process costs more than all laws do, were the rest as they leave it: then no way that begins with it is the likelier
   // one, nor one with odds that are worth a word.
   bool laws_are_likelier(const ProcessFit& alone) const {
-    double saved = -std::log(options_.least_odds);
-    for (const double cost : state_.costs) {
-      saved += cost;
-    }
+    const double saved = cost_of_laws(state_) - std::log(options_.least_odds);
     return !state_.terms.empty() &&
            alone.half_log_determinant + std::log(process_count) - 0.5 * absorbed(*model_, alone) > saved;
   }
@@ -293,20 +270,20 @@ class LawSearch::Search {
     }
     const double limit = std::log(options_.false_alarm_rate);
     std::vector<Candidate> candidates = shortlist_.best(*model_, shortlist_size);
-    if (candidates.empty() || log_p_of_law(candidates.front()) > limit) {
-      state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p_of_law(candidates.front()));
+    if (candidates.empty() || log_p(candidates.front()) > limit) {
+      state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p(candidates.front()));
       return false;
     }
     if (state_.processes.empty()) {  // with a process in play the pieces stand
       candidates = best_of(exact_alternatives(laws_on_, state_.terms, candidates, options_.stop));
     }
     for (const Candidate& candidate : candidates) {
-      state_.log_p_remaining = std::min(0.0, log_p_of_law(candidate));
-      if (log_p_of_law(candidate) > limit) {
+      state_.log_p_remaining = std::min(0.0, log_p(candidate));
+      if (log_p(candidate) > limit) {
         return false;
       }
       if (accept(candidate)) {
-        exchange();
+        exchange(state_.terms.size() - 1);
         return true;
       }
       state_.refused = state_.refused.empty() ? candidate.text() : state_.refused;
@@ -314,15 +291,11 @@ class LawSearch::Search {
     return false;
   }
 
-  bool predicts(const LawFit& fit, std::size_t k) const {
-    return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k];
-  }
-
   bool accept(const Candidate& candidate) {
     std::vector<LawTerm> terms = state_.terms;
     terms.push_back(candidate.term);
     const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
-    if (fit.terms.size() != terms.size() || !predicts(fit, terms.size() - 1) || fit.terms.back().at_its_limit()) {
+    if (fit.terms.size() != terms.size() || !is_predicted(fit, terms.size() - 1) || fit.terms.back().at_its_limit()) {
       return false;
     }
     state_.costs.push_back(candidate.cost);
@@ -348,31 +321,25 @@ class LawSearch::Search {
   }
   void choose(std::size_t left_out) { project_out(*model_, left_out); }
 
-  std::vector<LawTerm> all_but(std::size_t k) const {
-    std::vector<LawTerm> others = state_.terms;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    return others;
-  }
-
   // What explains the recording in the place of term k, exactly, with other values of its constant; `own`: the term as it stands.
   std::vector<std::vector<Candidate>> rivals(std::size_t k, std::size_t most, Candidate& own) {
     PieceModel& model = raw_model_ ? *raw_model_ : *model_;  // what settle() took out is what the rivals are to explain
     project_out(model, k);
     const std::vector<Candidate> candidates = shortlist_.best(model, most);
     project_out(model, state_.terms.size());
-    const std::vector<LawTerm> others = all_but(k);
+    const std::vector<LawTerm> others = all_but(state_.terms, k);
     const SingleFit alone = fit_each(laws_on_, others, {state_.terms[k]}, options_.stop).front();
     own = {state_.terms[k], alone.gain, state_.costs[k], false, alone.coefficient};
     return exact_alternatives(laws_on_, others, candidates, options_.stop);
   }
 
-  // Each term in turn against all functions, the others staying: what was taken first may have stood for two. What is then
-  // left with less than significance is dropped.
-  void exchange() {
+  // Each of the first `count` terms in turn against all functions, the others staying: what was taken first may have stood for two.
+  // What is then left with less than significance is dropped.
+  void exchange(std::size_t count) {
     if (state_.terms.size() < 2 || !state_.processes.empty()) {
       return;
     }
-    for (std::size_t k = 0; k + 1 < state_.terms.size(); ++k) {
+    for (std::size_t k = 0; k < count; ++k) {
       Candidate own;
       const std::vector<Candidate> candidates = best_of(rivals(k, shortlist_size, own));
       if (!candidates.empty() && candidates.front().merit() > own.merit() + 1.0) {
@@ -387,7 +354,7 @@ class LawSearch::Search {
     terms[k] = candidate.term;
     const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
     if (fit.terms.size() != terms.size() || (must_gain && fit.square_after >= state_.fit.square_after) ||
-        !predicts(fit, k) || fit.terms[k].at_its_limit()) {
+        !is_predicted(fit, k) || fit.terms[k].at_its_limit()) {
       return false;
     }
     state_.costs[k] = candidate.cost;
@@ -398,8 +365,8 @@ class LawSearch::Search {
   void drop_weak() {
     for (std::size_t k = 0; k < state_.terms.size() && state_.terms.size() > 1; ++k) {
       const Candidate here{state_.terms[k], state_.fit.gain[k], state_.costs[k], false};
-      if (log_p_of_law(here) > std::log(options_.false_alarm_rate)) {
-        const LawFit fit = fit_laws(laws_on_, all_but(k), constant_rounds, options_.stop);
+      if (log_p(here) > std::log(options_.false_alarm_rate)) {
+        const LawFit fit = fit_laws(laws_on_, all_but(state_.terms, k), constant_rounds, options_.stop);
         state_.costs.erase(state_.costs.begin() + static_cast<std::ptrdiff_t>(k));
         adopt(fit);
         k = static_cast<std::size_t>(-1);  // from the start: the others' gains have changed
@@ -437,7 +404,7 @@ class LawSearch::Search {
     const std::size_t members = tried.size();
     const std::vector<Candidate> beside = all.tried_beside();
     tried.insert(tried.end(), beside.begin(), beside.end());
-    law.stability = stability(laws_on_, all_but(k), tried, members, options_.stop);
+    law.stability = stability(laws_on_, all_but(state_.terms, k), tried, members, options_.stop);
   }
 
   void write_down() {
