@@ -17,6 +17,7 @@
 #include "estimator/discovery/search_state.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/discovery/stability.hpp"
+#include "estimator/discovery/two_laws.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
@@ -68,6 +69,9 @@ class LawSearch::Search {
     take_laws();
     settle();
     take_laws();
+    if (state_.terms.size() > 1 || significant(best_process())) {
+      begin_with_two();
+    }
     if (significant(best_process()) || (may_stand_alone && !laws_are_likelier(alone))) {
       processes_too();
     }
@@ -157,6 +161,27 @@ class LawSearch::Search {
   bool room() const {
     return static_cast<int>(state_.terms.size() + state_.processes.size()) < options_.most_terms &&
            !options_.stop.stop_requested();
+  }
+
+  // Laws that were found one by one against the best two together, and what these leave.
+  void begin_with_two() {
+    const std::optional<SearchState> two = said("two laws at once", [&] {
+      return two_laws(laws_on_, raw_model_ ? *raw_model_ : *model_, dictionary_, shortlist_, options_.false_alarm_rate,
+                      options_.stop);
+    });
+    if (!two) {
+      choose(state_.terms.size());
+      return;
+    }
+    const SearchState one_by_one = std::exchange(state_, *two);
+    choose(state_.terms.size());
+    exchange(state_.terms.size());
+    settle();
+    take_laws();
+    if (log_posterior_of_laws(state_) < log_posterior_of_laws(one_by_one)) {
+      state_ = one_by_one;
+      settle();
+    }
   }
 
   // Score, residual and model of the recordings with their laws in.

@@ -197,6 +197,37 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const 
   return {G, b};
 }
 
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(
+    const std::array<Eigen::MatrixXd, axis_count>& means) const {
+  const Eigen::Index pieces = sums_.piece_dt.size();
+  Eigen::Index count = 0;
+  std::array<Eigen::Index, axis_count> first{};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    first[axis] = count;
+    count += means[axis].cols();
+  }
+  Eigen::MatrixXd G(count, count), cross(chosen_image_.cols(), count);
+  Eigen::VectorXd b(count);
+  for (std::size_t i = 0; i < axis_count; ++i) {
+    const auto rows = Eigen::seqN(static_cast<Eigen::Index>(i), pieces, axis_count);
+    for (std::size_t j = i; j < axis_count; ++j) {
+      const Eigen::MatrixXd block =
+          information_->all(rows, Eigen::seqN(static_cast<Eigen::Index>(j), pieces, axis_count));
+      const Eigen::MatrixXd of_both = means[i].transpose() * (block * means[j]);
+      G.block(first[i], first[j], of_both.rows(), of_both.cols()) = of_both;
+      G.block(first[j], first[i], of_both.cols(), of_both.rows()) = of_both.transpose();
+    }
+    b.segment(first[i], means[i].cols()) = means[i].transpose() * own_score(static_cast<int>(i));
+    cross.middleCols(first[i], means[i].cols()) = own_image(static_cast<int>(i)).transpose() * means[i];
+  }
+  if (chosen_image_.cols() > 0) {
+    const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
+    G -= cross.transpose() * solved;
+    b -= solved.transpose() * chosen_score_;
+  }
+  return {G, b};
+}
+
 double PieceModel::gain(int axis, const Eigen::MatrixXd& means) const {
   const auto [G, b] = project(axis, means);
   for (Eigen::Index k = 0; k < b.size(); ++k) {

@@ -79,6 +79,9 @@ class PieceModel {
   // Projected information and score of columns of one axis, [k x k] and [k].
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(int axis, const Eigen::MatrixXd& means) const;
 
+  // The same of columns of all axes, [pieces x columns] each, in the order of the axes.
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(const std::array<Eigen::MatrixXd, axis_count>& means) const;
+
   double square() const { return square_; }  // of the residuals, the chosen ones' gain taken off
 
  private:

@@ -257,6 +257,18 @@ std::vector<Candidate> Shortlist::best_over_pieces(const PieceModel& model, std:
   return all;
 }
 
+std::array<Candidate, 2> Shortlist::refined(PieceModel& model, const Ranked& first, const Ranked& second) const {
+  std::array<Candidate, 2> both = {candidate(model, first), candidate(model, second)};
+  for (const std::size_t k : {0U, 1U}) {
+    std::vector<Eigen::VectorXd> columns;
+    add_columns(model, both[1 - k].term, columns);
+    model.choose(columns);
+    both[k] = candidate(model, k == 0 ? first : second);
+  }
+  model.choose({});
+  return both;
+}
+
 void Shortlist::add_columns(const PieceModel& model, const LawTerm& term, std::vector<Eigen::VectorXd>& columns) const {
   const auto column = [&](const std::vector<double>& constants) -> Eigen::VectorXd {
     return model.column(term.axis, sums_.means(term.expression.evaluate(sums_.channels, constants)));

@@ -1,6 +1,7 @@
 // From the ranking over the pieces to laws: constants refined, doubles left out.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -43,6 +44,8 @@ class Shortlist {
   // gain; best first. A third as many are added that are best beside the known columns (pieces.hpp). A law's means over the
   // pieces gain no more than the law does, with the known columns and without: the larger gain counts.
   std::vector<Candidate> best(const PieceModel& model, std::size_t most) const;
+  // Both functions, each with its constant of greatest gain beside the other. The model has nothing chosen, before and after.
+  std::array<Candidate, 2> refined(PieceModel& model, const Ranked& first, const Ranked& second) const;
   // A wave with other periods up to one of resolution away, amplitude and phase of greatest gain at each: where little of it is seen, several
   // fit alike, far beyond the sigma of a linearised fit. `wave_step` of the dictionary's periods apart. Of another law none.
   static constexpr double wave_step = 0.1;

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <map>
 #include <utility>
 
@@ -122,6 +123,27 @@ TEST(PieceModel, ProjectsOutWhatIsNoVectorOverPieces) {
     EXPECT_NEAR(ranked.gain, gain, 1e-6 * std::max(1.0, gain));  // single precision
   }
   EXPECT_NEAR(model.square(), left.squaredNorm(), 1e-7);
+}
+
+TEST(PieceModel, ProjectsFunctionsOfAllAxes) {
+  const Drawn d;
+  PieceModel model(d.sums, d.dictionary);
+  const Eigen::VectorXd known = drawn(columns, 1, 5);
+  model.choose({known});
+  std::array<Eigen::MatrixXd, axis_count> means;
+  Eigen::MatrixXd all(rows, 0);
+  for (int axis = 0; axis < axis_count; ++axis) {
+    const Eigen::Index its = axis % 3;  // of some axes none
+    means[static_cast<std::size_t>(axis)] = drawn(pieces, its, 20U + static_cast<unsigned>(axis));
+    all.conservativeResize(rows, all.cols() + its);
+    const Eigen::MatrixXd of_axis = d.Z(Eigen::all, Eigen::seqN(axis, pieces, axis_count));
+    all.rightCols(its) = of_axis * means[static_cast<std::size_t>(axis)];
+  }
+  const Eigen::VectorXd y = d.Z * known;
+  const Eigen::MatrixXd rest = all - y * (y.transpose() * all) / y.squaredNorm();
+  const auto [G, b] = model.project(means);
+  EXPECT_LT((G - rest.transpose() * rest).cwiseAbs().maxCoeff(), 1e-9 * G.norm());
+  EXPECT_LT((b - rest.transpose() * d.r).cwiseAbs().maxCoeff(), 1e-9 * G.norm());
 }
 
 TEST(PieceModel, LooksAtAnotherResidual) {
