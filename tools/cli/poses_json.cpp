@@ -149,6 +149,8 @@ Json read_outs_json(const diagnosis::ReadOuts& r) {
                   {"delay_sigma_s", r.clock->delay_sigma_s},
                   {"growth_s", r.clock->growth_s},
                   {"growth_sigma_s", r.clock->growth_sigma_s},
+                  {"faster", r.clock->faster},
+                  {"faster_sigma", r.clock->faster_sigma},
                   {"least_s", r.clock->least_s},
                   {"most_s", r.clock->most_s},
                   {"scatter_s", r.clock->scatter_s}};

@@ -428,6 +428,12 @@ std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
                                     r.clock->delay_s < 0.0 ? "early" : "late");
     if (r.clock->growth_sigma_s > 0.0) {
       words += fmt::format(", {} s more over the log", cell(r.clock->growth_s, r.clock->growth_sigma_s));
+      constexpr double told = 3.0;  // sigma
+      if (std::abs(r.clock->faster) > told * r.clock->faster_sigma) {
+        words += fmt::format("; were it right and the log's not, scales would be {} % {}",
+                             cell(100.0 * std::abs(r.clock->faster), 100.0 * r.clock->faster_sigma),
+                             r.clock->faster > 0.0 ? "less" : "more");
+      }
     }
     text += lines_of("read-outs'", words);
   }

@@ -188,6 +188,19 @@ void add_supports(const PoseInput& input, PoseDiagnosis& d) {
   }
 }
 
+// A rate times a wrong time is a wrong angle.
+void add_clock(PoseDiagnosis& d) {
+  const bool scale_told = std::any_of(d.gyro_parameters.begin(), d.gyro_parameters.end(), [](const PoseParameter& p) {
+    return p.determined && p.name.starts_with("scale_");
+  });
+  if (scale_told || d.read_outs || has_attitude(d)) {
+    d.invisible.emplace_back(
+        "the log's clock: its error is one of all gyros' scale factors; where it is 1 % slow, those of gyros that give "
+        "rates "
+        "are 1 % less; increments of angle are free of it");
+  }
+}
+
 void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
   d.rest = judge_rest(input, poses, alpha, d);
   if (!d.rest) {
@@ -429,6 +442,7 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     }
   }
   add_supports(input, d);
+  add_clock(d);
   add_open(d);
   return d;
 }

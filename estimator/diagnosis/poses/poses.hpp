@@ -114,6 +114,8 @@ struct ReadOutClock {
   double delay_s = 0.0, delay_sigma_s = 0.0;    // at the middle of the recording
   double growth_s = 0.0, growth_sigma_s = 0.0;  // over the recording
   double least_s = 0.0, most_s = 0.0, scatter_s = 0.0;
+  // What the log's clock is faster by than the read-outs', relative. Where theirs is right, gains of gyros that give rates are less by it.
+  double faster = 0.0, faster_sigma = 0.0;
 };
 
 // How gravity turns in the sensor while one axis of the table turns.

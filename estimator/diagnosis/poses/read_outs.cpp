@@ -285,6 +285,8 @@ std::optional<ReadOutClock> clock_of(const std::vector<Delay>& delays, double du
   clock.delay_sigma_s = std::hypot(r.sigma(0), 0.5 * interval_s);
   clock.growth_s = r.value(1);
   clock.growth_sigma_s = r.sigma(1);
+  clock.faster = -clock.growth_s / duration_s;  // what the read-outs show at a second happens 1 + this by the log
+  clock.faster_sigma = clock.growth_sigma_s / duration_s;
   clock.least_s = y.minCoeff();
   clock.most_s = y.maxCoeff();
   clock.scatter_s = std::sqrt(r.square / static_cast<double>(std::max<Eigen::Index>(1, n - 2)));

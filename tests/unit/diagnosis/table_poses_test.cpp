@@ -90,6 +90,30 @@ TEST(TablePoses, GainAndClockFromStops) {
   EXPECT_FALSE(d.accel_tested);  // gravity moves in one plane
 }
 
+// The log's clock is 1 % fast, and the angles come from a file of commands with the right time: what the table does at t, which the
+// log calls 1.01 t, stands at t. The gain is 0.9 * 1.01 by the log's time, in which a
+// turn takes longer, and 0.9 where the commands' is right.
+TEST(TablePoses, GainByTheLogsClockAndByTheReadOuts) {
+  Table t = stops();
+  t.input.inner.clear();
+  t.input.outer.clear();
+  for (double& time : t.input.time_s) {
+    time *= 1.01;
+  }
+  for (std::size_t i = 0; i < t.angle.size(); ++i) {
+    const double k = std::clamp(t.input.time_s[i] / dt - 1.0, 0.0, static_cast<double>(t.angle.size() - 1));
+    t.input.inner.push_back(t.angle[static_cast<std::size_t>(std::lround(k))]);
+  }
+  t.input.outer.assign(t.angle.size(), 0.0);
+  const PoseDiagnosis d = diagnose_poses(t.input, 0.01);
+  ASSERT_TRUE(d.read_outs && d.read_outs->axes.size() == 1 && d.read_outs->clock);
+  const ReadOutAxis& axis = d.read_outs->axes.front();
+  EXPECT_NEAR(axis.response.y(), 0.9 * 1.01, 8e-4);
+  EXPECT_NEAR(d.read_outs->clock->faster, 0.01, 5.0 * d.read_outs->clock->faster_sigma);
+  EXPECT_LT(d.read_outs->clock->faster_sigma, 2e-4);
+  EXPECT_NEAR(axis.response.y() / (1.0 + d.read_outs->clock->faster), 0.9, 1e-3);
+}
+
 // 36 turns of 10 deg, each 3 % off: white, or with a correlation of neighbours of 0.7.
 Table uneven_turns(double alike) {
   Table t(4);
