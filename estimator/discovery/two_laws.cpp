@@ -73,9 +73,13 @@ Pool pool_of(const PieceModel& model, const Dictionary& dictionary, std::size_t 
     if (root.info() != Eigen::Success || root.rcond() < 1e-9) {
       return false;
     }
-    root.matrixL().solveInPlace(pool.information.middleRows(m.first, m.columns));
-    root.matrixL().transpose().solveInPlace<Eigen::OnTheRight>(pool.information.middleCols(m.first, m.columns));
-    root.matrixL().solveInPlace(pool.score.segment(m.first, m.columns));
+    const Eigen::MatrixXd whitening = Eigen::MatrixXd(root.matrixL()).inverse();
+    const Eigen::MatrixXd rows = whitening * pool.information.middleRows(m.first, m.columns);
+    pool.information.middleRows(m.first, m.columns) = rows;
+    const Eigen::MatrixXd columns = pool.information.middleCols(m.first, m.columns) * whitening.transpose();
+    pool.information.middleCols(m.first, m.columns) = columns;
+    const Eigen::VectorXd score = whitening * pool.score.segment(m.first, m.columns);
+    pool.score.segment(m.first, m.columns) = score;
     return true;
   };
   std::erase_if(pool.members, [&](const Member& m) { return !whiten(m); });
