@@ -69,10 +69,12 @@ class LawSearch::Search {
     take_laws();
     settle();
     take_laws();
-    if (state_.terms.size() > 1 || significant(best_process())) {
+    bool process_left = significant(best_process());
+    if (state_.terms.size() > 1 || process_left) {
       begin_with_two();
     }
-    if (significant(best_process()) || (may_stand_alone && !laws_are_likelier(alone))) {
+      process_left = significant(best_process());
+    if (process_left || (may_stand_alone && !laws_are_likelier(alone))) {
       processes_too();
     }
     if (state_.processes.empty()) {
@@ -320,7 +322,7 @@ class LawSearch::Search {
     std::vector<LawTerm> terms = state_.terms;
     terms.push_back(candidate.term);
     const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
-    if (fit.terms.size() != terms.size() || !is_predicted(fit, terms.size() - 1) || fit.terms.back().at_its_limit()) {
+    if (fit.terms.size() != terms.size() || !stands(fit, terms.size() - 1)) {
       return false;
     }
     state_.costs.push_back(candidate.cost);
@@ -379,7 +381,7 @@ class LawSearch::Search {
     terms[k] = candidate.term;
     const LawFit fit = fit_laws(laws_on_, terms, constant_rounds, options_.stop);
     if (fit.terms.size() != terms.size() || (must_gain && fit.square_after >= state_.fit.square_after) ||
-        !is_predicted(fit, k) || fit.terms[k].at_its_limit()) {
+        !stands(fit, k)) {
       return false;
     }
     state_.costs[k] = candidate.cost;

@@ -186,14 +186,17 @@ void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
   choose(again);
 }
 
-std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const Eigen::MatrixXd& means) const {
-  Eigen::MatrixXd G = means.transpose() * (information_->own[static_cast<std::size_t>(axis)] * means);
-  Eigen::VectorXd b = means.transpose() * own_score(axis);
-  if (chosen_image_.cols() > 0) {
-    const Eigen::MatrixXd cross = own_image(axis).transpose() * means;
+void PieceModel::project_out_chosen(const Eigen::MatrixXd& cross, Eigen::MatrixXd& G, Eigen::VectorXd& b) const {
+  if (cross.rows() > 0) {
     G -= cross.transpose() * chosen_solver_.solve(cross);
     b -= cross.transpose() * chosen_solver_.solve(chosen_score_);
   }
+}
+
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(int axis, const Eigen::MatrixXd& means) const {
+  Eigen::MatrixXd G = means.transpose() * (information_->own[static_cast<std::size_t>(axis)] * means);
+  Eigen::VectorXd b = means.transpose() * own_score(axis);
+  project_out_chosen(own_image(axis).transpose() * means, G, b);
   return {G, b};
 }
 
@@ -220,11 +223,7 @@ std::pair<Eigen::MatrixXd, Eigen::VectorXd> PieceModel::project(
     b.segment(first[i], means[i].cols()) = means[i].transpose() * own_score(static_cast<int>(i));
     cross.middleCols(first[i], means[i].cols()) = own_image(static_cast<int>(i)).transpose() * means[i];
   }
-  if (chosen_image_.cols() > 0) {
-    const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
-    G -= cross.transpose() * solved;
-    b -= solved.transpose() * chosen_score_;
-  }
+  project_out_chosen(cross, G, b);
   return {G, b};
 }
 

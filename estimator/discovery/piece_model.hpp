@@ -78,7 +78,6 @@ class PieceModel {
   std::vector<Ranked> rank(std::size_t most) const;
   // Projected information and score of columns of one axis, [k x k] and [k].
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(int axis, const Eigen::MatrixXd& means) const;
-
   // The same of columns of all axes, [pieces x columns] each, in the order of the axes.
   std::pair<Eigen::MatrixXd, Eigen::VectorXd> project(const std::array<Eigen::MatrixXd, axis_count>& means) const;
 
@@ -86,6 +85,8 @@ class PieceModel {
 
  private:
   void score_functions();
+  // From information and score of columns, whose products with the chosen ones are `cross`, [chosen x columns].
+  void project_out_chosen(const Eigen::MatrixXd& cross, Eigen::MatrixXd& G, Eigen::VectorXd& b) const;
   // Chosen columns by their image, their information and their score.
   void take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::VectorXd score);
   // Before what is known was projected out.

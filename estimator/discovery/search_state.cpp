@@ -33,8 +33,8 @@ double log_p_of_law(double gain, std::size_t constants, double cost) {
   return log_chi_squared_tail(gain, constants > 1 ? 2.0 : 1.0) + cost + std::log(shares);
 }
 
-bool is_predicted(const LawFit& fit, std::size_t k) {
-  return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k];
+bool stands(const LawFit& fit, std::size_t k) {
+  return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k] && !fit.terms[k].at_its_limit();
 }
 
 double cost_of_laws(const SearchState& state) { return std::accumulate(state.costs.begin(), state.costs.end(), 0.0); }

@@ -26,8 +26,8 @@ constexpr double shares = 2.0;
 
 // Logarithm of the probability that noise gains as much, corrected for all functions.
 double log_p_of_law(double gain, std::size_t constants, double cost);
-// Whether law k of the fit gains on what is left out what it would gain there, were it true.
-bool is_predicted(const LawFit& fit, std::size_t k);
+// Whether law k of the fit gains on what is left out what it would gain there, were it true, with a constant inside its range.
+bool stands(const LawFit& fit, std::size_t k);
 double cost_of_laws(const SearchState& state);
 std::vector<LawTerm> all_but(std::vector<LawTerm> terms, std::size_t k);
 // Logarithm of the posterior probability of laws without a process, but for a constant.

@@ -150,13 +150,12 @@ std::optional<SearchState> two_laws(std::span<const LawRecording> recordings, Pi
     }
     state.fit = fit_laws(recordings, terms, constant_rounds, stop);
     state.terms = state.fit.terms;
-    bool stands = state.terms.size() == terms.size();
-    for (std::size_t k = 0; stands && k < terms.size(); ++k) {
-      stands =
-          is_predicted(state.fit, k) && !state.terms[k].at_its_limit() &&
-          log_p_of_law(state.fit.gain[k], state.terms[k].constants.size(), state.costs[k]) < std::log(false_alarm_rate);
+    bool both = state.terms.size() == terms.size();
+    for (std::size_t k = 0; both && k < terms.size(); ++k) {
+      both = stands(state.fit, k) && log_p_of_law(state.fit.gain[k], state.terms[k].constants.size(), state.costs[k]) <
+                                         std::log(false_alarm_rate);
     }
-    if (stands && (!best || log_posterior_of_laws(state) > log_posterior_of_laws(*best))) {
+    if (both && (!best || log_posterior_of_laws(state) > log_posterior_of_laws(*best))) {
       best = std::move(state);
     }
   }

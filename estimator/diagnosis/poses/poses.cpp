@@ -196,8 +196,7 @@ void add_clock(PoseDiagnosis& d) {
   if (scale_told || d.read_outs || has_attitude(d)) {
     d.invisible.emplace_back(
         "the log's clock: its error is one of all gyros' scale factors; where it is 1 % slow, those of gyros that give "
-        "rates "
-        "are 1 % less; increments of angle are free of it");
+        "rates are 1 % less; increments of angle are free of it");
   }
 }
 

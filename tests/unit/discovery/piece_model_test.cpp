@@ -10,34 +10,21 @@
 #include <map>
 #include <utility>
 
+#include "tests/unit/discovery/drawn.hpp"
+
 namespace selfcal::discovery {
 namespace {
 
 constexpr Eigen::Index pieces = 8, rows = 100, columns = pieces * axis_count;
 constexpr double q = 0.7;
 
-// Uniform numbers that are the same on every machine.
-Eigen::MatrixXd drawn(Eigen::Index m, Eigen::Index n, unsigned seed) {
-  Eigen::MatrixXd A(m, n);
-  for (double& x : A.reshaped()) {
-    seed = 1664525U * seed + 1013904223U;
-    x = static_cast<double>(seed >> 8U) / 16777216.0 - 0.5;
-  }
-  return A;
-}
-
 struct Drawn {
   Eigen::MatrixXd Z = drawn(rows, columns, 1);
   Eigen::VectorXd r = drawn(rows, 1, 2);
-  PieceSums sums;
+  PieceSums sums = sums_of(Z, r);
   Dictionary dictionary;
 
   Drawn() {
-    sums.piece_dt = Eigen::VectorXd::Constant(pieces, 60.0);
-    sums.pieces.resize(static_cast<std::size_t>(pieces));
-    sums.sums.information = Z.transpose() * Z;
-    sums.sums.score = Z.transpose() * r;
-    sums.sums.square = r.squaredNorm();
     dictionary.means = drawn(pieces, 4, 3);
     dictionary.functions.resize(4);
     dictionary.functions[1].partner = 2;  // a wave
@@ -45,8 +32,7 @@ struct Drawn {
   }
   // Fall of the square of the data's residual, weighted by their covariance, by functions of one axis.
   double gain(const Eigen::MatrixXd& covariance, int axis, const Eigen::MatrixXd& functions) const {
-    const Eigen::MatrixXd of_axis = Z(Eigen::all, Eigen::seqN(axis, pieces, axis_count));
-    const Eigen::MatrixXd signatures = of_axis * functions;
+    const Eigen::MatrixXd signatures = of_axis(Z, axis) * functions;
     const Eigen::MatrixXd weighted = covariance.inverse() * signatures;
     const Eigen::VectorXd b = weighted.transpose() * r;
     return b.dot((signatures.transpose() * weighted).ldlt().solve(b));
@@ -116,8 +102,7 @@ TEST(PieceModel, ProjectsOutWhatIsNoVectorOverPieces) {
     if (ranked.function == 1) {
       continue;  // with its partner
     }
-    const Eigen::MatrixXd of_axis = d.Z(Eigen::all, Eigen::seqN(ranked.axis, pieces, axis_count));
-    const Eigen::VectorXd f = of_axis * d.dictionary.means.col(ranked.function);
+    const Eigen::VectorXd f = of_axis(d.Z, ranked.axis) * d.dictionary.means.col(ranked.function);
     const Eigen::VectorXd rest = f - projector * f;
     const double gain = rest.dot(left) * rest.dot(left) / rest.squaredNorm();
     EXPECT_NEAR(ranked.gain, gain, 1e-6 * std::max(1.0, gain));  // single precision
@@ -136,8 +121,7 @@ TEST(PieceModel, ProjectsFunctionsOfAllAxes) {
     const Eigen::Index its = axis % 3;  // of some axes none
     means[static_cast<std::size_t>(axis)] = drawn(pieces, its, 20U + static_cast<unsigned>(axis));
     all.conservativeResize(rows, all.cols() + its);
-    const Eigen::MatrixXd of_axis = d.Z(Eigen::all, Eigen::seqN(axis, pieces, axis_count));
-    all.rightCols(its) = of_axis * means[static_cast<std::size_t>(axis)];
+    all.rightCols(its) = of_axis(d.Z, axis) * means[static_cast<std::size_t>(axis)];
   }
   const Eigen::VectorXd y = d.Z * known;
   const Eigen::MatrixXd rest = all - y * (y.transpose() * all) / y.squaredNorm();
