@@ -13,6 +13,7 @@
 #include "estimator/discovery/known_form.hpp"
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/laws_leave.hpp"
+#include "estimator/discovery/piece_residual.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/discovery/search_state.hpp"
 #include "estimator/discovery/shortlist.hpp"
@@ -45,19 +46,17 @@ class LawSearch::Search {
         options_(options),
         progress_(progress),
         scenes_(scenes_of(recordings)),
-        sums_(said("pieces of the recording", [&] { return sum_scenes(); })),
-        dictionary_(said("functions", [&] { return make_dictionary(sums_, available_in_all()); })),
-        information_(std::make_shared<const PieceInformation>(sums_.sums.information, dictionary_)),
-        model_(model_of_sums()),
-        shortlist_(sums_, dictionary_) {
+        residual_(scenes_, options.stop, progress),
+        shortlist_(residual_.sums(), residual_.dictionary()) {
     laws_on_ = laws_on(scenes_);
-    result_.misfit_before = sums_.sums.square - sums_.sums.rows;
-    result_.rows = sums_.sums.rows;
-    result_.functions_tried = dictionary_.functions.size() * axis_count;
+    const ColumnSums& sums = residual_.sums().sums;
+    result_.misfit_before = sums.square - sums.rows;
+    result_.rows = sums.rows;
+    result_.functions_tried = residual_.dictionary().functions.size() * axis_count;
     for (const UnitRecording& recording : recordings) {
       empty_.fit.recordings.push_back(without_any_law(recording.calibration));
     }
-    empty_.fit.square_after = sums_.sums.square;
+    empty_.fit.square_after = sums.square;
     state_ = empty_;
   }
 
@@ -72,8 +71,8 @@ class LawSearch::Search {
     bool process_left = significant(best_process());
     if (state_.terms.size() > 1 || process_left) {
       begin_with_two();
-    }
       process_left = significant(best_process());
+    }
     if (process_left || (may_stand_alone && !laws_are_likelier(alone))) {
       processes_too();
     }
@@ -100,7 +99,7 @@ class LawSearch::Search {
         law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
       }
       law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
-      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, available_in_all(), options_.stop);
+      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, residual_.available(), options_.stop);
     }
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
@@ -122,44 +121,6 @@ class LawSearch::Search {
     return work();
   }
 
-  std::size_t pieces_each() const { return pieces_of_each(scenes_.size()); }
-
-  PieceSums sum_scenes() {
-    std::vector<PieceSums> all;
-    for (const auto& scene : scenes_) {
-      all.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace, options_.stop, pieces_each()));
-      scene->table = all.back();
-    }
-    return join(std::move(all));
-  }
-
-  PieceSums sum_what_is_left() const {
-    std::vector<PieceSums> all;
-    for (std::size_t r = 0; r < scenes_.size(); ++r) {
-      const Scene& scene = *scenes_[r];
-      const diagnosis::CorrectedRecording rest =
-          without_laws(scene.motion, scene.table, scene.input, state_.terms, state_.fit.coefficient);
-      PassInput input = scene.input;
-      input.data = &rest.data();
-      all.push_back(
-          sum_over_pieces(scene.motion, input, trace_pass(input, options_.stop), options_.stop, pieces_each()));
-    }
-    return join(std::move(all));
-  }
-
-  // Of the residual that sums_ has now.
-  std::unique_ptr<PieceModel> model_of_sums() const {
-    return std::make_unique<PieceModel>(sums_, dictionary_, information_);
-  }
-
-  laws::VariableSet available_in_all() const {
-    laws::VariableSet available = scenes_.front()->motion.available();
-    for (const auto& scene : scenes_) {
-      available &= scene->motion.available();
-    }
-    return available;
-  }
-
   bool room() const {
     return static_cast<int>(state_.terms.size() + state_.processes.size()) < options_.most_terms &&
            !options_.stop.stop_requested();
@@ -168,7 +129,7 @@ class LawSearch::Search {
   // Laws that were found one by one against the best two together, and what these leave.
   void begin_with_two() {
     const std::optional<SearchState> two = said("two laws at once", [&] {
-      return two_laws(laws_on_, raw_model_ ? *raw_model_ : *model_, dictionary_, shortlist_, options_.false_alarm_rate,
+      return two_laws(laws_on_, residual_.whole_model(), residual_.dictionary(), shortlist_, options_.false_alarm_rate,
                       options_.stop);
     });
     if (!two) {
@@ -186,33 +147,13 @@ class LawSearch::Search {
     }
   }
 
-  // Score, residual and model of the recordings with their laws in.
-  void unsettle() {
-    if (raw_score_.size() > 0) {
-      sums_.sums.score = raw_score_;
-      sums_.sums.square = raw_square_;
-      raw_model_.reset();
-    }
-    model_ = model_of_sums();
-  }
-
-  // Of a law of 30 sigma the pieces leave what a process could take up. Score and residual become those without the laws.
+  // About what the laws leave, exactly.
   void settle() {
     if (state_.terms.empty()) {
-      if (raw_model_) {
-        unsettle();
-      }
+      residual_.put_back();
       return;
     }
-    const PieceSums settled = said("what the laws leave", [&] { return sum_what_is_left(); });
-    if (!raw_model_) {
-      raw_score_ = sums_.sums.score;
-      raw_square_ = sums_.sums.square;
-      raw_model_ = std::move(model_);
-    }
-    sums_.sums.score = settled.sums.score;
-    sums_.sums.square = settled.sums.square;
-    model_ = model_of_sums();
+    said("what the laws leave", [&] { residual_.take_out(state_.fit); });
     choose(state_.terms.size());
   }
 
@@ -221,7 +162,7 @@ class LawSearch::Search {
     const SearchState laws_first = state_;
     const double laws_first_posterior = log_posterior();
     state_ = empty_;
-    unsettle();
+    residual_.put_back();
     take_processes();
     take_laws();
     const double ahead = state_.processes.empty() ? -1.0 : log_posterior() - laws_first_posterior;
@@ -233,14 +174,16 @@ class LawSearch::Search {
       state_ = laws_first;
       if (state_.processes.empty()) {
         // What may stand in a law's place is asked of the recording with no process in it.
-        model_ = model_of_sums();
+        residual_.renew();
         choose(state_.terms.size());
       }
     }
   }
 
   // Logarithm of the posterior probability, but for a constant.
-  double log_posterior() const { return -0.5 * model_->square() - cost_of_processes() - cost_of_laws(state_); }
+  double log_posterior() const {
+    return -0.5 * residual_.model().square() - cost_of_processes() - cost_of_laws(state_);
+  }
 
   double cost_of_processes() const {
     return state_.half_log_determinant + std::log(process_count) * static_cast<double>(state_.processes.size());
@@ -259,14 +202,14 @@ class LawSearch::Search {
   bool laws_are_likelier(const ProcessFit& alone) const {
     const double saved = cost_of_laws(state_) - std::log(options_.least_odds);
     return !state_.terms.empty() &&
-           alone.half_log_determinant + std::log(process_count) - 0.5 * absorbed(*model_, alone) > saved;
+           alone.half_log_determinant + std::log(process_count) - 0.5 * absorbed(residual_.model(), alone) > saved;
   }
 
   void take_processes() {
     for (ProcessFit process = best_process(); significant(process) && room(); process = best_process()) {
-      const double before = model_->square();
-      model_->integrate_out(process.columns, process.size * process.size);
-      state_.half_log_determinant += 0.5 * (before - model_->square()) - process.log_likelihood_gain;
+      const double before = residual_.model().square();
+      residual_.model().integrate_out(process.columns, process.size * process.size);
+      state_.half_log_determinant += 0.5 * (before - residual_.model().square()) - process.log_likelihood_gain;
       state_.processes.push_back(
           {process.kind, process.axis, process.size, process.sigma, process.log_likelihood_gain, process.ahead});
     }
@@ -278,7 +221,7 @@ class LawSearch::Search {
       const bool there = std::any_of(state_.processes.begin(), state_.processes.end(),
                                      [&](const DiscoveredProcess& p) { return p.axis == axis; });
       if (!there) {
-        ProcessFit fit = likelier_process(*model_, sums_, axis);
+        ProcessFit fit = likelier_process(residual_.model(), residual_.sums(), axis);
         best = fit.log_likelihood_gain > best.log_likelihood_gain ? std::move(fit) : best;
       }
     }
@@ -296,7 +239,7 @@ class LawSearch::Search {
       progress_("law " + std::to_string(state_.terms.size() + 1));
     }
     const double limit = std::log(options_.false_alarm_rate);
-    std::vector<Candidate> candidates = shortlist_.best(*model_, shortlist_size);
+    std::vector<Candidate> candidates = shortlist_.best(residual_.model(), shortlist_size);
     if (candidates.empty() || log_p(candidates.front()) > limit) {
       state_.log_p_remaining = candidates.empty() ? 0.0 : std::min(0.0, log_p(candidates.front()));
       return false;
@@ -346,11 +289,11 @@ class LawSearch::Search {
     }
     model.choose(columns);
   }
-  void choose(std::size_t left_out) { project_out(*model_, left_out); }
+  void choose(std::size_t left_out) { project_out(residual_.model(), left_out); }
 
   // What explains the recording in the place of term k, exactly, with other values of its constant; `own`: the term as it stands.
   std::vector<std::vector<Candidate>> rivals(std::size_t k, std::size_t most, Candidate& own) {
-    PieceModel& model = raw_model_ ? *raw_model_ : *model_;  // what settle() took out is what the rivals are to explain
+    PieceModel& model = residual_.whole_model();  // what settle() took out is what the rivals are to explain
     project_out(model, k);
     const std::vector<Candidate> candidates = shortlist_.best(model, most);
     project_out(model, state_.terms.size());
@@ -404,7 +347,7 @@ class LawSearch::Search {
   LawClass class_of(std::size_t k) {
     Candidate own;
     const std::vector<std::vector<Candidate>> others = rivals(k, class_size, own);
-    PieceModel& model = raw_model_ ? *raw_model_ : *model_;
+    PieceModel& model = residual_.whole_model();
     project_out(model, k);
     const std::vector<Candidate> own_values = shortlist_.values_of_wave(model, own);
     project_out(model, state_.terms.size());
@@ -440,7 +383,8 @@ class LawSearch::Search {
     result_.log_p_remaining = state_.log_p_remaining;
     result_.refused = state_.refused;
     result_.fit = state_.fit;
-    result_.misfit_after = (state_.processes.empty() ? state_.fit.square_after : model_->square()) - result_.rows;
+    result_.misfit_after =
+        (state_.processes.empty() ? state_.fit.square_after : residual_.model().square()) - result_.rows;
   }
 
   std::span<const UnitRecording> recordings_;
@@ -448,16 +392,10 @@ class LawSearch::Search {
   Progress progress_;
   std::vector<std::unique_ptr<Scene>> scenes_;
   std::vector<LawRecording> laws_on_;  // the same, for fits
-  PieceSums sums_;                     // of all of them
-  Dictionary dictionary_;
-  std::shared_ptr<const PieceInformation> information_;  // of sums_
-  std::unique_ptr<PieceModel> model_;
-  std::unique_ptr<PieceModel> raw_model_;  // of the recording with its laws, once settle() took them out
+  PieceResidual residual_;
   Shortlist shortlist_;
   Discovery result_;
   SearchState empty_, state_;
-  Eigen::VectorXd raw_score_;  // before settle()
-  double raw_square_ = 0.0;
 };
 
 LawSearch::LawSearch(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,
