@@ -11,6 +11,7 @@
 #include "estimator/discovery/constant_spread.hpp"
 #include "estimator/discovery/departure.hpp"
 #include "estimator/discovery/known_form.hpp"
+#include "estimator/discovery/lack_of_fit.hpp"
 #include "estimator/discovery/law_class.hpp"
 #include "estimator/discovery/laws_leave.hpp"
 #include "estimator/discovery/piece_residual.hpp"
@@ -89,6 +90,10 @@ class LawSearch::Search {
       settle_class(k, laws[k]);  // which may put another equation in the place of one
     }
     write_down();
+    const bool laws_alone = state_.processes.empty();  // or what is left is no matter of the laws
+    if (laws_alone) {
+      settle();
+    }
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
       DiscoveredLaw& law = laws[k];
       write_numbers(law, state_, k, shortlist_.constants(state_.terms[k]));
@@ -100,6 +105,8 @@ class LawSearch::Search {
       }
       law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
       law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, residual_.available(), options_.stop);
+      law.overlap = overlap_on_axis(laws_on_, state_.fit, law.term.axis, options_.stop);
+      law.lack_log_p = laws_alone ? log_p_of_lack(residual_.model(), residual_.sums(), law.term.axis, gained()) : 0.0;
     }
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
@@ -192,7 +199,7 @@ class LawSearch::Search {
   bool significant(const ProcessFit& process) const {
     // What is less than this share of a strong law is the error of its linearisation as likely as anything else.
     constexpr double least_share = 0.005;
-    return 2.0 * process.log_likelihood_gain > least_share * (state_.fit.square_before - state_.fit.square_after) &&
+    return 2.0 * process.log_likelihood_gain > least_share * gained() &&
            log_chi_squared_tail(2.0 * process.log_likelihood_gain, 1.0) + std::log(process_count * shares) <
                std::log(options_.false_alarm_rate);
   }
@@ -376,6 +383,8 @@ class LawSearch::Search {
     tried.insert(tried.end(), beside.begin(), beside.end());
     law.stability = stability(laws_on_, all_but(state_.terms, k), tried, members, options_.stop);
   }
+
+  double gained() const { return state_.fit.square_before - state_.fit.square_after; }
 
   void write_down() {
     result_.processes = state_.processes;

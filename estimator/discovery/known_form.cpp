@@ -4,11 +4,16 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/discovery/search_state.hpp"
+
 namespace selfcal::discovery {
 namespace {
 
 constexpr double comparable = 0.5;  // share of the larger of two gains
 constexpr double more_likely_than_not = 0.5;
+// Two laws drawn by themselves share little: the 33 states, projected out of both, take what is alike in them. Of one law whose form
+// neither has, both do a part and the second mends the first.
+constexpr double largest_overlap = 1.0 / 3.0;
 // Of a law's gain: what its form may lack where it is to predict (carry_over.hpp).
 constexpr double shadow_share = 0.1;
 // Probability that the weaker law follows the stronger one's axis, beyond which it counts as its shadow. At one in twenty
@@ -43,7 +48,8 @@ bool form_is_known(int axis, const std::vector<DiscoveredLaw>& all, double depar
   int here = 0, unsure = 0;
   for (const DiscoveredLaw& law : all) {
     if (law.term.axis == axis) {
-      if (law.departure_log_p < std::log(departure_rate) || has_shadow(law, all)) {
+      if (std::min(law.departure_log_p, law.lack_log_p) < std::log(departure_rate) || law.overlap > largest_overlap ||
+          has_shadow(law, all)) {
         return false;
       }
       ++here;
@@ -69,6 +75,25 @@ bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double
   const bool process =
       std::any_of(processes.begin(), processes.end(), [&](const DiscoveredProcess& p) { return p.axis == axis; });
   return process || here > 2 || (here == 2 && least <= comparable * most);
+}
+
+double overlap_on_axis(std::span<const LawRecording> recordings, const LawFit& fit, int axis,
+                       const std::stop_token& stop) {
+  std::vector<LawTerm> elsewhere;
+  double each = 0.0;
+  for (std::size_t k = 0; k < fit.terms.size(); ++k) {
+    if (fit.terms[k].axis == axis) {
+      each += fit.gain[k];
+    } else {
+      elsewhere.push_back(fit.terms[k]);
+    }
+  }
+  if (fit.terms.size() < elsewhere.size() + 2) {
+    return 0.0;
+  }
+  const double without =
+      elsewhere.empty() ? fit.square_before : fit_laws(recordings, elsewhere, constant_rounds, stop).square_after;
+  return 1.0 - each / (without - fit.square_after);
 }
 
 TellingLaws tell_laws(std::vector<DiscoveredLaw> laws, std::span<const DiscoveredProcess> processes,

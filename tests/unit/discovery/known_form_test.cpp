@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <utility>
+#include <vector>
 
 using namespace selfcal::discovery;
 
@@ -37,6 +38,22 @@ TEST(KnownForm, TwoOfOneAxisAreToldWhereAlikeInSizeAndLikelyElsewhere) {
   EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 400.0)}), Counts(0, 2));
   EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 500.0, 0.33)}), Counts(0, 2));
   EXPECT_EQ(told_and_described({law(3, 900.0), law(3, 800.0), law(3, 700.0)}), Counts(0, 3));
+}
+
+TEST(KnownForm, TwoOfOneAxisThatDoEachOthersWorkAreDescribed) {
+  std::vector<DiscoveredLaw> laws = {law(3, 900.0), law(3, 800.0), law(0, 2000.0)};
+  laws[0].overlap = laws[1].overlap = 0.3;
+  EXPECT_EQ(told_and_described(laws), Counts(3, 0));
+  laws[0].overlap = laws[1].overlap = 0.4;
+  EXPECT_EQ(told_and_described(laws), Counts(1, 2));
+}
+
+TEST(KnownForm, AnAxisThatHoldsMoreThanItsLawIsDescribed) {
+  DiscoveredLaw lacks = law(4, 700.0);
+  lacks.lack_log_p = std::log(departure_rate) - 0.1;
+  EXPECT_EQ(told_and_described({lacks, law(0, 900.0)}), Counts(1, 1));
+  lacks.lack_log_p = std::log(departure_rate) + 0.1;
+  EXPECT_EQ(told_and_described({lacks, law(0, 900.0)}), Counts(2, 0));
 }
 
 TEST(KnownForm, AWeakLawThatIsUnsureElsewhereIsTold) {
