@@ -112,6 +112,9 @@ ordered_json law_json(const DiscoveredLaw& law) {
   if (!law.effect.empty()) {
     document["effect"] = law.effect;
   }
+  if (!law.why.empty()) {
+    document["why"] = law.why;
+  }
   if (law.unsure) {
     document["unsure"] = true;
   }

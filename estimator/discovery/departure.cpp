@@ -36,7 +36,8 @@ std::vector<Departure> departures_of(const LawTerm& law, const laws::VariableSet
       text.append("*").append(quantity);
       auto product = laws::Expression::parse(text);
       if (product && (product->variables() & ~available).none()) {
-        all.push_back({{law.axis, std::move(*product), law.constants}, share / static_cast<double>(quantities.size())});
+        all.push_back(
+            {{law.axis, std::move(*product), law.constants}, quantity, share / static_cast<double>(quantities.size())});
       }
     }
   };
@@ -45,26 +46,26 @@ std::vector<Departure> departures_of(const LawTerm& law, const laws::VariableSet
   return all;
 }
 
-double log_p_of_departure(std::span<const Departure> departures, std::span<const SingleFit> fits, double gain) {
-  double least = 0.0;
+Departed departed(std::span<const Departure> departures, std::span<const SingleFit> fits, double gain) {
+  Departed farthest;
   for (std::size_t d = 0; d < fits.size(); ++d) {
     if (fits[d].left > least_left && fits[d].gain > least_share * gain) {
-      least = std::min(least, log_chi_squared_tail(fits[d].gain, 1.0) - std::log(departures[d].belief));
+      const double log_p = log_chi_squared_tail(fits[d].gain, 1.0) - std::log(departures[d].belief);
+      farthest = log_p < farthest.log_p ? Departed{log_p, departures[d].quantity} : farthest;
     }
   }
-  return least;
+  return farthest;
 }
 
-double log_p_of_departure(std::span<const LawRecording> recordings, const LawFit& fit, std::size_t k,
-                          const laws::VariableSet& available, const std::stop_token& stop) {
+Departed departed(std::span<const LawRecording> recordings, const LawFit& fit, std::size_t k,
+                  const laws::VariableSet& available, const std::stop_token& stop) {
   const std::vector<Departure> departures = departures_of(fit.terms[k], available);
   std::vector<LawTerm> terms;
   terms.reserve(departures.size());
   for (const Departure& d : departures) {
     terms.push_back(d.term);
   }
-  return log_p_of_departure(departures, fit_each(recordings, fit.terms, terms, stop, GivenConstants::free),
-                            fit.gain[k]);
+  return departed(departures, fit_each(recordings, fit.terms, terms, stop, GivenConstants::free), fit.gain[k]);
 }
 
 }  // namespace selfcal::discovery

@@ -104,7 +104,9 @@ class LawSearch::Search {
         law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
       }
       law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
-      law.departure_log_p = log_p_of_departure(laws_on_, state_.fit, k, residual_.available(), options_.stop);
+      const Departed far = departed(laws_on_, state_.fit, k, residual_.available(), options_.stop);
+      law.departure_log_p = far.log_p;
+      law.departs_with = far.quantity;
       law.overlap = overlap_on_axis(laws_on_, state_.fit, law.term.axis, options_.stop);
       law.lack_log_p = laws_alone ? log_p_of_lack(residual_.model(), residual_.sums(), law.term.axis, gained()) : 0.0;
     }

@@ -63,9 +63,11 @@ struct DiscoveredLaw {
   double stability = 0.0;        // share of draws of three quarters of the dwells and rotations in which it, or what
                                  // cannot be told from it, explains most
   double departure_log_p = 0.0;  // that a true form departs as far (departure.hpp), the logarithm
+  std::string departs_with;      // the quantity where it departs most
   double lack_log_p = 0.0;       // that its axis, all laws on it true, leaves as much (lack_of_fit.hpp), the logarithm
   double overlap = 0.0;       // share of what the laws of its axis gain together that none gains alone (known_form.hpp)
   double carries_over = 0.0;  // probability that it leaves at most a tenth of the misfit on a plan never used
+  std::string why;            // it is described only, the end of a sentence (known_form.hpp); empty: it is told
   bool unsure = false;        // described only because it more probably fails there than not (known_form.hpp)
   std::vector<ClassMember> ambiguous;  // what this recording cannot tell from it, itself included, simplest first
 };

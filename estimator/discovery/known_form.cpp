@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "estimator/discovery/search_state.hpp"
 
@@ -44,25 +46,36 @@ bool is_unsure(const std::vector<DiscoveredLaw>& all) {
   return all.size() == 1 && all.front().gain > strong_gain && all.front().carries_over < more_likely_than_not;
 }
 
-bool form_is_known(int axis, const std::vector<DiscoveredLaw>& all, double departure_rate) {
+// Why the form of this axis is not known, empty where it is. `crowding`: what stands against it before the classes are looked at.
+std::string why_unknown(int axis, const std::vector<DiscoveredLaw>& all, std::string crowding, double departure_rate) {
+  if (!crowding.empty()) {
+    return crowding;
+  }
   int here = 0, unsure = 0;
   for (const DiscoveredLaw& law : all) {
-    if (law.term.axis == axis) {
-      if (std::min(law.departure_log_p, law.lack_log_p) < std::log(departure_rate) || law.overlap > largest_overlap ||
-          has_shadow(law, all)) {
-        return false;
-      }
-      ++here;
-      unsure += law.carries_over < more_likely_than_not ? 1 : 0;
+    if (law.term.axis != axis) {
+      continue;
     }
+    if (law.departure_log_p < std::log(departure_rate)) {
+      return "its form departs from the axis with " + law.departs_with;
+    }
+    if (law.lack_log_p < std::log(departure_rate)) {
+      return "positions and turns show more on the axis than it";
+    }
+    if (law.overlap > largest_overlap) {
+      return "it and another of the axis do each other's work";
+    }
+    if (has_shadow(law, all)) {
+      return "a much weaker one may as well be of this axis";
+    }
+    ++here;
+    unsure += law.carries_over < more_likely_than_not ? 1 : 0;
   }
-  return here == 1 || unsure == 0;
+  return here == 1 || unsure == 0 ? "" : "one of the axis' two more probably fails elsewhere";
 }
 
-}  // namespace
-
-bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double> gains,
-                std::span<const DiscoveredProcess> processes) {
+std::string crowding(int axis, std::span<const LawTerm> terms, std::span<const double> gains,
+                     std::span<const DiscoveredProcess> processes) {
   double least = 0.0, most = 0.0;
   int here = 0;
   for (std::size_t k = 0; k < terms.size(); ++k) {
@@ -72,9 +85,20 @@ bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double
       ++here;
     }
   }
-  const bool process =
-      std::any_of(processes.begin(), processes.end(), [&](const DiscoveredProcess& p) { return p.axis == axis; });
-  return process || here > 2 || (here == 2 && least <= comparable * most);
+  if (std::any_of(processes.begin(), processes.end(), [&](const DiscoveredProcess& p) { return p.axis == axis; })) {
+    return "the axis needs a random process beside it";
+  }
+  if (here > 2) {
+    return "more than two equations share the axis";
+  }
+  return here == 2 && least <= comparable * most ? "one of the axis' two does less than half the other" : "";
+}
+
+}  // namespace
+
+bool is_crowded(int axis, std::span<const LawTerm> terms, std::span<const double> gains,
+                std::span<const DiscoveredProcess> processes) {
+  return !crowding(axis, terms, gains, processes).empty();
 }
 
 double overlap_on_axis(std::span<const LawRecording> recordings, const LawFit& fit, int axis,
@@ -104,23 +128,26 @@ TellingLaws tell_laws(std::vector<DiscoveredLaw> laws, std::span<const Discovere
     terms.push_back(law.term);
     gains.push_back(law.gain);
   }
-  std::array<bool, axis_count> known{};
+  std::array<std::string, axis_count> why;
   double unknown = 0.0;
   for (const DiscoveredLaw& law : laws) {
-    const int axis = law.term.axis;
-    known[static_cast<std::size_t>(axis)] =
-        !is_crowded(axis, terms, gains, processes) && form_is_known(axis, laws, departure_rate);
-    unknown = known[static_cast<std::size_t>(axis)] ? unknown : std::max(unknown, law.gain);
+    std::string& of_axis = why[static_cast<std::size_t>(law.term.axis)];
+    of_axis = why_unknown(law.term.axis, laws, crowding(law.term.axis, terms, gains, processes), departure_rate);
+    unknown = of_axis.empty() ? unknown : std::max(unknown, law.gain);
   }
   TellingLaws result;
-  if (is_unsure(laws) && known[static_cast<std::size_t>(laws.front().term.axis)]) {
+  if (is_unsure(laws) && why[static_cast<std::size_t>(laws.front().term.axis)].empty()) {
     laws.front().unsure = true;
+    laws.front().why = "none of its class holds on another plan more probably than not";
     result.described = std::move(laws);
     return result;
   }
   for (DiscoveredLaw& law : laws) {
-    const bool told = law.gain > unknown && known[static_cast<std::size_t>(law.term.axis)];
-    (told ? result.told : result.described).push_back(std::move(law));
+    law.why = why[static_cast<std::size_t>(law.term.axis)];
+    if (law.why.empty() && law.gain <= unknown) {
+      law.why = "it may be what a stronger described one lacks";
+    }
+    (law.why.empty() ? result.told : result.described).push_back(std::move(law));
   }
   return result;
 }

@@ -145,12 +145,12 @@ std::string described_text(const Discovery& found, Detail detail) {
                 "  no equation holds on another plan more probably than not ({:.2f} the best of {}); a description of\n"
                 "  this recording, not to be used on another:\n",
                 found.described.front().carries_over, found.described.front().ambiguous.size())
-          : "  no equation of its own, for the axis does more than these forms hold; a description of\n"
-            "  this recording, not to be used on another:\n";
+          : "  a description of this recording, not to be used on another:\n";
   for (const DiscoveredLaw& law : found.described) {
     text += fmt::format("    {:<8} ({}) * {}, {:.0f} % of the misfit\n", name_of_axis(law.term.axis),
                         with_sigma(law.coefficient, law.sigma, unit_of_axis(law.term.axis)), law.expression,
                         100.0 * law.share);
+    text += law.unsure ? std::string() : fmt::format("      no equation, for {}\n", law.why);
     text += !law.unsure ? std::string() : detail == Detail::brief ? rivals_text(law) : class_text(law);
   }
   return text;

@@ -26,7 +26,7 @@ double log_p(std::size_t quantity, double gain, double of_law = 900.0, double le
   std::vector<SingleFit> fits(departures.size(), SingleFit{0.0, 1.0, 1.0, 0.5});
   fits[quantity].gain = gain;
   fits[quantity].left = left;
-  return log_p_of_departure(departures, fits, of_law);
+  return departed(departures, fits, of_law).log_p;
 }
 
 std::size_t place_of(const std::string& expression) {
@@ -64,6 +64,15 @@ TEST(Departure, SizesAreAskedAndQuantitiesThemselvesBelievedFirst) {
   EXPECT_NEAR(log_p(size, 20.0) - log_p(rate, 20.0), std::log(0.65 / 0.35), 1e-9);
 }
 
+TEST(Departure, TheQuantityOfTheFarthestIsNamed) {
+  const std::vector<Departure> departures = of_a_creep();
+  std::vector<SingleFit> fits(departures.size(), SingleFit{0.0, 1.0, 1.0, 0.5});
+  EXPECT_EQ(departed(departures, fits, 900.0).quantity, "");
+  fits[place_of("exp(-since/?)*fx*wx")].gain = 20.0;
+  fits[place_of("exp(-since/?)*fx*abs(wx)")].gain = 40.0;
+  EXPECT_EQ(departed(departures, fits, 900.0).quantity, "abs(wx)");
+}
+
 TEST(Departure, NotWhatIsTheLawInOtherWordsOrItsLinearisation) {
   EXPECT_EQ(log_p(0, 20.0, 900.0, 1e-4), 0.0);
   EXPECT_EQ(log_p(0, 40.0, 10000.0), 0.0);
@@ -85,7 +94,7 @@ TEST(Departure, OfTrueLawsOneInAHundred) {
       f.gain = std::pow(normal(engine), 2.0);
       any = any || f.gain > 6.635;  // 1 % of one
     }
-    refused += log_p_of_departure(departures, fits, 900.0) < std::log(0.01) ? 1 : 0;
+    refused += departed(departures, fits, 900.0).log_p < std::log(0.01) ? 1 : 0;
     uncorrected += any ? 1 : 0;
   }
   const double rate = static_cast<double>(refused) / laws;

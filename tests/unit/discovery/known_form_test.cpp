@@ -56,6 +56,19 @@ TEST(KnownForm, AnAxisThatHoldsMoreThanItsLawIsDescribed) {
   EXPECT_EQ(told_and_described({lacks, law(0, 900.0)}), Counts(2, 0));
 }
 
+// What is described says why, and what is told says nothing.
+TEST(KnownForm, WhatIsDescribedSaysWhy) {
+  DiscoveredLaw departs = law(4, 700.0);
+  departs.departure_log_p = -20.0;
+  departs.departs_with = "abs(wx)";
+  const TellingLaws t = tell_laws({law(0, 900.0), departs, law(1, 100.0)}, {}, departure_rate);
+  ASSERT_EQ(t.told.size(), 1U);
+  ASSERT_EQ(t.described.size(), 2U);
+  EXPECT_EQ(t.told.front().why, "");
+  EXPECT_EQ(t.described.front().why, "its form departs from the axis with abs(wx)");
+  EXPECT_EQ(t.described.back().why, "it may be what a stronger described one lacks");
+}
+
 TEST(KnownForm, AWeakLawThatIsUnsureElsewhereIsTold) {
   EXPECT_EQ(told_and_described({law(3, 100.0, 0.33)}), Counts(1, 0));
 }

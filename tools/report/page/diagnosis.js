@@ -211,7 +211,7 @@ function showDiagnosisTables(d) {
     add('Only described', element('p', {class: 'note'}, unsure.length > 0
         ? 'Several equations explain what this axis does, and none of them holds on another plan more probably than not. The best one describes this recording and is '
           + 'not to be used on another.'
-        : 'Only several equations together make up what this axis does: its form is none of them. They describe this recording and are not to be used on another.'),
+        : 'What these sensors do has a form that is none of those tried. The equations describe this recording and are not to be used on another.'),
     discoveredTable(described, [], 'described'), ...classTables(unsure), ...(unsure.length > 0 ? [nextExperiment(unsure)] : []));
   }
   if (d.unexplained && !explained(d)) {

@@ -18,6 +18,7 @@ function discoveredTable(laws, processes, id) {
     {title: 'law', cells: [...laws.map((l) => lawAsMath(textOf(l.expression))), ...processes.map((p) => textOf(p.process))], class: 'words'},
     ...(laws.some((l) => l.effect) ? [{title: 'as in the catalogue', cells: laws.map((l) => textOf(l.effect) || '–'), class: 'left'}] : []),
     {title: 'size ± σ', cells: all.map((l) => `${withSigma(l.coefficient, l.sigma)} ${unitSymbol(l.unit)}${l.process === 'random walk' ? '/√h' : ''}`)},
+    ...(laws.some((l) => l.why) ? [{title: 'no equation, for', cells: all.map((l) => textOf(l.why) || '–'), class: 'words'}] : []),
     {title: 'holds on another plan', cells: all.map((l) => (Number.isFinite(l.carries_over) ? `${significant(100 * l.carries_over, 2)} %` : '–'))},
   ], {id});
 }
