@@ -118,7 +118,8 @@ ordered_json law_json(const DiscoveredLaw& law) {
   if (law.unsure) {
     document["unsure"] = true;
   }
-  if (law.carries_over > 0.0) {  // else its class was not looked at
+  // Else its class was not looked at, or holds none that is the law.
+  if (law.carries_over > 0.0 && (law.why.empty() || law.unsure)) {
     document["stability"] = law.stability;
     document["carries_over"] = law.carries_over;
   }
