@@ -90,10 +90,6 @@ class LawSearch::Search {
       settle_class(k, laws[k]);  // which may put another equation in the place of one
     }
     write_down();
-    const bool laws_alone = state_.processes.empty();  // or what is left is no matter of the laws
-    if (laws_alone) {
-      settle();
-    }
     for (std::size_t k = 0; k < state_.terms.size(); ++k) {
       DiscoveredLaw& law = laws[k];
       write_numbers(law, state_, k, shortlist_.constants(state_.terms[k]));
@@ -107,9 +103,8 @@ class LawSearch::Search {
       const Departed far = departed(laws_on_, state_.fit, k, residual_.available(), options_.stop);
       law.departure_log_p = far.log_p;
       law.departs_with = far.quantity;
-      law.overlap = overlap_on_axis(laws_on_, state_.fit, law.term.axis, options_.stop);
-      law.lack_log_p = laws_alone ? log_p_of_lack(residual_.model(), residual_.sums(), law.term.axis, gained()) : 0.0;
     }
+    ask_axes(laws);
     std::stable_sort(laws.begin(), laws.end(),
                      [](const DiscoveredLaw& a, const DiscoveredLaw& b) { return a.gain > b.gain; });
     TellingLaws telling = tell_laws(std::move(laws), state_.processes, options_.departure_rate);
@@ -387,6 +382,28 @@ class LawSearch::Search {
   }
 
   double gained() const { return state_.fit.square_before - state_.fit.square_after; }
+
+  // What all laws of an axis together do, of axes whose form these do not rule out to be known already.
+  void ask_axes(std::vector<DiscoveredLaw>& laws) {
+    const bool laws_alone = state_.processes.empty();  // or what is left is no matter of the laws
+    if (laws_alone) {
+      settle();
+    }
+    for (int axis = 0; axis < axis_count; ++axis) {
+      const bool any = std::any_of(laws.begin(), laws.end(), [&](const auto& law) { return law.term.axis == axis; });
+      if (!any || is_crowded(axis, state_.terms, state_.fit.gain, state_.processes)) {
+        continue;
+      }
+      const double overlap = overlap_on_axis(laws_on_, state_.fit, axis, options_.stop);
+      const double lack = laws_alone ? log_p_of_lack(residual_.model(), residual_.sums(), axis, gained()) : 0.0;
+      for (DiscoveredLaw& law : laws) {
+        if (law.term.axis == axis) {
+          law.overlap = overlap;
+          law.lack_log_p = lack;
+        }
+      }
+    }
+  }
 
   void write_down() {
     result_.processes = state_.processes;

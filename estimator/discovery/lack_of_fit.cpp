@@ -1,12 +1,12 @@
 #include "estimator/discovery/lack_of_fit.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <vector>
 
+#include "estimator/diagnosis/regression/regression.hpp"
 #include "estimator/laws/expression.hpp"
 #include "estimator/statistics/distributions.hpp"
 
@@ -41,17 +41,12 @@ Eigen::MatrixXd grouped(const PieceSums& sums, bool with_turns) {
 }
 
 double log_p(const PieceModel& model, int axis, const Eigen::MatrixXd& means, double uncounted) {
-  constexpr double least_left = 1e-6;  // of a direction, of columns of information 1 each
+  constexpr double widest = 1000.0;  // of columns of information 1 each: directions of less than 1e-6 take no degree
   const auto [G, b] = model.project(axis, means);
   const Eigen::VectorXd scale = G.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * G * scale.asDiagonal());
-  const Eigen::Index degrees = (eigen.eigenvalues().array() > least_left).count();  // in ascending order
-  if (degrees == 0) {
-    return 0.0;
-  }
-  const Eigen::VectorXd along = eigen.eigenvectors().rightCols(degrees).transpose() * scale.cwiseProduct(b);
-  const double gain = (along.array().square() / eigen.eigenvalues().tail(degrees).array()).sum();
-  return log_chi_squared_tail(std::max(0.0, gain - uncounted), static_cast<double>(degrees));
+  const diagnosis::Fit fit =
+      diagnosis::fit_columns(scale.asDiagonal() * G * scale.asDiagonal(), scale.cwiseProduct(b), widest);
+  return fit.rank > 0 ? log_chi_squared_tail(std::max(0.0, fit.delta_chi2 - uncounted), fit.rank) : 0.0;
 }
 
 }  // namespace

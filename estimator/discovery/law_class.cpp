@@ -9,10 +9,6 @@ namespace {
 
 constexpr double largest_log_odds = 50.0;
 
-bool same_law(const LawTerm& a, const LawTerm& b) {
-  return a.axis == b.axis && a.expression.text() == b.expression.text();
-}
-
 bool nearly(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr double tolerance = 0.1;  // alternatives of a constant are farther apart
   return a.empty() || std::abs(a.front() - b.front()) < tolerance * std::abs(b.front());

@@ -9,6 +9,11 @@
 #include "estimator/discovery/pieces.hpp"
 
 namespace selfcal::discovery {
+
+bool same_law(const LawTerm& a, const LawTerm& b) {
+  return a.axis == b.axis && a.expression.text() == b.expression.text();
+}
+
 namespace {
 
 // Relative step of the derivative with respect to a constant: its square is the error, 1e-8 its rounding.

@@ -26,6 +26,9 @@ struct LawTerm {
   bool at_its_limit() const { return !constants.empty() && !(constants.front() > least && constants.front() < most); }
 };
 
+// Of the same form on the same axis, whatever their constants are.
+bool same_law(const LawTerm& a, const LawTerm& b);
+
 // One recording that laws are fitted to. All must outlive it; `table` and `trace` are those of a pass with this input, a
 // forward pass about the calibrated recording.
 struct LawRecording {

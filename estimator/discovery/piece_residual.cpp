@@ -6,9 +6,7 @@
 namespace selfcal::discovery {
 namespace {
 
-bool same(const LawTerm& a, const LawTerm& b) {
-  return a.axis == b.axis && a.constants == b.constants && a.expression.text() == b.expression.text();
-}
+bool same(const LawTerm& a, const LawTerm& b) { return same_law(a, b) && a.constants == b.constants; }
 
 void say(const Progress& progress, const char* words) {
   if (progress) {

@@ -213,9 +213,8 @@ std::vector<Candidate> Shortlist::best(const PieceModel& model, std::size_t most
   }
   const auto of_all = static_cast<std::ptrdiff_t>(all.size());
   for (Candidate& other : best_over_pieces(model.beside(*beside_known_), (most + 2) / 3)) {
-    const auto same = std::find_if(all.begin(), all.begin() + of_all, [&](const Candidate& c) {
-      return c.term.axis == other.term.axis && c.term.expression.text() == other.term.expression.text();
-    });
+    const auto same = std::find_if(all.begin(), all.begin() + of_all,
+                                   [&](const Candidate& c) { return same_law(c.term, other.term); });
     if (same == all.begin() + of_all) {
       all.push_back(std::move(other));
     } else {
