@@ -1,5 +1,6 @@
 #include "estimator/passes/dynamic_transition.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,8 +8,18 @@
 
 namespace selfcal {
 
-double BiasNoise::drive_variance(double length_s) const {
-  return rate * rate * length_s - sigma * sigma * std::expm1(-2.0 * length_s / correlation_s);
+bool BiasNoise::drawn_in(const Interval& interval) const {
+  const auto next = std::upper_bound(drawn_anew_s.begin(), drawn_anew_s.end(), interval.start_s);
+  return next != drawn_anew_s.end() && *next <= interval.end_s;
+}
+
+double BiasNoise::kept(const Interval& interval) const {
+  return drawn_in(interval) ? 0.0 : std::exp(-interval.length_s / correlation_s);
+}
+
+double BiasNoise::drive_variance(const Interval& interval) const {
+  const double forgotten = drawn_in(interval) ? 1.0 : -std::expm1(-2.0 * interval.length_s / correlation_s);
+  return rate * rate * interval.length_s + sigma * sigma * forgotten;
 }
 
 DynamicTransition::DynamicTransition(const ObservationModel& observation, std::vector<BiasNoise> biases,
@@ -25,7 +36,7 @@ const Eigen::MatrixXd& DynamicTransition::over(const Interval& interval) {
   for (int k = 0; k < static_cast<int>(biases_.size()); ++k) {
     const BiasNoise& bias = biases_[static_cast<std::size_t>(k)];
     const int at = first_bias() + k;
-    Phi_(at, at) = std::exp(-interval.length_s / bias.correlation_s);
+    Phi_(at, at) = bias.kept(interval);
     Phi_.col(at).head<StateLayout::navigation_count>() =
         0.5 * (1.0 + Phi_(at, at)) * interval.Gamma.col(bias.parameter);
   }

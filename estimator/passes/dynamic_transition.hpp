@@ -12,15 +12,19 @@ namespace selfcal {
 
 // A bias that changes with time; `parameter` is the bias among the 24. It wanders about its constant value, a Gauss-Markov process of
 // first order, stationary, the same when time runs backwards; or, with a rate and no correlation time, it walks away from what it
-// is where the pass begins.
+// is where the pass begins; or it keeps a value from one time to the next, at which it is drawn anew.
 struct BiasNoise {
   int parameter = 0;
   double sigma = 0.0;  // of what wanders, SI: m/s^2, rad/s; where the pass begins
   double correlation_s = HUGE_VAL;
-  double rate = 0.0;  // of what walks, per sqrt(s)
+  double rate = 0.0;                      // of what walks, per sqrt(s)
+  std::vector<double> drawn_anew_s = {};  // rising, recording's time: what wanders is forgotten, and drawn with `sigma`
 
-  // Of the part that an interval of this length adds.
-  double drive_variance(double length_s) const;
+  bool drawn_in(const Interval& interval) const;
+  // Share of its value at one end of an interval that is there at the other.
+  double kept(const Interval& interval) const;
+  // Of the part that an interval adds.
+  double drive_variance(const Interval& interval) const;
 };
 
 // Order: navigation errors, motion of the base, biases.

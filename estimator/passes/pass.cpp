@@ -247,7 +247,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
     if (layout.bias_count > 0) {
       L.rightCols(layout.bias_count) = transition.drive(interval);
       for (int k = 0; k < layout.bias_count; ++k) {
-        q(layout.biases() + k) = input.noise.biases[static_cast<std::size_t>(k)].drive_variance(interval.length_s);
+        q(layout.biases() + k) = input.noise.biases[static_cast<std::size_t>(k)].drive_variance(interval);
       }
     }
     filter.propagate(transition.over(interval), Gamma, model.drive, L, q);
