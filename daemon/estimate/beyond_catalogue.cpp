@@ -208,7 +208,7 @@ void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {
 }
 
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
-  if (diagnosis.unexplained && explains(found) && !found->laws.empty() && found->processes.empty()) {
+  if (diagnosis.unexplained && explains(found) && !found->average.parameters.empty()) {
     diagnosis.value = diagnosis.value_as_named = found->average.parameters.front();
     diagnosis.covariance = found->average.covariance.front();
     diagnosis.sigma = diagnosis.covariance.diagonal().cwiseSqrt();

@@ -445,7 +445,10 @@ Discovery LawSearch::told() {
   if (!found.laws.empty() && found.processes.empty()) {
     const LawFit told = fit_of_told(recordings, found, options.stop);
     found.average = average_over_classes(recordings, found, told, members_averaged, options.stop);
-    found.left = left_by_laws(recordings.front(), told, options.coloured);
+    found.left = left_by(recordings.front(), told, {}, options.coloured);
+  } else if (!found.processes.empty() && found.described.empty()) {
+    found.average = beside_processes(recordings, found.fit, found.processes, options.stop);
+    found.left = left_by(recordings.front(), found.fit, found.processes, options.coloured);
   }
   return found;
 }

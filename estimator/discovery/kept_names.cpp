@@ -80,7 +80,8 @@ bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diag
                            const std::stop_token& stop) {
   const auto of_a_sensor = [](const diagnosis::ModelEffect& e) { return e.effect->sensor != nullptr; };
   if (!d.unexplained || !d.rejected_by_remains_alone || d.rejected_model.empty() || found.laws.empty() ||
-      !found.described.empty() || !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
+      !found.processes.empty() || !found.described.empty() ||
+      !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
     return false;
   }
   std::vector<LawTerm> told;

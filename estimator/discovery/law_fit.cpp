@@ -71,6 +71,17 @@ void refine_constants(std::vector<LawTerm>& terms, const Eigen::VectorXd& value)
 
 }  // namespace
 
+Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(terms.size()) + constants_of(terms));
+  auto at = static_cast<Eigen::Index>(terms.size());
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    for (std::size_t c = 0; c < terms[k].constants.size(); ++c) {
+      scale(at++) = coefficient(static_cast<Eigen::Index>(k));
+    }
+  }
+  return scale;
+}
+
 LawColumns::LawColumns(const LawMotion& motion, const NodeTable& table, const std::vector<LawTerm>& terms,
                        bool derivatives)
     : motion_(motion), table_(table), count_(static_cast<int>(terms.size()) + (derivatives ? constants_of(terms) : 0)) {
@@ -157,18 +168,6 @@ JointSums sum_jointly(std::span<const LawRecording> recordings, const std::vecto
     all.each.push_back(std::move(sums));
   }
   return all;
-}
-
-// What turns a constant's derivative into the column of the constant: its term's coefficient. [terms + constants]
-Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(terms.size()) + constants_of(terms));
-  auto at = static_cast<Eigen::Index>(terms.size());
-  for (std::size_t k = 0; k < terms.size(); ++k) {
-    for (std::size_t c = 0; c < terms[k].constants.size(); ++c) {
-      scale(at++) = coefficient(static_cast<Eigen::Index>(k));
-    }
-  }
-  return scale;
 }
 
 FittedRecording fitted(const PassInput& input, const ColumnSums& sums, const LawFit& fit,

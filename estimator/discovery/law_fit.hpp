@@ -57,6 +57,9 @@ struct LawFit {
   std::vector<FittedRecording> recordings;
 };
 
+// What turns a constant's derivative into the column of the constant: its term's coefficient. [terms + constants]
+Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient);
+
 // Columns of the terms, each with the derivative with respect to each of its constants behind all of them.
 class LawColumns : public ColumnSource {
  public:

@@ -1,15 +1,52 @@
 #include "estimator/discovery/laws_leave.hpp"
 
+#include <Eigen/Cholesky>
+#include <cmath>
 #include <utility>
 
 #include "estimator/diagnosis/regression/evidence.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/search/quantities.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/discovery/column_pass.hpp"
+#include "estimator/discovery/law_motion.hpp"
+#include "estimator/discovery/pieces.hpp"
 #include "estimator/discovery/scene.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::discovery {
+namespace {
+
+constexpr double seconds_per_hour = 3600.0;
+
+// The parameter that is the bias of an axis, gyros first.
+int bias_of(int axis) { return axis < 3 ? parameter::gyro_drift + axis : parameter::accel_bias + axis - 3; }
+
+BiasNoise as_bias(const DiscoveredProcess& process, const diagnosis::RecordingContext& context) {
+  BiasNoise bias{.parameter = bias_of(process.axis)};
+  const double size = process.size * unit_of(process.axis);
+  if (process.kind == ProcessKind::random_walk) {
+    bias.rate = size / std::sqrt(seconds_per_hour);
+    return bias;
+  }
+  bias.sigma = size;
+  for (const diagnosis::Turn& turn : context.turns()) {
+    bias.drawn_anew_s.push_back(turn.start_s);
+  }
+  return bias;
+}
+
+// A forward pass over these increments of the recording, the processes in its filter.
+PassInput pass_with(const ImuData& data, const UnitRecording& recording, std::span<const DiscoveredProcess> processes,
+                    const diagnosis::RecordingContext& context) {
+  PassInput input = diagnosis::forward_pass(data, recording.calibration);
+  for (const DiscoveredProcess& process : processes) {
+    input.noise.biases.push_back(as_bias(process, context));
+  }
+  return input;
+}
+
+}  // namespace
 
 diagnosis::CorrectedRecording less_laws(const UnitRecording& recording, const LawFit& fit) {
   const diagnosis::RecordingContext context(recording.data);
@@ -31,7 +68,8 @@ LawFit fit_of_told(std::span<const UnitRecording> recordings, const Discovery& f
   return fit_laws(laws_on(scenes), std::move(told), 0, stop);
 }
 
-Left left_by_laws(const UnitRecording& recording, const LawFit& fit, bool coloured) {
+Left left_by(const UnitRecording& recording, const LawFit& fit, std::span<const DiscoveredProcess> processes,
+             bool coloured) {
   const diagnosis::CorrectedRecording rest = less_laws(recording, fit);
   const diagnosis::RecordingContext context(recording.data);
   std::vector<diagnosis::Candidate> bins = diagnosis::quantity_bins(context);
@@ -42,7 +80,7 @@ Left left_by_laws(const UnitRecording& recording, const LawFit& fit, bool colour
     columns += bin.count;
   }
   diagnosis::SignaturePass pass(context, bins, true);
-  const diagnosis::SignatureRows rows = pass.run(diagnosis::forward_pass(rest.data(), recording.calibration));
+  const diagnosis::SignatureRows rows = pass.run(pass_with(rest.data(), recording, processes, context));
   const diagnosis::Evidence evidence(rows);
   diagnosis::Shown shown{evidence.square, test_whiteness(rows.residual).log_p,
                          diagnosis::locate(evidence, pass.map(), pass.first_map_column(), {})};
@@ -55,6 +93,38 @@ Left left_by_laws(const UnitRecording& recording, const LawFit& fit, bool colour
   left.places = std::move(shown.map.places);
   left.by_quantity = diagnosis::locate_by_quantity(evidence, bins, {}, context.mean_temperature());
   return left;
+}
+
+ClassAverage beside_processes(std::span<const UnitRecording> recordings, const LawFit& fit,
+                              std::span<const DiscoveredProcess> processes, const std::stop_token& stop) {
+  ClassAverage beside;
+  for (const UnitRecording& recording : recordings) {
+    const diagnosis::RecordingContext context(recording.data);
+    const diagnosis::CorrectedRecording rest = less_laws(recording, fit);
+    const PassInput input = pass_with(rest.data(), recording, processes, context);
+    const PassTrace trace = trace_pass(input);
+    const int first = trace.pass.layout.parameters();
+    ParameterVector parameters = input.parameters + trace.pass.mean.segment<sensor_parameter_count>(first);
+    ParameterMatrix covariance =
+        trace.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first);
+    if (!fit.terms.empty()) {
+      // What is left of the laws where the processes take their part of what the fit gave to them.
+      const LawMotion motion(context);
+      LawColumns columns(motion, collect_nodes(motion, input), fit.terms, true);
+      const ColumnSums sums = run_columns(input, trace, columns, stop);
+      const Eigen::VectorXd scale = column_scale(fit.terms, fit.coefficient);
+      const Eigen::MatrixXd shift = sums.shift * scale.asDiagonal();
+      Eigen::MatrixXd information = scale.asDiagonal() * sums.information * scale.asDiagonal();
+      constexpr double wide = 100.0;  // of the fit's sigma: holds what the recording leaves open
+      information.diagonal() += (wide * wide * fit.covariance.diagonal()).cwiseInverse();
+      const Eigen::LDLT<Eigen::MatrixXd> solver(information);
+      parameters += shift * solver.solve(scale.asDiagonal() * sums.score);
+      covariance += shift * solver.solve(shift.transpose());
+    }
+    beside.parameters.push_back(parameters);
+    beside.covariance.push_back(covariance);
+  }
+  return beside;
 }
 
 }  // namespace selfcal::discovery

@@ -32,7 +32,7 @@ def effect(name, **keys):
 def answer(name, text, *arguments):
     """The document of a diagnosis of a recording in which the law is concealed."""
     (folder / f"{name}.toml").write_text(text)
-    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", "23", "-o", f"{name}.h5")
+    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", "23", "-o", f"{name}.h5", "--truth", f"{name}.json")
     return json.loads(run("diagnose", f"{name}.h5", "--json", *arguments, statuses=(0, 1)))
 
 
