@@ -365,7 +365,10 @@ void adopt(const JointFit& joint, Discovery& found) {
     }
   }
   // Beside a process each recording has its own 24: what it leaves open is not what the fit of the laws alone leaves.
-  for (std::size_t r = 0; found.processes.empty() && r < found.average.parameters.size(); ++r) {
+  if (!found.processes.empty()) {
+    return;
+  }
+  for (std::size_t r = 0; r < found.average.parameters.size(); ++r) {
     found.average.parameters[r] += joint.shared.parameters[r] - before.parameters[r];
     found.average.covariance[r] += joint.shared.covariance[r] - before.covariance[r];
   }

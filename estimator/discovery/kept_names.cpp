@@ -80,8 +80,7 @@ bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diag
                            const std::stop_token& stop) {
   const auto of_a_sensor = [](const diagnosis::ModelEffect& e) { return e.effect->sensor != nullptr; };
   if (!d.unexplained || !d.rejected_by_remains_alone || d.rejected_model.empty() || found.laws.empty() ||
-      !found.processes.empty() || !found.described.empty() ||
-      !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
+      !found.described.empty() || !std::all_of(d.rejected_model.begin(), d.rejected_model.end(), of_a_sensor)) {
     return false;
   }
   std::vector<LawTerm> told;
@@ -102,7 +101,7 @@ bool say_what_was_rejected(const UnitRecording& recording, const diagnosis::Diag
     }
   }
   const double chance = 2.0 * std::log(static_cast<double>(std::max<std::size_t>(1, found.functions_tried)));
-  return found.left && columns.by_all(coefficient) && columns.more_by_laws() < chance;
+  return found.processes.empty() && found.left && columns.by_all(coefficient) && columns.more_by_laws() < chance;
 }
 
 void keep_rejected_names(diagnosis::Diagnosis& d, const Discovery& found) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "estimator/diagnosis/regression/evidence.hpp"
+#include "estimator/diagnosis/search/bias_noise.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/search/quantities.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
@@ -12,21 +13,17 @@
 #include "estimator/discovery/law_motion.hpp"
 #include "estimator/discovery/pieces.hpp"
 #include "estimator/discovery/scene.hpp"
+#include "estimator/geometry/units.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
 namespace selfcal::discovery {
 namespace {
 
-constexpr double seconds_per_hour = 3600.0;
-
-// The parameter that is the bias of an axis, gyros first.
-int bias_of(int axis) { return axis < 3 ? parameter::gyro_drift + axis : parameter::accel_bias + axis - 3; }
-
 BiasNoise as_bias(const DiscoveredProcess& process, const diagnosis::RecordingContext& context) {
-  BiasNoise bias{.parameter = bias_of(process.axis)};
+  BiasNoise bias{.parameter = diagnosis::bias_of(process.axis)};
   const double size = process.size * unit_of(process.axis);
   if (process.kind == ProcessKind::random_walk) {
-    bias.rate = size / std::sqrt(seconds_per_hour);
+    bias.rate = size / std::sqrt(units::hour);
     return bias;
   }
   bias.sigma = size;
@@ -49,6 +46,9 @@ PassInput pass_with(const ImuData& data, const UnitRecording& recording, std::sp
 }  // namespace
 
 diagnosis::CorrectedRecording less_laws(const UnitRecording& recording, const LawFit& fit) {
+  if (fit.terms.empty()) {
+    return diagnosis::CorrectedRecording(recording.data);
+  }
   const diagnosis::RecordingContext context(recording.data);
   const LawMotion motion(context);
   const PassInput input = diagnosis::forward_pass(recording.data, recording.calibration);

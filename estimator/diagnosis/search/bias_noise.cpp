@@ -16,10 +16,6 @@ namespace {
 
 using Kind = BiasKernel::Kind;
 
-constexpr int gyro_drift_x = 3, accel_bias_x = 0;  // among the 24
-
-int bias_of(int axis) { return axis < 3 ? gyro_drift_x + axis : accel_bias_x + axis - 3; }
-
 // The likelihood of noise models about a stage, its terms at the sizes that they were taken out with: one trajectory for all. Where
 // another recording is compared with, as `log_likelihood` has it.
 class NoiseLikelihood {
@@ -168,6 +164,8 @@ double fit_kinds(const SearchGround& ground, const Stage& stage, const NoiseLike
 }
 
 }  // namespace
+
+int bias_of(int axis) { return axis < 3 ? parameter::gyro_drift + axis : parameter::accel_bias + axis - 3; }
 
 std::vector<std::vector<int>> open_axes(const Hypothesis& hypothesis) {
   // Sensors of one kind are alike: what each axis may do alone, a triad may do with one size.

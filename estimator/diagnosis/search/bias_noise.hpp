@@ -8,6 +8,9 @@
 
 namespace selfcal::diagnosis {
 
+// The parameter among the 24 that is the bias of an axis, gyros first.
+int bias_of(int axis);
+
 // Axes and triads that no process of the hypothesis takes.
 std::vector<std::vector<int>> open_axes(const Hypothesis& hypothesis);
 
