@@ -305,7 +305,7 @@ class Builder {
     if (column == dictionary_.means.cols()) {
       dictionary_.means.conservativeResize(mean.size(), std::max<Eigen::Index>(1024, 2 * column));
     }
-    dictionary_.means.col(column) = mean / rms;
+    dictionary_.means.col(column) = (mean / rms).cast<float>();
     scales_.push_back(rms);
     Function function{factors, Kernel::none, 0.0, -1, false, cost};
     const Factor& first = dictionary_.factors[static_cast<std::size_t>(factors.front())];

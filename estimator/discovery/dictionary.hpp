@@ -35,7 +35,9 @@ struct Function {
 struct Dictionary {
   std::vector<Factor> factors;
   std::vector<Function> functions;
-  Eigen::MatrixXd means;  // [pieces x functions], scaled to a root mean square of 1 over the time
+  // [pieces x functions], scaled to a root mean square of 1 over the time. Single precision serves to rank them: what is
+  // told is fitted to the recording itself.
+  Eigen::MatrixXf means;
   Eigen::VectorXd scale;  // [functions] what they were divided by
 
   // With `?` for the constant.

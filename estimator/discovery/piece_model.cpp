@@ -13,6 +13,50 @@ namespace {
 constexpr double least_left = 1e-4;
 constexpr double rounding = 1e-9;
 
+// Products with all functions of a dictionary are made of so many at a time, so that they stay in the cache. A wave's partner follows it and
+// is of its block.
+struct Block {
+  Eigen::Index first, count;
+};
+
+int partner_of(const Dictionary& dictionary, Eigen::Index k) {
+  return dictionary.functions[static_cast<std::size_t>(k)].partner;
+}
+
+std::vector<Block> blocks_of(const Dictionary& dictionary) {
+  constexpr Eigen::Index most = 1024;
+  std::vector<Block> all;
+  for (Eigen::Index first = 0; first < dictionary.means.cols(); first += all.back().count) {
+    const Eigen::Index count = std::min(most, dictionary.means.cols() - first);
+    const bool parts = partner_of(dictionary, first + count - 1) == first + count;
+    all.push_back({first, count + (parts ? 1 : 0)});
+  }
+  return all;
+}
+
+// Columns over pieces and axes, [pieces x columns] of each axis beside those of the one before.
+Eigen::MatrixXf axis_by_axis(const Eigen::MatrixXd& columns) {
+  const Eigen::Index pieces = columns.rows() / axis_count;
+  Eigen::MatrixXf all(pieces, axis_count * columns.cols());
+  for (int axis = 0; axis < axis_count; ++axis) {
+    all.middleCols(axis * columns.cols(), columns.cols()) =
+        columns(Eigen::seqN(axis, pieces, axis_count), Eigen::all).cast<float>();
+  }
+  return all;
+}
+
+// Dot products of a block's columns, one of each function, with those of their partners; 0 where there is none.
+Eigen::VectorXd beside_partner(const Dictionary& dictionary, const Block& block, const Eigen::MatrixXf& image) {
+  Eigen::VectorXd products = Eigen::VectorXd::Zero(block.count);
+  for (Eigen::Index k = 0; k < block.count; ++k) {
+    const int p = partner_of(dictionary, block.first + k);
+    if (p >= 0) {
+      products(k) = static_cast<double>(image.col(k).dot(image.col(p - block.first)));
+    }
+  }
+  return products;
+}
+
 }  // namespace
 
 double cost_of_phase(double gain) { return 0.5 * std::log(2.0 * std::numbers::pi * std::max(1.0, gain)); }
@@ -24,35 +68,23 @@ PieceInformation::PieceInformation(Eigen::MatrixXd information, const Dictionary
   }
 }
 
-// f'G f as the square of a root of G times f: half of the products, and in single precision still right to 1e-3 where a function has 1e-8
-// of the information of the largest.
+// f'G f as the square of a root of G times f: in single precision still right to 1e-3 where a function has 1e-8 of the information of the
+// largest.
 void PieceInformation::of_axis(int axis, const Dictionary& dictionary) {
   const auto rows = Eigen::seqN(axis, all.rows() / axis_count, axis_count);
-  const Eigen::MatrixXd& D = dictionary.means;
   const auto f = static_cast<std::size_t>(axis);
   own[f] = all(rows, rows);
   const Eigen::LDLT<Eigen::MatrixXd> root(own[f]);
   const Eigen::VectorXd size = root.vectorD().cwiseMax(0.0).cwiseSqrt();
   const Eigen::MatrixXd upper = root.matrixU();
   const Eigen::MatrixXf triangle = (size.asDiagonal() * upper).cast<float>();
-  function[f].resize(D.cols());
-  partner[f] = Eigen::VectorXd::Zero(D.cols());
-  Eigen::Index count = 0;
-  for (Eigen::Index first = 0; first < D.cols(); first += count) {
-    constexpr Eigen::Index most = 1024;  // that the image stays small
-    count = std::min(most, D.cols() - first);
-    const auto partner_of = [&](Eigen::Index k) { return dictionary.functions[static_cast<std::size_t>(k)].partner; };
-    count += partner_of(first + count - 1) == first + count ? 1 : 0;  // a wave's partner follows it
-    Eigen::MatrixXf image = D.middleCols(first, count).cast<float>();
-    image = root.transpositionsP() * image;
+  function[f].resize(dictionary.means.cols());
+  partner[f] = Eigen::VectorXd::Zero(dictionary.means.cols());
+  for (const Block& block : blocks_of(dictionary)) {
+    Eigen::MatrixXf image = root.transpositionsP() * dictionary.means.middleCols(block.first, block.count);
     image = triangle.triangularView<Eigen::Upper>() * image;
-    function[f].segment(first, count) = image.colwise().squaredNorm().transpose().cast<double>();
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const int p = partner_of(first + k);
-      if (p >= 0) {
-        partner[f](first + k) = static_cast<double>(image.col(k).dot(image.col(p - first)));
-      }
-    }
+    function[f].segment(block.first, block.count) = image.colwise().squaredNorm().transpose().cast<double>();
+    partner[f].segment(block.first, block.count) = beside_partner(dictionary, block, image);
   }
 }
 
@@ -61,20 +93,24 @@ std::shared_ptr<PieceInformation> PieceInformation::less(const Eigen::MatrixXd& 
   lower->all.selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
   lower->all.triangularView<Eigen::StrictlyUpper>() = lower->all.transpose();
   const Eigen::Index pieces = all.rows() / axis_count;
-  for (int axis = 0; axis < axis_count; ++axis) {
-    if (W.cols() >= pieces / 2) {
+  if (W.cols() >= pieces / 2) {
+    for (int axis = 0; axis < axis_count; ++axis) {
       lower->of_axis(axis, dictionary);
-      continue;
     }
+    return lower;
+  }
+  for (int axis = 0; axis < axis_count; ++axis) {
     const auto rows = Eigen::seqN(axis, pieces, axis_count);
-    const auto f = static_cast<std::size_t>(axis);
-    lower->own[f] = lower->all(rows, rows);
-    const Eigen::MatrixXd of_own = W(rows, Eigen::all);
-    const Eigen::MatrixXd taken = of_own.transpose() * dictionary.means;
-    lower->function[f] -= taken.colwise().squaredNorm().transpose();
-    for (Eigen::Index k = 0; k < taken.cols(); ++k) {
-      const int p = dictionary.functions[static_cast<std::size_t>(k)].partner;
-      lower->partner[f](k) -= p >= 0 ? taken.col(k).dot(taken.col(p)) : 0.0;
+    lower->own[static_cast<std::size_t>(axis)] = lower->all(rows, rows);
+  }
+  const Eigen::MatrixXf all_axes = axis_by_axis(W);
+  for (const Block& block : blocks_of(dictionary)) {
+    const Eigen::MatrixXf taken = all_axes.transpose() * dictionary.means.middleCols(block.first, block.count);
+    for (std::size_t f = 0; f < axis_count; ++f) {
+      const Eigen::MatrixXf of_axis = taken.middleRows(static_cast<Eigen::Index>(f) * W.cols(), W.cols());
+      lower->function[f].segment(block.first, block.count) -=
+          of_axis.colwise().squaredNorm().transpose().cast<double>();
+      lower->partner[f].segment(block.first, block.count) -= beside_partner(dictionary, block, of_axis);
     }
   }
   return lower;
@@ -103,15 +139,7 @@ PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary,
       information_(std::move(information)),
       score_(sums.sums.score),
       square_(sums.sums.square),
-      raw_square_(sums.sums.square) {
-  score_functions();
-}
-
-void PieceModel::score_functions() {
-  for (int axis = 0; axis < axis_count; ++axis) {
-    function_score_[static_cast<std::size_t>(axis)] = dictionary_.means.transpose() * own_score(axis);
-  }
-}
+      raw_square_(sums.sums.square) {}
 
 Eigen::VectorXd PieceModel::column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const {
   Eigen::VectorXd all = Eigen::VectorXd::Zero(score_.size());
@@ -150,7 +178,6 @@ void PieceModel::take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::Vecto
 void PieceModel::look_at(Eigen::VectorXd score, double square) {
   score_ = std::move(score);
   raw_square_ = square;
-  score_functions();
   choose({});
 }
 
@@ -160,7 +187,6 @@ PieceModel PieceModel::beside(const PieceProjection& columns) const {
   model.information_ = columns.left;
   model.score_ -= columns.W * b;
   model.raw_square_ -= b.squaredNorm();
-  model.score_functions();
   const Eigen::MatrixXd c = columns.root.matrixL().solve(columns.X.transpose() * chosen_image_);
   Eigen::MatrixXd A = chosen_information_ - c.transpose() * c;
   A.diagonal() += rounding * chosen_information_.diagonal();
@@ -178,7 +204,6 @@ void PieceModel::integrate_out(const Eigen::MatrixXd& X, double q) {
   information_ = information_->less(W, dictionary_);
   score_ -= W * b;
   raw_square_ -= b.squaredNorm();
-  score_functions();
   std::vector<Eigen::VectorXd> again;
   for (Eigen::Index k = 0; k < chosen_.cols(); ++k) {
     again.emplace_back(chosen_.col(k));
@@ -240,40 +265,35 @@ double PieceModel::gain(int axis, const Eigen::MatrixXd& means) const {
   return std::isfinite(gained) && gained > 0.0 ? gained : 0.0;
 }
 
+Eigen::MatrixXd PieceModel::chosen_root() const {
+  const Eigen::VectorXd size = chosen_solver_.vectorD().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd image = chosen_solver_.transpositionsP() * Eigen::MatrixXd(chosen_image_.transpose());
+  const Eigen::MatrixXd root = chosen_solver_.matrixL().solve(image);
+  return ((size.array() > 0.0).select(size.cwiseInverse(), 0.0).asDiagonal() * root).transpose();
+}
+
 std::vector<Ranked> PieceModel::rank(std::size_t most) const {
   std::vector<Ranked> all;
-  const Eigen::MatrixXd& D = dictionary_.means;
-  for (int axis = 0; axis < axis_count; ++axis) {
-    const auto f = static_cast<std::size_t>(axis);
-    Eigen::VectorXd information = information_->function[f], score = function_score_[f],
-                    partner = information_->partner[f];
-    if (chosen_image_.cols() > 0) {
-      const Eigen::MatrixXd cross = own_image(axis).transpose() * D;
-      const Eigen::MatrixXd solved = chosen_solver_.solve(cross);
-      information -= (cross.array() * solved.array()).colwise().sum().matrix().transpose();
-      score -= solved.transpose() * chosen_score_;
-      for (Eigen::Index k = 0; k < D.cols(); ++k) {
-        const int p = dictionary_.functions[static_cast<std::size_t>(k)].partner;
-        partner(k) -= p >= 0 ? cross.col(k).dot(solved.col(p)) : 0.0;
-      }
-    }
-    const auto seen = [&](Eigen::Index k) { return information(k) > least_left * whole().function[f](k); };
-    for (Eigen::Index k = 0; k < D.cols(); ++k) {
-      const Function& function = dictionary_.functions[static_cast<std::size_t>(k)];
-      if (function.second || !seen(k)) {
-        continue;
-      }
-      Ranked r{axis, static_cast<int>(k), score(k) * score(k) / information(k), 0.0};
-      if (function.partner >= 0 && seen(function.partner)) {
-        const double a = information(k), c = information(function.partner), x = partner(k);
-        const double determinant = a * c - x * x;
-        if (determinant > least_left * a * c) {
-          const double u = score(k), v = score(function.partner);
-          r.gain = (c * u * u - 2.0 * x * u * v + a * v * v) / determinant;
-        }
-      }
-      r.merit = 0.5 * r.gain - function.cost - (function.partner >= 0 ? cost_of_phase(r.gain) : 0.0);
-      all.push_back(r);
+  const Eigen::Index chosen = chosen_image_.cols();
+  // The chosen ones are taken off in double precision; what is single is the product of a function with what is left.
+  Eigen::MatrixXd columns(score_.size(), chosen + 1);
+  columns.col(chosen) = score_;
+  if (chosen > 0) {
+    columns.leftCols(chosen) = chosen_root();
+    columns.col(chosen) -= chosen_image_ * chosen_solver_.solve(chosen_score_);
+  }
+  const Eigen::MatrixXf all_axes = axis_by_axis(columns);
+  for (const Block& block : blocks_of(dictionary_)) {
+    const Eigen::MatrixXf products = all_axes.transpose() * dictionary_.means.middleCols(block.first, block.count);
+    for (int axis = 0; axis < axis_count; ++axis) {
+      const Eigen::MatrixXf taken = products.middleRows(axis * (chosen + 1), chosen);
+      const auto f = static_cast<std::size_t>(axis);
+      const BlockSums sums{
+          products.row(axis * (chosen + 1) + chosen).transpose().cast<double>(),
+          information_->function[f].segment(block.first, block.count) -
+              taken.colwise().squaredNorm().transpose().cast<double>(),
+          information_->partner[f].segment(block.first, block.count) - beside_partner(dictionary_, block, taken)};
+      rank_block(axis, block.first, sums, all);
     }
   }
   most = std::min(most, all.size());
@@ -281,6 +301,29 @@ std::vector<Ranked> PieceModel::rank(std::size_t most) const {
                     [](const Ranked& a, const Ranked& b) { return a.merit > b.merit; });
   all.resize(most);
   return all;
+}
+
+void PieceModel::rank_block(int axis, Eigen::Index first, const BlockSums& sums, std::vector<Ranked>& all) const {
+  const Eigen::VectorXd& before = whole().function[static_cast<std::size_t>(axis)];
+  const auto seen = [&](Eigen::Index k) { return sums.information(k) > least_left * before(first + k); };
+  for (Eigen::Index k = 0; k < sums.score.size(); ++k) {
+    const Function& function = dictionary_.functions[static_cast<std::size_t>(first + k)];
+    if (function.second || !seen(k)) {
+      continue;
+    }
+    Ranked r{axis, static_cast<int>(first + k), sums.score(k) * sums.score(k) / sums.information(k), 0.0};
+    const Eigen::Index other = function.partner - first;
+    if (function.partner >= 0 && seen(other)) {
+      const double a = sums.information(k), c = sums.information(other), x = sums.partner(k);
+      const double determinant = a * c - x * x;
+      if (determinant > least_left * a * c) {
+        const double u = sums.score(k), v = sums.score(other);
+        r.gain = (c * u * u - 2.0 * x * u * v + a * v * v) / determinant;
+      }
+    }
+    r.merit = 0.5 * r.gain - function.cost - (function.partner >= 0 ? cost_of_phase(r.gain) : 0.0);
+    all.push_back(r);
+  }
 }
 
 }  // namespace selfcal::discovery

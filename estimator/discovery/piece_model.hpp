@@ -84,7 +84,13 @@ class PieceModel {
   double square() const { return square_; }  // of the residuals, the chosen ones' gain taken off
 
  private:
-  void score_functions();
+  // Of a block of functions on one axis, the chosen ones projected out.
+  struct BlockSums {
+    Eigen::VectorXd score, information, partner;
+  };
+  void rank_block(int axis, Eigen::Index first, const BlockSums& sums, std::vector<Ranked>& all) const;
+  // G X L'^-1, L L' = X'G X: what the chosen ones take of a function's information is the square of its product with these.
+  Eigen::MatrixXd chosen_root() const;
   // From information and score of columns, whose products with the chosen ones are `cross`, [chosen x columns].
   void project_out_chosen(const Eigen::MatrixXd& cross, Eigen::MatrixXd& G, Eigen::VectorXd& b) const;
   // Chosen columns by their image, their information and their score.
@@ -106,7 +112,6 @@ class PieceModel {
   Eigen::MatrixXd chosen_information_;
   Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
   Eigen::VectorXd chosen_score_;
-  std::array<Eigen::VectorXd, axis_count> function_score_;  // of every function on every axis before projection
 };
 
 }  // namespace selfcal::discovery

@@ -64,7 +64,7 @@ Pool pool_of(const PieceModel& model, const Dictionary& dictionary, std::size_t 
   }
   std::array<Eigen::MatrixXd, axis_count> means;
   for (std::size_t f = 0; f < axis_count; ++f) {
-    means[f] = dictionary.means(Eigen::all, functions[f]);
+    means[f] = dictionary.means(Eigen::all, functions[f]).cast<double>();
   }
   std::tie(pool.information, pool.score) = model.project(means);
   const auto whiten = [&](const Member& m) {

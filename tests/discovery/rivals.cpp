@@ -49,7 +49,7 @@ std::vector<RivalLaw> stepwise(const PieceSums& sums, const laws::VariableSet& a
       break;
     }
     taken.push_back({best.front().axis, best.front().function});
-    columns.push_back(model.column(best.front().axis, dictionary.means.col(best.front().function)));
+    columns.push_back(model.column(best.front().axis, dictionary.means.col(best.front().function).cast<double>()));
     model.choose(columns);
   }
   const auto n = static_cast<Eigen::Index>(columns.size());

@@ -25,7 +25,7 @@ struct Rotation {
   Dictionary dictionary;
 
   Rotation() {
-    dictionary.means = drawn(pieces, 1, 3);
+    dictionary.means = drawn(pieces, 1, 3).cast<float>();
     dictionary.functions.resize(1);
   }
   // The residual: noise, and what a function over the pieces does on axis 2.
@@ -88,7 +88,7 @@ TEST(LackOfFit, OnePositionOrOneTurnIsSeen) {
 TEST(LackOfFit, WhatALawExplainsIsNoLack) {
   Rotation d;
   d.noise.setZero();
-  const Eigen::VectorXd law = 50.0 * d.dictionary.means.col(0);
+  const Eigen::VectorXd law = 50.0 * d.dictionary.means.col(0).cast<double>();
   d.conceal(law);
   PieceModel model(d.sums, d.dictionary);
   EXPECT_LT(log_p_of_lack(model, d.sums, 2, 0.0), std::log(1e-5));

@@ -24,7 +24,7 @@ struct TwoConcealed {
   Dictionary dictionary;
 
   explicit TwoConcealed(bool a_wave) {
-    dictionary.means = drawn(pieces, 6, 3);
+    dictionary.means = drawn(pieces, 6, 3).cast<float>();
     dictionary.functions.resize(6);
     for (int k = 0; k < 6; ++k) {
       dictionary.factors.push_back({std::string(1, static_cast<char>('a' + k)), Kernel::none, 0.0});
@@ -33,10 +33,11 @@ struct TwoConcealed {
     dictionary.functions[1].partner = 2;
     dictionary.functions[2].second = true;
     // The signature of function 3 on the first axis becomes the sum of both and a little more.
-    const Eigen::VectorXd first = signature(1, a_wave ? wave() : Eigen::VectorXd(dictionary.means.col(0)));
-    const Eigen::VectorXd second = signature(4, dictionary.means.col(5));
+    const Eigen::VectorXd first =
+        signature(1, a_wave ? wave() : Eigen::VectorXd(dictionary.means.col(0).cast<double>()));
+    const Eigen::VectorXd second = signature(4, dictionary.means.col(5).cast<double>());
     r = 40.0 * (first.normalized() + second.normalized());
-    const Eigen::VectorXd f = dictionary.means.col(3);
+    const Eigen::VectorXd f = dictionary.means.col(3).cast<double>();
     const Eigen::VectorXd change =
         first.normalized() + second.normalized() + 0.05 * drawn(rows, 1, 9) - signature(0, f);
     for (Eigen::Index p = 0; p < pieces; ++p) {
@@ -44,7 +45,9 @@ struct TwoConcealed {
     }
     sums = sums_of(Z, r);
   }
-  Eigen::VectorXd wave() const { return 0.8 * dictionary.means.col(1) + 0.6 * dictionary.means.col(2); }
+  Eigen::VectorXd wave() const {
+    return 0.8 * dictionary.means.col(1).cast<double>() + 0.6 * dictionary.means.col(2).cast<double>();
+  }
   Eigen::VectorXd signature(int axis, const Eigen::VectorXd& f) const { return of_axis(Z, axis) * f; }
 };
 
@@ -78,7 +81,7 @@ TEST(RankPairs, GainsWhatTheSquareFallsBy) {
       Eigen::MatrixXd::Identity(rows, rows) - Y * (Y.transpose() * Y).inverse() * Y.transpose();
   const auto columns_of = [&](const Ranked& ranked) -> Eigen::MatrixXd {
     const Eigen::Index wide = ranked.function == 1 ? 2 : 1;
-    return rest * of_axis(d.Z, ranked.axis) * d.dictionary.means.middleCols(ranked.function, wide);
+    return rest * of_axis(d.Z, ranked.axis) * d.dictionary.means.middleCols(ranked.function, wide).cast<double>();
   };
   const std::vector<RankedPair> pairs = rank_pairs(model, d.dictionary, 100);
   ASSERT_GT(pairs.size(), 10U);
