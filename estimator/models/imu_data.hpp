@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "estimator/geometry/earth.hpp"
@@ -19,6 +20,12 @@ struct Coast {
   Matrix3 turn = Matrix3::Identity();  // C_nb behind = C_nb before * turn, as far as it is known
 };
 
+// Smallest steps of the increments; 0 where none shows.
+struct Quanta {
+  double angle = 0.0;     // rad
+  double velocity = 0.0;  // m/s
+};
+
 struct ImuData {
   earth::Position site;                                // known position of the site
   double sample_rate_hz = 0.0;                         // nominal
@@ -29,6 +36,7 @@ struct ImuData {
   std::span<const double> gimbal_inner;                // [N] rad, may be empty
   std::span<const double> temperature;                 // [N] degC of the first channel, may be empty
   std::span<const Coast> coasts;                       // chronological, no two overlap; mostly empty
+  std::optional<Quanta> quanta;  // that the increments had before something was taken out of them; none: they show it
 
   std::size_t size() const { return time_s.size(); }
 };

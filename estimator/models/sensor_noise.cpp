@@ -189,10 +189,15 @@ double slow_group(const std::vector<Segment>& segments) {
 
 }  // namespace
 
+Quanta find_quanta(const ImuData& data) {
+  return data.quanta ? *data.quanta : Quanta{find_quantum(data.delta_theta), find_quantum(data.delta_v)};
+}
+
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments) {
   SensorNoise noise;
-  noise.gyro.quantum = find_quantum(data.delta_theta);
-  noise.accel.quantum = find_quantum(data.delta_v);
+  const Quanta quanta = find_quanta(data);
+  noise.gyro.quantum = quanta.angle;
+  noise.accel.quantum = quanta.velocity;
   const Spectrum accel = mean_spectrum(data.delta_v, data.sample_rate_hz, segments, fast_group_s);
   noise.spectra = accel.pieces;
   if (noise.spectra == 0) {

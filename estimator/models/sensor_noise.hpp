@@ -21,6 +21,9 @@ struct SensorNoise {
   std::size_t spectra = 0;  // pieces averaged; 0: the recording was too short to say anything
 };
 
+// As the recording says, or as its increments show.
+Quanta find_quanta(const ImuData& data);
+
 // Mean periodogram of the dwells, in a band chosen by whether the base moves (see the constants in the source), fitted with N^2 + 4 sin^2(pi f D)/D Q^2 (white rate plus white angle; IEEE Std 952, annex C) with spectral lines
 // left out. Gyros with a quantum on a still base: quantised_rate.hpp.
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments);

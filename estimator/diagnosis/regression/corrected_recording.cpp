@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "estimator/models/sensor_noise.hpp"
+
 namespace selfcal::diagnosis {
 
 CorrectedRecording::CorrectedRecording(const ImuData& original, AngleVelocity delta_theta, AngleVelocity delta_v)
@@ -9,6 +11,7 @@ CorrectedRecording::CorrectedRecording(const ImuData& original, AngleVelocity de
       data_(original) {
   data_.delta_theta = increments_->delta_theta;
   data_.delta_v = increments_->delta_v;
+  data_.quanta = find_quanta(original);
 }
 
 CorrectedRecording::CorrectedRecording(const RecordingContext& context, PassInput about, Correction correction)

@@ -14,7 +14,7 @@ class CorrectedRecording {
   CorrectedRecording() = default;
   // Nothing taken out.
   explicit CorrectedRecording(const ImuData& original) : data_(original) {}
-  // Other increments in the place of the original's.
+  // Other increments in the place of the original's. The sensors' quanta stay in them as noise: they are the original's.
   CorrectedRecording(const ImuData& original, AngleVelocity delta_theta, AngleVelocity delta_v);
   // `correction` taken out of the context's recording; attitude along it comes from navigating with `about`'s parameters and
   // start, whatever its data.

@@ -1,4 +1,6 @@
-"""Laws concealed in simulated recordings, and what a diagnosis answers. Used by a test as SELFCAL FOLDER."""
+"""Laws concealed in simulated recordings, and what a diagnosis answers. Used by a test as SELFCAL FOLDER [--all].
+
+A diagnosis takes ten seconds and more: without --all a test asks some of its cases."""
 import json
 import shutil
 import subprocess
@@ -7,6 +9,7 @@ from pathlib import Path
 
 SELFCAL = Path(sys.argv[1]).resolve()
 folder = Path(sys.argv[2])
+EVERY_CASE = "--all" in sys.argv[3:]
 faults = []
 
 
