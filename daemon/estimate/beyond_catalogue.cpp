@@ -208,9 +208,16 @@ void replace_process(diagnosis::Diagnosis& d, const Discovery& found) {
 }
 
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* found) {
-  if (diagnosis.unexplained && explains(found) && !found->average.parameters.empty()) {
-    diagnosis.value = diagnosis.value_as_named = found->average.parameters.front();
-    diagnosis.covariance = found->average.covariance.front();
+  if (diagnosis.unexplained && found != nullptr && !found->average.parameters.empty()) {
+    const ParameterVector& value = found->average.parameters.front();
+    const ParameterMatrix& covariance = found->average.covariance.front();
+    if (explains(found)) {
+      diagnosis.value = diagnosis.value_as_named = value;
+      diagnosis.covariance = covariance;
+    } else {  // neither is right: sigma holds both
+      const ParameterVector moved = value - diagnosis.value;
+      diagnosis.covariance += covariance + moved * moved.transpose();
+    }
     diagnosis.sigma = diagnosis.covariance.diagonal().cwiseSqrt();
   }
   if (diagnosis.unexplained && explains(found) && found->left) {

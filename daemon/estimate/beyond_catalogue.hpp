@@ -31,7 +31,8 @@ bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagno
 void replace_process(diagnosis::Diagnosis& diagnosis, const discovery::Discovery& found);
 
 // The diagnosis with the 24 as fitted with the laws, and with what these leave (`after`, `remaining`), where laws explain what the
-// catalogue leaves: the catalogue's rejected names correct nothing.
+// catalogue leaves: the catalogue's rejected names correct nothing. Where what is found explains too little the 24 stay, and their sigma
+// holds how far equations that are only described move them.
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
 
 // "accel_y and accel_z take a new offset at each turn"; "gyro_x follows abs(wz) or one of 22 others" where it matters which, for

@@ -1,7 +1,10 @@
 #include "estimator/discovery/class_average.hpp"
 
 #include <algorithm>
+#include <memory>
 
+#include "estimator/discovery/absorbed.hpp"
+#include "estimator/discovery/laws_leave.hpp"
 #include "estimator/discovery/scene.hpp"
 
 namespace selfcal::discovery {
@@ -48,45 +51,82 @@ std::size_t place_of(const DiscoveredLaw& law, const std::vector<LawTerm>& terms
   return static_cast<std::size_t>(found - terms.begin());
 }
 
+// Adds what the members of a law's class spread about the equation in which it is told. Of what is only described none is the law, and their
+// odds say nothing: all count alike, and the mean stays.
+void add_class(ClassAverage& average, const DiscoveredLaw& law, const LawFit& fit, const SharedParameters& as_found,
+               const std::vector<LawRecording>& recordings, std::size_t members, const std::stop_token& stop) {
+  const std::size_t place = place_of(law, fit.terms);
+  auto [own_odds, rivals] = words_of(law, members);
+  const bool told = law.why.empty();
+  if (!told) {
+    own_odds = 1.0;
+    for (Rival& rival : rivals) {
+      rival.odds = 1.0;
+    }
+  }
+  double total = own_odds;
+  for (const Rival& rival : rivals) {
+    total += rival.odds;
+  }
+  std::vector<ParameterVector> mean(recordings.size(), ParameterVector::Zero());
+  std::vector<ParameterMatrix> square(recordings.size(), ParameterMatrix::Zero());
+  for (const Rival& rival : rivals) {
+    if (place == fit.terms.size() || stop.stop_requested()) {
+      break;
+    }
+    std::vector<LawTerm> terms = fit.terms;
+    terms[place] = rival.term;
+    const SharedParameters instead = share_parameters(fit_laws(recordings, terms, 0, stop));
+    for (std::size_t r = 0; r < recordings.size(); ++r) {
+      const ParameterVector moved = instead.parameters[r] - as_found.parameters[r];
+      mean[r] += rival.odds / total * moved;
+      square[r] += rival.odds / total * moved * moved.transpose();
+    }
+  }
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    average.covariance[r] += square[r];
+    if (told) {
+      average.parameters[r] += mean[r];
+      average.covariance[r] -= mean[r] * mean[r].transpose();
+    }
+  }
+}
+
+// What is described may move the 24 as far again, and by what they take up of it unseen.
+void hold_described(ClassAverage& average, const std::vector<ParameterVector>& with,
+                    const std::vector<ParameterVector>& without, const std::vector<std::unique_ptr<Scene>>& scenes,
+                    std::span<const DiscoveredLaw> described) {
+  for (std::size_t r = 0; r < with.size(); ++r) {
+    const ParameterVector moved = without[r] - with[r];
+    average.covariance[r] += moved * moved.transpose();
+    average.covariance[r].diagonal() += absorbed(scenes[r]->table, described).cwiseAbs2();
+  }
+}
+
 }  // namespace
 
 ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
                                   const LawFit& told_alone, std::size_t members, const std::stop_token& stop) {
+  const bool beside = !found.processes.empty();
   const SharedParameters as_found = share_parameters(found.fit);
-  ClassAverage average{as_found.parameters, as_found.covariance};
-  if (!found.described.empty()) {
-    const SharedParameters without = share_parameters(told_alone);
-    for (std::size_t r = 0; r < recordings.size(); ++r) {
-      const ParameterVector moved = without.parameters[r] - as_found.parameters[r];
-      average.covariance[r] += moved * moved.transpose();
-    }
+  ClassAverage average = beside ? beside_processes(recordings, found.fit, found.processes, stop)
+                                : ClassAverage{as_found.parameters, as_found.covariance};
+  if (beside && found.described.empty()) {
+    return average;
   }
   const std::vector<std::unique_ptr<Scene>> scenes = scenes_with_tables(recordings);
-  for (const DiscoveredLaw& law : found.laws) {
-    const std::size_t place = place_of(law, found.fit.terms);
-    const auto [own_odds, rivals] = words_of(law, members);
-    double total = own_odds;
-    for (const Rival& rival : rivals) {
-      total += rival.odds;
-    }
-    std::vector<ParameterVector> mean(recordings.size(), ParameterVector::Zero());
-    std::vector<ParameterMatrix> square(recordings.size(), ParameterMatrix::Zero());
-    for (const Rival& rival : rivals) {
-      if (place == found.fit.terms.size() || stop.stop_requested()) {
-        break;
+  if (!found.described.empty()) {
+    hold_described(average, std::vector(average.parameters),
+                   beside ? beside_processes(recordings, told_alone, found.processes, stop).parameters
+                          : share_parameters(told_alone).parameters,
+                   scenes, found.described);
+  }
+  if (!beside) {
+    const std::vector<LawRecording> with_laws = laws_on(scenes);
+    for (const std::vector<DiscoveredLaw>* laws : {&found.laws, &found.described}) {
+      for (const DiscoveredLaw& law : *laws) {
+        add_class(average, law, found.fit, as_found, with_laws, members, stop);
       }
-      std::vector<LawTerm> terms = found.fit.terms;
-      terms[place] = rival.term;
-      const SharedParameters instead = share_parameters(fit_laws(laws_on(scenes), terms, 0, stop));
-      for (std::size_t r = 0; r < recordings.size(); ++r) {
-        const ParameterVector moved = instead.parameters[r] - as_found.parameters[r];
-        mean[r] += rival.odds / total * moved;
-        square[r] += rival.odds / total * moved * moved.transpose();
-      }
-    }
-    for (std::size_t r = 0; r < recordings.size(); ++r) {
-      average.parameters[r] += mean[r];
-      average.covariance[r] += square[r] - mean[r] * mean[r].transpose();
     }
   }
   return average;

@@ -2,7 +2,8 @@
 //
 // Where a class has several members, each of them in the law's place leads to its own 24. Their mean, weighted by the odds, and
 // their spread are the answer; that of several laws adds up, as if the choices were independent. What is only described is in
-// all of these fits, and its true form may move the 24 as far again as this one does.
+// all of these fits, with the spread of its own class, and its true form may move the 24 as far again as this one does, and farther by what they take up of it unseen
+// (absorbed.hpp). Beside a process no class is looked at.
 #pragma once
 
 #include <span>

@@ -442,13 +442,13 @@ Discovery LawSearch::told() {
   const std::span<const UnitRecording> recordings = search_->recordings();
   const DiscoveryOptions options = search_->options();
   search_.reset();  // what follows has passes and memory of its own
-  if (!found.laws.empty() && found.processes.empty()) {
-    const LawFit told = fit_of_told(recordings, found, options.stop);
-    found.average = average_over_classes(recordings, found, told, members_averaged, options.stop);
-    found.left = left_by(recordings.front(), told, {}, options.coloured);
-  } else if (!found.processes.empty() && found.described.empty()) {
-    found.average = beside_processes(recordings, found.fit, found.processes, options.stop);
-    found.left = left_by(recordings.front(), found.fit, found.processes, options.coloured);
+  if (found.laws.empty() && found.described.empty() && found.processes.empty()) {
+    return found;
+  }
+  const LawFit told = fit_of_told(recordings, found, options.stop);
+  found.average = average_over_classes(recordings, found, told, members_averaged, options.stop);
+  if (found.processes.empty() ? !found.laws.empty() : found.described.empty()) {
+    found.left = left_by(recordings.front(), told, found.processes, options.coloured);
   }
   return found;
 }

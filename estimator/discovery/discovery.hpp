@@ -118,8 +118,9 @@ struct Discovery {
   std::string refused;              // the best function that did not predict what was left out; empty: none
   std::size_t functions_tried = 0;  // functions times axes
   LawFit fit;                       // of the laws in the order in which they were found, with the 24 of each recording
-  ClassAverage average;      // empty where nothing is told; beside a process where something is only described too
-  std::optional<Left> left;  // of the first recording, where `average` is not empty
+  ClassAverage average;             // empty where nothing is told or described
+  std::optional<Left>
+      left;  // of the first recording, by what is told; beside a process none where something is only described
 };
 
 // One recording of the unit that is looked at. Both must outlive it.

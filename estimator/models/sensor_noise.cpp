@@ -112,12 +112,27 @@ void fit_density(const Spectrum& spectrum, std::optional<double> known_angle, do
   noise.increment_sigma = std::sqrt(angle);
 }
 
+// The first ones that are observations.
+std::vector<std::array<double, 3>> first_of(Increments increments, std::span<const Coast> coasts) {
+  constexpr std::size_t enough = 4000;
+  std::vector<std::array<double, 3>> first;
+  auto coast = coasts.begin();
+  for (std::size_t i = 0; i < increments.size() && first.size() < enough; ++i) {
+    while (coast != coasts.end() && coast->last <= i) {
+      ++coast;
+    }
+    if (coast == coasts.end() || i < coast->first) {
+      first.push_back(increments[i]);
+    }
+  }
+  return first;
+}
+
 // The quantum: increments that are whole multiples of a step larger than their own rounding.
-double find_quantum(Increments increments) {
-  const std::size_t count = std::min<std::size_t>(increments.size(), 4000);
+double find_quantum(const std::vector<std::array<double, 3>>& increments) {
   double smallest = 0.0;
-  for (std::size_t i = 0; i < count; ++i) {
-    for (const double x : increments[i]) {
+  for (const std::array<double, 3>& increment : increments) {
+    for (const double x : increment) {
       const double size = std::abs(x);
       if (size > 0.0 && (smallest == 0.0 || size < smallest)) {
         smallest = size;
@@ -137,7 +152,7 @@ double find_quantum(Increments increments) {
         return std::abs(ratio - std::round(ratio)) < 1e-3;
       });
     };
-    if (std::all_of(increments.begin(), increments.begin() + static_cast<std::ptrdiff_t>(count), whole)) {
+    if (std::all_of(increments.begin(), increments.end(), whole)) {
       return step;
     }
   }
@@ -190,7 +205,9 @@ double slow_group(const std::vector<Segment>& segments) {
 }  // namespace
 
 Quanta find_quanta(const ImuData& data) {
-  return data.quanta ? *data.quanta : Quanta{find_quantum(data.delta_theta), find_quantum(data.delta_v)};
+  return data.quanta ? *data.quanta
+                     : Quanta{find_quantum(first_of(data.delta_theta, data.coasts)),
+                              find_quantum(first_of(data.delta_v, data.coasts))};
 }
 
 SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment>& segments) {

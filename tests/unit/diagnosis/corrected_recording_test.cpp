@@ -56,6 +56,18 @@ TEST(CorrectedRecording, KeepsTheQuantaOfItsOriginal) {
   EXPECT_NEAR(find_quanta(twice.data()).angle, angle, 1e-6 * angle);
 }
 
+// What stands in the place of lost samples is no observation.
+TEST(CorrectedRecording, QuantaAreThoseOfObservations) {
+  Stepped s;
+  s.delta_theta[20] = {1e-7, 2e-7, 3e-7};
+  s.delta_v[21] = {1e-6, 2e-6, 3e-6};
+  ASSERT_EQ(find_quanta(s.data).angle, 0.0);
+  const std::vector<Coast> lost = {{.first = 5, .last = 7}, {.first = 20, .last = 22, .gyros = true}};
+  s.data.coasts = lost;
+  EXPECT_NEAR(find_quanta(s.data).angle, angle, 1e-6 * angle);
+  EXPECT_NEAR(find_quanta(s.data).velocity, velocity, 1e-6 * velocity);
+}
+
 // Where the sensors show no step none is seen in what is left.
 TEST(CorrectedRecording, HasNoQuantaWhereTheOriginalHasNone) {
   Stepped s;

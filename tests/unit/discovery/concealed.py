@@ -39,6 +39,12 @@ def answer(name, text, *arguments):
     return json.loads(run("diagnose", f"{name}.h5", "--json", *arguments, statuses=(0, 1)))
 
 
+def errors_of_the_24(name, told):
+    """Of each its error in sigma that is told."""
+    truth = {p["name"]: p["value"] for p in json.loads((folder / f"{name}.json").read_text())["parameters"]}
+    return {p["name"]: (p["value"] - truth[p["name"]]) / p["sigma"] for p in told["parameters"]}
+
+
 def end():
     for fault in faults:
         print("FAILED", fault)
