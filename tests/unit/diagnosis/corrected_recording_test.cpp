@@ -59,9 +59,9 @@ TEST(CorrectedRecording, KeepsTheQuantaOfItsOriginal) {
 // What stands in the place of lost samples is no observation.
 TEST(CorrectedRecording, QuantaAreThoseOfObservations) {
   Stepped s;
-  s.delta_theta[20] = {1e-7, 2e-7, 3e-7};
-  s.delta_v[21] = {1e-6, 2e-6, 3e-6};
-  ASSERT_EQ(find_quanta(s.data).angle, 0.0);
+  s.delta_theta[20] = {3.14159e-7, 2.71828e-7, 1.41421e-7};
+  s.delta_v[21] = {3.14159e-6, 2.71828e-6, 1.41421e-6};
+  ASSERT_EQ(find_quanta(s.data).angle, 0.0);  // or this shows nothing
   const std::vector<Coast> lost = {{.first = 5, .last = 7}, {.first = 20, .last = 22, .gyros = true}};
   s.data.coasts = lost;
   EXPECT_NEAR(find_quanta(s.data).angle, angle, 1e-6 * angle);
