@@ -58,13 +58,9 @@ AxisParameters parameters_of(int axis, const laws::Channels& channels) {
 
 ParameterVector absorbed(const NodeTable& table, std::span<const DiscoveredLaw> described) {
   ParameterVector sigma = ParameterVector::Zero();
-  const auto nodes = static_cast<Eigen::Index>(table.nodes.size());
-  Eigen::VectorXd dt(nodes);
-  for (Eigen::Index k = 0; k < nodes; ++k) {
-    dt(k) = table.nodes[static_cast<std::size_t>(k)].dt;
-  }
+  const Eigen::VectorXd dt = dt_of(table);
   for (int axis = 0; axis < axis_count; ++axis) {
-    Eigen::VectorXd law = Eigen::VectorXd::Zero(nodes);
+    Eigen::VectorXd law = Eigen::VectorXd::Zero(dt.size());
     for (const DiscoveredLaw& d : described) {
       if (d.term.axis == axis) {
         law += d.coefficient * unit_of(axis) * d.term.expression.evaluate(table.channels, d.term.constants).matrix();

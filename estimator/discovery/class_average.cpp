@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "estimator/discovery/absorbed.hpp"
 #include "estimator/discovery/laws_leave.hpp"
@@ -53,8 +54,9 @@ std::size_t place_of(const DiscoveredLaw& law, const std::vector<LawTerm>& terms
 
 // Adds what the members of a law's class spread about the equation in which it is told. Of what is only described none is the law, and their
 // odds say nothing: all count alike, and the mean stays.
-void add_class(ClassAverage& average, const DiscoveredLaw& law, const LawFit& fit, const SharedParameters& as_found,
-               const std::vector<LawRecording>& recordings, std::size_t members, const std::stop_token& stop) {
+void add_class(ClassAverage& average, const DiscoveredLaw& law, const LawFit& fit,
+               const std::vector<ParameterVector>& as_found, const std::vector<LawRecording>& recordings,
+               std::size_t members, const std::stop_token& stop) {
   const std::size_t place = place_of(law, fit.terms);
   auto [own_odds, rivals] = words_of(law, members);
   const bool told = law.why.empty();
@@ -78,7 +80,7 @@ void add_class(ClassAverage& average, const DiscoveredLaw& law, const LawFit& fi
     terms[place] = rival.term;
     const SharedParameters instead = share_parameters(fit_laws(recordings, terms, 0, stop));
     for (std::size_t r = 0; r < recordings.size(); ++r) {
-      const ParameterVector moved = instead.parameters[r] - as_found.parameters[r];
+      const ParameterVector moved = instead.parameters[r] - as_found[r];
       mean[r] += rival.odds / total * moved;
       square[r] += rival.odds / total * moved * moved.transpose();
     }
@@ -108,18 +110,21 @@ void hold_described(ClassAverage& average, const std::vector<ParameterVector>& w
 ClassAverage average_over_classes(std::span<const UnitRecording> recordings, const Discovery& found,
                                   const LawFit& told_alone, std::size_t members, const std::stop_token& stop) {
   const bool beside = !found.processes.empty();
-  const SharedParameters as_found = share_parameters(found.fit);
-  ClassAverage average = beside ? beside_processes(recordings, found.fit, found.processes, stop)
-                                : ClassAverage{as_found.parameters, as_found.covariance};
+  const auto average_of = [&](const LawFit& fit) {
+    if (beside) {
+      return beside_processes(recordings, fit, found.processes, stop);
+    }
+    SharedParameters shared = share_parameters(fit);
+    return ClassAverage{std::move(shared.parameters), std::move(shared.covariance)};
+  };
+  ClassAverage average = average_of(found.fit);
   if (beside && found.described.empty()) {
     return average;
   }
+  const std::vector<ParameterVector> as_found = average.parameters;
   const std::vector<std::unique_ptr<Scene>> scenes = scenes_with_tables(recordings);
   if (!found.described.empty()) {
-    hold_described(average, std::vector(average.parameters),
-                   beside ? beside_processes(recordings, told_alone, found.processes, stop).parameters
-                          : share_parameters(told_alone).parameters,
-                   scenes, found.described);
+    hold_described(average, as_found, average_of(told_alone).parameters, scenes, found.described);
   }
   if (!beside) {
     const std::vector<LawRecording> with_laws = laws_on(scenes);

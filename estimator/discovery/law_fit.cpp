@@ -85,12 +85,8 @@ Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::Vec
 LawColumns::LawColumns(const LawMotion& motion, const NodeTable& table, const std::vector<LawTerm>& terms,
                        bool derivatives)
     : motion_(motion), table_(table), count_(static_cast<int>(terms.size()) + (derivatives ? constants_of(terms) : 0)) {
-  const auto n = static_cast<Eigen::Index>(table.nodes.size());
-  Eigen::ArrayXd dt(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    dt(k) = table.nodes[static_cast<std::size_t>(k)].dt;
-  }
-  integrals_.resize(n, count_);
+  const Eigen::ArrayXd dt = dt_of(table);
+  integrals_.resize(dt.size(), count_);
   const auto put = [&](int axis, const Eigen::ArrayXd& values) {
     integrals_.col(static_cast<Eigen::Index>(axes_.size())) =
         values.isFinite().select(values, 0.0) * dt * unit_of(axis);

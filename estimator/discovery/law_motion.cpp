@@ -165,4 +165,10 @@ NodeTable collect_nodes(const LawMotion& motion, const PassInput& input) {
   return table;
 }
 
+Eigen::ArrayXd dt_of(const NodeTable& table) {
+  Eigen::ArrayXd dt(static_cast<Eigen::Index>(table.nodes.size()));
+  std::transform(table.nodes.begin(), table.nodes.end(), dt.begin(), [](const Node& node) { return node.dt; });
+  return dt;
+}
+
 }  // namespace selfcal::discovery

@@ -56,5 +56,7 @@ class LawMotion {
 
 // The nodes of a pass with this input.
 NodeTable collect_nodes(const LawMotion& motion, const PassInput& input);
+// [nodes] s
+Eigen::ArrayXd dt_of(const NodeTable& table);
 
 }  // namespace selfcal::discovery
