@@ -1,5 +1,6 @@
 #include "estimator/discovery/column_pass.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -116,6 +117,45 @@ class Tracer : public PassObserver {
 };
 
 }  // namespace
+
+Eigen::MatrixXd solve_scaled(const Eigen::MatrixXd& information, const Eigen::MatrixXd& b) {
+  // Nearer than this to the span of the others a column is collinear with them.
+  constexpr double least_left = 1e-9;
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd A = scale.asDiagonal() * information * scale.asDiagonal();
+  A.diagonal().array() += least_left;
+  return scale.asDiagonal() * A.ldlt().solve(scale.asDiagonal() * b);
+}
+
+ColumnSums project_out(const ColumnSums& sums, int first, int count, RowSink* rows) {
+  const auto n = static_cast<int>(sums.score.size());
+  std::vector<int> stay, out;
+  for (int k = 0; k < n; ++k) {
+    (k >= first && k < first + count ? out : stay).push_back(k);
+  }
+  const Eigen::MatrixXd G = sums.information(out, out);
+  const auto solve = [&G](const Eigen::MatrixXd& b) { return solve_scaled(G, b); };
+  const Eigen::MatrixXd cross = sums.information(out, stay), taken = solve(cross);
+  const Eigen::VectorXd score = sums.score(out), value = solve(score);
+  const Eigen::MatrixXd shift = sums.shift(Eigen::all, out);
+  ColumnSums left;
+  left.information = sums.information(stay, stay) - cross.transpose() * taken;
+  left.score = sums.score(stay) - cross.transpose() * value;
+  left.square = sums.square - score.dot(value);
+  left.rows = sums.rows;
+  left.shift = sums.shift(Eigen::all, stay) - shift * taken;
+  left.pass = sums.pass;
+  const int parameters = sums.pass.layout.parameters();
+  left.pass.mean.segment<sensor_parameter_count>(parameters) += shift * value;
+  left.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(parameters, parameters) +=
+      shift * solve(shift.transpose());
+  if (rows != nullptr) {
+    const Eigen::MatrixXd of_out = rows->columns(Eigen::all, out);
+    rows->columns = rows->columns(Eigen::all, stay) - of_out * taken;
+    rows->residual -= of_out * value;
+  }
+  return left;
+}
 
 PassTrace trace_pass(const PassInput& input, const std::stop_token& stop) {
   PassTrace trace;

@@ -48,6 +48,13 @@ struct RowSink {
   std::vector<double> time_s;  // [rows] middle of the interval, recording's time
 };
 
+// x of least |x| in units of the columns' lengths with information * x = b, columns of b: collinear ones count once.
+Eigen::MatrixXd solve_scaled(const Eigen::MatrixXd& information, const Eigen::MatrixXd& b);
+
+// Columns from `first` on, `count` of them, projected out as the 33 states are: what is left are the sums of a filter that has their
+// coefficients among its states, unknown before. So are the rows of the sink. Collinear ones count once.
+ColumnSums project_out(const ColumnSums& sums, int first, int count, RowSink* rows = nullptr);
+
 // With `rows` the rows are kept too (few columns only). `trace`: of a pass with this input.
 ColumnSums run_columns(const PassInput& input, const PassTrace& trace, ColumnSource& source,
                        const std::stop_token& stop = {}, RowSink* rows = nullptr);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/diagnosis.hpp"
+#include "estimator/discovery/effect_columns.hpp"
 #include "estimator/discovery/law_fit.hpp"
 #include "estimator/discovery/process.hpp"
 #include "estimator/passes/calibration.hpp"
@@ -127,6 +128,8 @@ struct Discovery {
 struct UnitRecording {
   const ImuData& data;
   const CalibrationResult& calibration;  // that of the 24 alone (diagnosis/still_calibration.hpp) of `data`
+  // Effects whose coefficients are unknown beside the 24, as they were taken out of `data`: projected out of all that is searched and fitted.
+  std::span<const EffectTerm> beside = {};
 };
 
 using Progress = std::function<void(const std::string&)>;

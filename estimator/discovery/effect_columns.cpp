@@ -23,7 +23,7 @@ Integrals integrals(const EffectTerm& term, double constant, const diagnosis::Ef
 
 }  // namespace
 
-EffectColumns::EffectColumns(const diagnosis::RecordingContext& context, const std::vector<EffectTerm>& terms)
+EffectColumns::EffectColumns(const diagnosis::RecordingContext& context, std::span<const EffectTerm> terms)
     : context_(context), terms_(terms) {
   for (const EffectTerm& term : terms) {
     count_ += term.count();
@@ -53,6 +53,17 @@ void TwoSources::block(const SensorBlock& block, Eigen::Ref<Eigen::Matrix3Xd> ve
                        Eigen::Ref<Eigen::Matrix3Xd> angle) {
   first_.block(block, velocity.leftCols(first_.count()), angle.leftCols(first_.count()));
   second_.block(block, velocity.rightCols(second_.count()), angle.rightCols(second_.count()));
+}
+
+ColumnSums run_beside(std::span<const EffectTerm> effects, const diagnosis::RecordingContext& context,
+                      const PassInput& input, const PassTrace& trace, ColumnSource& columns,
+                      const std::stop_token& stop, RowSink* rows) {
+  if (effects.empty()) {
+    return run_columns(input, trace, columns, stop, rows);
+  }
+  EffectColumns of_effects(context, effects);
+  TwoSources both(of_effects, columns);  // those that begin later stand behind
+  return project_out(run_columns(input, trace, both, stop, rows), 0, of_effects.count(), rows);
 }
 
 }  // namespace selfcal::discovery

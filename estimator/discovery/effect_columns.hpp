@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "estimator/diagnosis/effects/effect.hpp"
@@ -24,7 +25,7 @@ struct EffectTerm {
 class EffectColumns : public ColumnSource {
  public:
   // Both must outlive it.
-  EffectColumns(const diagnosis::RecordingContext& context, const std::vector<EffectTerm>& terms);
+  EffectColumns(const diagnosis::RecordingContext& context, std::span<const EffectTerm> terms);
   int count() const override { return count_; }
   int active(double /*time_s*/) const override { return count_; }
   bool block_ends_before(std::size_t sample) const override { return context_.divides(sample); }
@@ -33,7 +34,7 @@ class EffectColumns : public ColumnSource {
 
  private:
   const diagnosis::RecordingContext& context_;
-  const std::vector<EffectTerm>& terms_;
+  std::span<const EffectTerm> terms_;
   int count_ = 0;
 };
 
@@ -51,5 +52,11 @@ class TwoSources : public ColumnSource {
  private:
   ColumnSource &first_, &second_;
 };
+
+// run_columns with the effects' coefficients, and constants that are free, projected out of everything. `context`: of the recording that
+// `trace` is of.
+ColumnSums run_beside(std::span<const EffectTerm> effects, const diagnosis::RecordingContext& context,
+                      const PassInput& input, const PassTrace& trace, ColumnSource& columns,
+                      const std::stop_token& stop = {}, RowSink* rows = nullptr);
 
 }  // namespace selfcal::discovery

@@ -145,7 +145,7 @@ JointSums sum_jointly(std::span<const LawRecording> recordings, const std::vecto
   for (const LawRecording& r : recordings) {
     LawColumns source(r.motion, r.table, terms, true);
     RowSink sink;
-    ColumnSums sums = run_columns(r.input, r.trace, source, stop, &sink);
+    ColumnSums sums = run_beside(r.beside, r.motion.context(), r.input, r.trace, source, stop, &sink);
     if (all.each.empty()) {
       all.information = Eigen::MatrixXd::Zero(source.count(), source.count());
       all.score = Eigen::VectorXd::Zero(source.count());
@@ -245,7 +245,7 @@ std::vector<SingleFit> fit_each(std::span<const LawRecording> recordings, const 
   Eigen::VectorXd score;
   for (const LawRecording& r : recordings) {
     LawColumns source(r.motion, r.table, all, free);
-    const ColumnSums sums = run_columns(r.input, r.trace, source, stop);
+    const ColumnSums sums = run_beside(r.beside, r.motion.context(), r.input, r.trace, source, stop);
     information = information.size() == 0 ? sums.information : Eigen::MatrixXd(information + sums.information);
     score = score.size() == 0 ? sums.score : Eigen::VectorXd(score + sums.score);
   }

@@ -10,6 +10,7 @@
 
 #include "estimator/diagnosis/regression/corrected_recording.hpp"
 #include "estimator/discovery/column_pass.hpp"
+#include "estimator/discovery/effect_columns.hpp"
 #include "estimator/discovery/law_motion.hpp"
 #include "estimator/laws/expression.hpp"
 
@@ -36,6 +37,7 @@ struct LawRecording {
   const NodeTable& table;
   const PassInput& input;
   const PassTrace& trace;
+  std::span<const EffectTerm> beside = {};  // projected out: UnitRecording
 };
 
 // The 24 of one recording with the laws, SI.

@@ -167,7 +167,7 @@ Started started(std::vector<LawTerm> laws, const std::vector<std::unique_ptr<Sce
   std::vector<PieceSums> each;
   each.reserve(scenes.size());
   for (const auto& scene : scenes) {
-    each.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace));
+    each.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace, scene->beside));
   }
   const PieceSums sums = join(std::move(each));
   Dictionary nothing;

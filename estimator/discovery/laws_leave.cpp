@@ -1,6 +1,7 @@
 #include "estimator/discovery/laws_leave.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -43,16 +44,40 @@ PassInput pass_with(const ImuData& data, const UnitRecording& recording, std::sp
   return input;
 }
 
+// `rest`, about the recording's calibration, less what the effects beside it are off by.
+diagnosis::CorrectedRecording less_effects(const UnitRecording& recording, diagnosis::CorrectedRecording rest) {
+  const diagnosis::RecordingContext context(rest.data());
+  const PassInput input = diagnosis::forward_pass(rest.data(), recording.calibration);
+  EffectColumns columns(context, recording.beside);
+  const ColumnSums sums = run_columns(input, trace_pass(input), columns);
+  const Eigen::VectorXd move = solve_scaled(sums.information, sums.score);
+  constexpr double largest_step =
+      0.33;  // of a constant's logarithm: beyond that its signature is no longer nearly linear in it
+  diagnosis::Correction correction;
+  Eigen::Index at = 0;
+  for (const EffectTerm& term : recording.beside) {
+    const Eigen::Index n = term.size.size();
+    const double constant = term.constant_free
+                                ? term.constant * std::exp(std::clamp(move(at + n), -largest_step, largest_step))
+                                : term.constant;
+    correction.add(*term.effect, constant, term.size + move.segment(at, n));
+    correction.add(*term.effect, term.constant, -term.size);
+    at += term.count();
+  }
+  return {context, input, std::move(correction)};
+}
+
 }  // namespace
 
 diagnosis::CorrectedRecording less_laws(const UnitRecording& recording, const LawFit& fit) {
-  if (fit.terms.empty()) {
-    return diagnosis::CorrectedRecording(recording.data);
+  diagnosis::CorrectedRecording rest(recording.data);
+  if (!fit.terms.empty()) {
+    const diagnosis::RecordingContext context(recording.data);
+    const LawMotion motion(context);
+    const PassInput input = diagnosis::forward_pass(recording.data, recording.calibration);
+    rest = without_laws(motion, collect_nodes(motion, input), input, fit.terms, fit.coefficient);
   }
-  const diagnosis::RecordingContext context(recording.data);
-  const LawMotion motion(context);
-  const PassInput input = diagnosis::forward_pass(recording.data, recording.calibration);
-  return without_laws(motion, collect_nodes(motion, input), input, fit.terms, fit.coefficient);
+  return recording.beside.empty() ? rest : less_effects(recording, rest);
 }
 
 LawFit fit_of_told(std::span<const UnitRecording> recordings, const Discovery& found, const std::stop_token& stop) {
@@ -103,15 +128,16 @@ ClassAverage beside_processes(std::span<const UnitRecording> recordings, const L
     const diagnosis::CorrectedRecording rest = less_laws(recording, fit);
     const PassInput input = pass_with(rest.data(), recording, processes, context);
     const PassTrace trace = trace_pass(input);
-    const int first = trace.pass.layout.parameters();
-    ParameterVector parameters = input.parameters + trace.pass.mean.segment<sensor_parameter_count>(first);
+    const LawMotion motion(context);
+    const NodeTable table = collect_nodes(motion, input);
+    LawColumns columns(motion, table, fit.terms, true);
+    const ColumnSums sums = run_beside(recording.beside, context, input, trace, columns, stop);
+    const int first = sums.pass.layout.parameters();
+    ParameterVector parameters = input.parameters + sums.pass.mean.segment<sensor_parameter_count>(first);
     ParameterMatrix covariance =
-        trace.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first);
+        sums.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first);
     if (!fit.terms.empty()) {
       // What is left of the laws where the processes take their part of what the fit gave to them.
-      const LawMotion motion(context);
-      LawColumns columns(motion, collect_nodes(motion, input), fit.terms, true);
-      const ColumnSums sums = run_columns(input, trace, columns, stop);
       const Eigen::VectorXd scale = column_scale(fit.terms, fit.coefficient);
       const Eigen::MatrixXd shift = sums.shift * scale.asDiagonal();
       Eigen::MatrixXd information = scale.asDiagonal() * sums.information * scale.asDiagonal();

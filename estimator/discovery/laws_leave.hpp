@@ -9,7 +9,7 @@
 
 namespace selfcal::discovery {
 
-// Increments of the recording less all laws of the fit. `recording.data` must outlive it.
+// Increments of the recording less all laws of the fit, and less what they move the effects by whose coefficients are unknown beside it. `recording.data` must outlive it.
 diagnosis::CorrectedRecording less_laws(const UnitRecording& recording, const LawFit& fit);
 
 // The fit of the laws that are told, without what is only described: where nothing is, `found.fit`.

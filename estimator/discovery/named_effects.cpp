@@ -91,6 +91,12 @@ tl::expected<UnexplainedRest, std::string> UnexplainedRest::of(std::span<const D
       return tl::unexpected(fitted.error());
     }
   }
+  rest.beside_.resize(unit.size());
+  if (unit.size() == 1) {
+    for (const UnitEffect& effect : rest.start_.effects) {
+      rest.beside_.front().push_back(effect.on.front());
+    }
+  }
   for (std::size_t r = 0; r < unit.size(); ++r) {
     auto corrected = std::make_unique<diagnosis::CorrectedRecording>(without_effects(rest.unit_[r], r, rest.start_));
     CalibrationOutcome calibration = diagnosis::calibrate_still(corrected->data(), {}, stop);
@@ -98,7 +104,7 @@ tl::expected<UnexplainedRest, std::string> UnexplainedRest::of(std::span<const D
       return tl::unexpected(calibration.failure.message);
     }
     rest.calibrations_.push_back(std::make_unique<CalibrationResult>(std::move(*calibration.result)));
-    rest.recordings_.push_back({corrected->data(), *rest.calibrations_.back()});
+    rest.recordings_.push_back({corrected->data(), *rest.calibrations_.back(), rest.beside_[r]});
     rest.corrected_.push_back(std::move(corrected));
   }
   return rest;

@@ -25,7 +25,8 @@ struct DiagnosedRecording {
 };
 
 // Recordings of one unit, less what was named, calibrated anew. Of one recording an effect is taken out as it was named; of several,
-// as fitted together (joint_fit.hpp) on all of them that can hold it, whether they named it or not. Where the catalogue explains some of the
+// as fitted together (joint_fit.hpp) on all of them that can hold it, whether they named it or not. Beside one recording its coefficients
+// are unknown still: its size was fitted where no law was. Several recordings tell them by themselves. Where the catalogue explains some of the
 // recordings and leaves another unexplained, only what all of them name is taken out: a name that one recording gives may stand for the law
 // that the other one lacks, and one unit has one physics. Motions of the base and noise stay: they are in the calibrations.
 class UnexplainedRest {
@@ -47,6 +48,7 @@ class UnexplainedRest {
  private:
   std::vector<std::unique_ptr<diagnosis::CorrectedRecording>> corrected_;
   std::vector<std::unique_ptr<CalibrationResult>> calibrations_;
+  std::vector<std::vector<EffectTerm>> beside_;  // [recordings]
   std::vector<UnitRecording> recordings_;
   std::vector<const diagnosis::Effect*> taken_out_;
   std::vector<JointRecording> unit_;

@@ -39,7 +39,8 @@ void PieceResidual::renew() { model_ = std::make_unique<PieceModel>(sums_, dicti
 PieceSums PieceResidual::sum_whole() {
   std::vector<PieceSums> all;
   for (const auto& scene : scenes_) {
-    all.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace, stop_, pieces_of_each(scenes_.size())));
+    all.push_back(sum_over_pieces(scene->motion, scene->input, scene->trace, scene->beside, stop_,
+                                  pieces_of_each(scenes_.size())));
     scene->table = all.back();
   }
   return join(std::move(all));
@@ -52,8 +53,8 @@ PieceSums PieceResidual::sum_without(const LawFit& fit) const {
         without_laws(scene->motion, scene->table, scene->input, fit.terms, fit.coefficient);
     PassInput input = scene->input;
     input.data = &rest.data();
-    all.push_back(
-        sum_over_pieces(scene->motion, input, trace_pass(input, stop_), stop_, pieces_of_each(scenes_.size())));
+    all.push_back(sum_over_pieces(scene->motion, input, trace_pass(input, stop_), scene->beside, stop_,
+                                  pieces_of_each(scenes_.size())));
   }
   return join(std::move(all));
 }

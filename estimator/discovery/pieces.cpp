@@ -148,11 +148,11 @@ Eigen::VectorXd PieceSums::score(int axis) const {
 }
 
 PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace,
-                          const std::stop_token& stop, std::size_t most) {
+                          std::span<const EffectTerm> effects, const std::stop_token& stop, std::size_t most) {
   PieceSums result;
   result.pieces = cut_into_pieces(motion.context(), most);
   PieceSource source(motion, result);
-  result.sums = run_columns(input, trace, source, stop);
+  result.sums = run_beside(effects, motion.context(), input, trace, source, stop);
   source.finish();
   return result;
 }

@@ -5,10 +5,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <stop_token>
 #include <vector>
 
 #include "estimator/discovery/column_pass.hpp"
+#include "estimator/discovery/effect_columns.hpp"
 #include "estimator/discovery/law_motion.hpp"
 
 namespace selfcal::discovery {
@@ -46,8 +48,10 @@ struct PieceSums : NodeTable {
 // SI size of one unit of an axis: 1 deg/h, 1 ug.
 double unit_of(int axis);
 
+// With the effects projected out, `beside` of UnitRecording.
 PieceSums sum_over_pieces(const LawMotion& motion, const PassInput& input, const PassTrace& trace,
-                          const std::stop_token& stop = {}, std::size_t most = most_pieces);
+                          std::span<const EffectTerm> effects = {}, const std::stop_token& stop = {},
+                          std::size_t most = most_pieces);
 
 // Columns that are carried before those of the pieces, n of them.
 struct BesidePieces {

@@ -18,7 +18,8 @@ struct Scene {
       : context(recording.data),
         motion(context),
         input(diagnosis::forward_pass(recording.data, recording.calibration)),
-        trace(trace_pass(input)) {}
+        trace(trace_pass(input)),
+        beside(recording.beside) {}
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
@@ -26,6 +27,7 @@ struct Scene {
   LawMotion motion;
   PassInput input;
   PassTrace trace;
+  std::span<const EffectTerm> beside;
   NodeTable table;
 };
 
@@ -50,7 +52,7 @@ inline std::vector<LawRecording> laws_on(const std::vector<std::unique_ptr<Scene
   std::vector<LawRecording> all;
   all.reserve(scenes.size());
   for (const auto& scene : scenes) {
-    all.push_back({scene->motion, scene->table, scene->input, scene->trace});
+    all.push_back({scene->motion, scene->table, scene->input, scene->trace, scene->beside});
   }
   return all;
 }

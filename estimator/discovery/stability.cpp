@@ -19,7 +19,7 @@ std::vector<Sums> sums_of_parts(const LawRecording& recording, const std::vector
                                 const std::stop_token& stop) {
   LawColumns source(recording.motion, recording.table, terms, false);
   RowSink rows;
-  run_columns(recording.input, recording.trace, source, stop, &rows);
+  run_beside(recording.beside, recording.motion.context(), recording.input, recording.trace, source, stop, &rows);
   const auto n = static_cast<Eigen::Index>(terms.size());
   std::vector<Sums> parts;
   for (Eigen::Index first = 0; first < rows.residual.size();) {

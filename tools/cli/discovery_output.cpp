@@ -313,7 +313,7 @@ std::string discovery_text(const Discovery& found, const std::optional<discovery
 }
 
 std::string trial_text(const std::vector<discovery::TriedLaw>& tried) {
-  std::string text = "laws tried beside the 24:\n";
+  std::string text = "laws tried beside the 24 and what is named:\n";
   for (const discovery::TriedLaw& law : tried) {
     const bool predicts = law.held_out_gain > 0.0;
     text += fmt::format(

@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/discovery/piece_model.hpp"
 #include "estimator/discovery/scene.hpp"
@@ -62,6 +66,52 @@ TEST(Pieces, FindWhatALawDoes) {
     const auto [share, words] = best_found(scene, dictionary, law);
     EXPECT_GT(share, 0.93) << law.expression << ": " << words;
     EXPECT_LT(share, 1.03) << law.expression << ": " << words;
+  }
+}
+
+// Beside an effect a law is what it is beside as many columns more: solved together, and with the effect projected out.
+TEST(Pieces, AnEffectBesideALawIsProjectedOutOfEverything) {
+  const Unit unit;
+  const Scene scene({unit.ideal.data(), unit.calibration});
+  const auto& all = diagnosis::catalogue();
+  const auto effect =
+      std::find_if(all.begin(), all.end(), [](const diagnosis::Effect& e) { return e.id == "gyro_g_sensitivity"; });
+  ASSERT_NE(effect, all.end());
+  const std::vector<EffectTerm> beside = {{&*effect, NAN, Eigen::VectorXd::Zero(9)}};
+  LawTerm term;
+  term.expression = *laws::Expression::parse("fy*abs(cos(outer))");  // mostly a g-sensitivity
+  const NodeTable table = collect_nodes(scene.motion, scene.input);
+  LawColumns law(scene.motion, table, {term}, false);
+  LawColumns again(scene.motion, table, {term}, false);
+  EffectColumns columns(scene.context, beside);
+  TwoSources both(law, columns);
+  const ColumnSums together = run_columns(scene.input, scene.trace, both);
+  RowSink rows;
+  const ColumnSums alone = run_beside(beside, scene.context, scene.input, scene.trace, again, {}, &rows);
+
+  ASSERT_EQ(alone.score.size(), 1);
+  const Eigen::MatrixXd covariance = together.information.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::VectorXd value = covariance * together.score;
+  EXPECT_LT(alone.information(0, 0), 0.5 * together.information(0, 0));
+  EXPECT_NEAR(alone.information(0, 0) * covariance(0, 0), 1.0, 1e-5);
+  EXPECT_NEAR(alone.score(0) / alone.information(0, 0), value(0), 1e-5 * std::sqrt(covariance(0, 0)));
+  EXPECT_NEAR(rows.columns.squaredNorm() / alone.information(0, 0), 1.0, 1e-5);
+  EXPECT_NEAR(rows.columns.col(0).dot(rows.residual), alone.score(0), 1e-5 * std::sqrt(alone.information(0, 0)));
+  EXPECT_NEAR(rows.residual.squaredNorm(), alone.square, 1e-6 * (1.0 + alone.square));
+
+  // The 24 follow both, and their sigma holds the effect's.
+  const int first = alone.pass.layout.parameters();
+  const ParameterVector by_both = together.pass.mean.segment<sensor_parameter_count>(first) + together.shift * value;
+  const ParameterVector by_law = alone.pass.mean.segment<sensor_parameter_count>(first) + alone.shift * value.head(1);
+  const ParameterMatrix of_both =
+      together.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first) +
+      together.shift * covariance * together.shift.transpose();
+  const ParameterMatrix of_law =
+      alone.pass.covariance.block<sensor_parameter_count, sensor_parameter_count>(first, first) +
+      alone.shift * alone.shift.transpose() / alone.information(0, 0);
+  for (Eigen::Index k = 0; k < sensor_parameter_count; ++k) {
+    EXPECT_NEAR(by_law(k), by_both(k), 1e-4 * std::sqrt(of_both(k, k))) << k;
+    EXPECT_NEAR(of_law(k, k) / of_both(k, k), 1.0, 1e-4) << k;
   }
 }
 
