@@ -90,8 +90,9 @@ def accelerometers(answer, a, beside_g, unit=1.0, may_be_open=False):
 
 
 def names(answer):
+    """Without drifts that are told as a bias's own wandering as well: these sensors' biases wander."""
     settling = ["accel_relaxation"] if answer["accelerometers"]["settling"] else []
-    return [f["effect"] for t in ("accelerometers", "gyros") for f in answer[t]["findings"]] + settling
+    return [f["effect"] for t in ("accelerometers", "gyros") for f in answer[t]["findings"] if not f["may_be_flicker"]] + settling
 
 
 def bias(answer, g, beside_deg_per_h):

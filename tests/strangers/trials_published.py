@@ -116,11 +116,14 @@ def imported(operator, rng):
     accelerometers(answer, truth["a"], 4e-5)
     check("three gyro scale factors", gyro_scales(answer, truth["g"]) == 3)
     words.unsigned(operator.folder, rng)
+    # A hand's tremor of 0.04 rad/s, correlated over 0.07 s, in turns of 1 to 2 s that the attitude does not follow: 1.0 deg about both level
+    # axes together, 0.9 less nine parameters of 30 residuals, to 15 %.
+    tremor_deg, three_sigma = 0.9, 1.45
     for file in ("plain.csv", "hex.csv", "full.csv"):
         operator.settled(file, ("accelerometer.axes", "gyro.unit", "accelerometer.unit"))
         answer = operator.diagnosed(file)
         carried = answer["gravity_direction_deg"]["after"]
-        check(f"{file}: {answer['poses']} poses, gravity carried to {carried:.2f} deg", answer["poses"] == 16 and carried < 1.0)
+        check(f"{file}: {answer['poses']} poses, gravity carried to {carried:.2f} deg", answer["poses"] == 16 and carried < three_sigma * tremor_deg)
 
 
 def silent(operator, rng):

@@ -129,7 +129,7 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
   }
   text += d.gyro_named.empty() ? "nothing named\n" : "named:\n";
   for (const diagnosis::PoseEffect& e : d.gyro_named) {
-    text += fmt::format("  {}{}{}{} leaves {}\n", e.effect->id,
+    text += fmt::format("  {}{}{}{}{} leaves {}\n", e.may_be_flicker ? "a drift, as by " : "", e.effect->id,
                         e.effect->temperature == diagnosis::TemperatureUse::measured ? ", per degC" : "",
                         e.equivalent.empty() ? "" : ", or as well ", fmt::join(diagnosis::ids_of(e.equivalent), ", "),
                         three(e.held_out_rms, shown.gyro));

@@ -191,10 +191,10 @@ std::string rivals_of(const diagnosis::PoseDiagnosis& d) {
 
 // The verdict in a sentence, and what tells more.
 Json verdict_of(const diagnosis::PoseDiagnosis& d) {
-  std::vector<std::string> named;
+  std::vector<std::string> named, drifts_as_well;
   for (const auto* effects : {&d.gyro_named, &d.accel_named}) {
     for (const diagnosis::PoseEffect& e : *effects) {
-      named.push_back(e.effect->id);
+      (e.may_be_flicker ? drifts_as_well : named).push_back(e.effect->id);
     }
   }
   if (d.settling) {
@@ -207,6 +207,10 @@ Json verdict_of(const diagnosis::PoseDiagnosis& d) {
   if (!named.empty()) {
     verdict = fmt::format("Named: {}.", fmt::join(named, ", "));
     next = rivals_of(d).empty() ? "" : "The same poses once more in another order, just switched on, tell them apart.";
+  } else if (!drifts_as_well.empty()) {
+    verdict =
+        fmt::format("The gyros' bias changes with time: it wanders by itself, or {}.", fmt::join(drifts_as_well, ", "));
+    next = "The same poses once more, just switched on, tell them apart.";
   } else if (!d.gyro_jumps.empty()) {
     verdict = d.gyro_jumps.front().gap ? "The gyros' bias is another behind a gap of the log."
                                        : "The gyros' bias is another from one pose on.";

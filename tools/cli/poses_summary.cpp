@@ -128,7 +128,7 @@ std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit
   if (!rivals.empty()) {
     words += fmt::format("; or as well {}", fmt::join(rivals, ", "));
   }
-  return lines_of("named:", words + confounded_clause(d, e));
+  return lines_of(e.may_be_flicker ? "drifts:" : "named:", words + confounded_clause(d, e));
 }
 
 // The experiment that parts what is named from what does the same.

@@ -56,7 +56,7 @@ struct PoseEffect {
   double log_p_beside_flicker = 0.0;
   // Depends on the pose by no more than the Earth's rate does, which was not taken out: no heading, or no latitude.
   bool may_be_earth = false;
-  bool may_be_flicker = false;  // named, and not seen beside that noise
+  bool may_be_flicker = false;  // not seen beside that noise: that it drifts is known, and not by what
 };
 
 // How much of what one effect would do another one does too, over the times and directions of these poses.

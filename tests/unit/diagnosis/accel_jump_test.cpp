@@ -37,6 +37,25 @@ TEST(AccelJump, IsToldWhereAndByHowMuch) {
   }
 }
 
+// What a jump leaves beside the nine widens their sigma: that is no reason to ask nothing.
+TEST(AccelJump, IsToldHoweverLargeItIs) {
+  constexpr int before = 14;
+  constexpr double when = (before - 0.1) / pose_count;
+  for (const double times : {0.3, 1.0, 3.0, 10.0}) {
+    for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+      const PoseDiagnosis d =
+          diagnose_poses(test::hand_turned(pose_count, seed,
+                                           [times](double share, const Vector3&) {
+                                             return share > when ? Vector3(times * size) : Vector3(Vector3::Zero());
+                                           }),
+                         0.01);
+      ASSERT_TRUE(d.accel_jump) << times << " times, seed " << seed;
+      EXPECT_LE(d.accel_jump->from_pose, before);
+      EXPECT_GT(d.accel_jump->to_pose, before);
+    }
+  }
+}
+
 TEST(AccelJump, WhatRisesWarmsUpOrGoesWithThePoseIsNone) {
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
     const auto none = [seed](const auto& extra, const char* what) {
