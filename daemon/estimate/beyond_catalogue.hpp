@@ -31,7 +31,7 @@ bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagno
 void replace_process(diagnosis::Diagnosis& diagnosis, const discovery::Discovery& found);
 
 // The diagnosis with the 24 as fitted with the laws, and with what these leave (`after`, `remaining`), where laws explain what the
-// catalogue leaves: the catalogue's rejected names correct nothing. Where what is found explains too little the 24 stay, and their sigma
+// catalogue leaves: the catalogue's rejected names correct nothing, and sigma holds what stands as well in the place of names beside the laws. Where what is found explains too little the 24 stay, and their sigma
 // holds how far equations that are only described move them.
 diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const discovery::Discovery* found);
 

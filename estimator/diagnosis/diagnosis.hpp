@@ -139,6 +139,9 @@ struct Diagnosis {
   ParameterVector value, sigma;
   ParameterVector value_as_named;
   ParameterMatrix covariance;  // of value
+  // By how much more value_as_named may be off than were `model` the truth: other names in its place, forms that are open, and that it
+  // is not the mean.
+  ParameterMatrix open_beside_named = ParameterMatrix::Zero();
 };
 
 // Nothing turned, and the position departs by more than noise of the model does: what changes is asked of the log as one that

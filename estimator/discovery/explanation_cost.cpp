@@ -37,6 +37,9 @@ namespace {
 diagnosis::Diagnosis without_those(diagnosis::Diagnosis d, const std::function<bool(const diagnosis::Effect*)>& name) {
   const auto kept = std::stable_partition(d.findings.begin(), d.findings.end(),
                                           [&](const diagnosis::Finding& f) { return !name(f.source); });
+  if (kept != d.findings.end()) {
+    d.open_beside_named.setZero();  // it was beside names that are not all there any more
+  }
   d.rejected.insert(d.rejected.begin(), kept, d.findings.end());
   d.findings.erase(kept, d.findings.end());
   const auto modelled = std::stable_partition(d.model.begin(), d.model.end(),

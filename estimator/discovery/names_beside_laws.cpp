@@ -117,6 +117,7 @@ class Together {
     named.sigma = of_rest.sigma;
     named.covariance = of_rest.covariance;
     named.value_as_named = of_rest.value_as_named;
+    named.open_beside_named = of_rest.open_beside_named;
     named.rejected.clear();
     named.rejected_model.clear();
     named.rejected_by_remains_alone = false;

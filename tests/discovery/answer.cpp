@@ -19,8 +19,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "daemon/estimate/analysis.hpp"
+#include "daemon/estimate/beyond_catalogue.hpp"
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/unit_answer.hpp"
@@ -110,6 +112,7 @@ ordered_json rival_json(const std::string& rival, const ImuData& data, const Cal
 struct DiagnosisAnswer {
   ordered_json words;
   std::optional<discovery::Discovery> found;
+  std::vector<double> parameters, sigma;  // the 24 that are told
 };
 
 DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
@@ -123,6 +126,9 @@ DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
     diagnosis = diagnosis::diagnose(data, {}).diagnosis;
   }
   if (diagnosis) {
+    const diagnosis::Diagnosis told = with_laws(*diagnosis, answer.found ? &*answer.found : nullptr);
+    answer.parameters.assign(told.value.begin(), told.value.end());
+    answer.sigma.assign(told.sigma.begin(), told.sigma.end());
     answer.words["verdict"] = verdict_name(diagnosis->verdict);
     answer.words["names"] = ordered_json::array();
     for (const auto& finding : diagnosis->findings) {
@@ -222,6 +228,8 @@ int answer(const Request& request) {
     j = answer.words;
     if (answer.found) {
       j["discovery"] = to_json(*answer.found);
+      j["discovery"]["parameters"] = answer.parameters;
+      j["discovery"]["parameter_sigma"] = answer.sigma;
     }
     j["seconds"] = elapsed();
     fmt::print("{}\n", j.dump());

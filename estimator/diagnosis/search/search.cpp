@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/search/search.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -203,6 +204,16 @@ Shown shown_after(const Stage& stage) {
           map_of(stage, given, fitted)};
 }
 
+// Without what roundings or a prior make negative.
+ParameterMatrix positive_part(const ParameterMatrix& matrix) {
+  const ParameterVector scale = matrix.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> solver(scale.cwiseInverse().asDiagonal() * matrix *
+                                                              scale.cwiseInverse().asDiagonal());
+  const ParameterMatrix root =
+      scale.asDiagonal() * solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return root * root.transpose();
+}
+
 // The 24 with the terms as reported, and as a mean over all explanations with its covariance.
 void report_parameters(const Stage& stage, const Hypothesis& reported, const Averages& averages, SearchResult& result) {
   const Eigen::MatrixXd& shift = stage.model.rows().shift;
@@ -225,6 +236,11 @@ void report_parameters(const Stage& stage, const Hypothesis& reported, const Ave
     result.value += S * forms.mean;
     result.covariance += S * forms.covariance * S.transpose();
   }
+  const Eigen::MatrixXd S = shift(Eigen::all, columns);
+  const ParameterMatrix as_named =
+      stage.model.covariance() + S * stage.model.evidence().fit(columns).covariance * S.transpose();
+  const ParameterVector apart = result.value - result.value_as_named;
+  result.open_beside_named = positive_part(result.covariance - as_named + apart * apart.transpose());
 }
 
 void report_forms(const Stage& stage, SearchResult& result) {

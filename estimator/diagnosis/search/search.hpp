@@ -67,7 +67,7 @@ struct SearchResult {
   std::vector<Suspect> prospects, suspects;
   // The 24 as a mean over all explanations, and with the effects as named.
   ParameterVector value = ParameterVector::Zero(), value_as_named = ParameterVector::Zero();
-  ParameterMatrix covariance = ParameterMatrix::Zero();
+  ParameterMatrix covariance = ParameterMatrix::Zero(), open_beside_named = ParameterMatrix::Zero();
   Stage stage;  // where the search ended
 
   bool empty() const { return named.empty() && processes.empty(); }
