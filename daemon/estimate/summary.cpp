@@ -118,9 +118,10 @@ std::string or_laws(const Diagnosis& d) {
   for (const diagnosis::Effect* name : d.instead->names) {
     names.push_back(effect_words(name->id));
   }
+  const char* before = d.instead->odds > 1.0 ? "; more likely" : "; or";
   return in_place_of_some(d)
-             ? fmt::format("; or, in the place of {}, that {}", fmt::join(names, " and "), laws_words(*d.instead))
-             : fmt::format("; or that {}", laws_words(*d.instead));
+             ? fmt::format("{}, in the place of {}, that {}", before, fmt::join(names, " and "), laws_words(*d.instead))
+             : fmt::format("{} that {}", before, laws_words(*d.instead));
 }
 
 // With the equations that the names leave, or with the word that they leave something.

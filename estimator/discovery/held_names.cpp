@@ -125,13 +125,16 @@ double HeldNames::with_one_physics(const std::vector<bool>& out, const Eigen::Ve
   return gain_of(place.transpose() * beside_.information * place, place.transpose() * score);
 }
 
-double HeldNames::most_beyond(const std::vector<bool>& out, double least) {
+double HeldNames::most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed) {
   const Columns c = columns(out);
   model_->look_at(sums_.sums.score + beside_.with_pieces * c.in, c.square);
   model_->choose(beside_.with_pieces(Eigen::all, c.stay), beside_.information(c.stay, c.stay), c.score(c.stay));
   std::vector<std::vector<LawTerm>> alone;
   double over_pieces = 0.0;
   for (Candidate& candidate : Shortlist(sums_, dictionary_).best(*model_, shortlist_size)) {
+    if (!allowed(candidate.term.axis)) {
+      continue;
+    }
     over_pieces = std::max(over_pieces, candidate.gain);
     alone.push_back({std::move(candidate.term)});
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <span>
 #include <stop_token>
@@ -26,7 +27,8 @@ class HeldNames {
 
   // By how much more than the names for which `out` says so do, the best function makes the square fall in their place, all other names
   // fitted anew: found over the pieces, and where it may be `least` or more exactly, its constants free.
-  double most_beyond(const std::vector<bool>& out, double least);
+  // Functions of axes for which `allowed` does not say so do not count.
+  double most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed);
   // The same of laws, those of each alternative together.
   std::vector<double> beyond(const std::vector<bool>& out, const std::vector<std::vector<LawTerm>>& alternatives) const;
 

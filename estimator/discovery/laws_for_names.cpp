@@ -37,6 +37,8 @@ class NamesAgainstLaws {
   NamesAgainstLaws(std::span<const DiagnosedRecording> unit, const UnexplainedRest& less,
                    const DiscoveryOptions& of_laws, const Progress& progress)
       : unit_(unit), of_laws_(of_laws), progress_(progress), held_(less, of_laws.stop, progress) {
+    other_triad_ =
+        std::any_of(unit.begin(), unit.end(), [](const DiagnosedRecording& r) { return r.diagnosis.remainder; });
     const std::vector<diagnosis::ModelEffect> all = names_of(unit);
     for (const diagnosis::Effect* name : held_.names()) {
       models_.push_back(
@@ -95,7 +97,9 @@ class NamesAgainstLaws {
     }
     LawSearch search(rest->recordings(), of_laws_, progress_);
     const Discovery& found = search.fitted();
-    if (found.fit.terms.empty() || !found.processes.empty() || of_laws_.stop.stop_requested()) {
+    const bool allowed = std::all_of(found.fit.terms.begin(), found.fit.terms.end(),
+                                     [&](const LawTerm& law) { return may_replace(out, law.axis); });
+    if (found.fit.terms.empty() || !allowed || !found.processes.empty() || of_laws_.stop.stop_requested()) {
       return std::nullopt;
     }
     const double log_odds = 0.5 * (held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size()));
@@ -105,7 +109,17 @@ class NamesAgainstLaws {
  private:
   double most_of(const std::vector<bool>& out, double least) {
     const double more = dearer(out, 1);
-    return held_.most_beyond(out, least + more) - more;
+    return held_.most_beyond(out, least + more, [&](int axis) { return may_replace(out, axis); }) - more;
+  }
+  // Whether a law of this axis may stand in the place of these names.
+  bool may_replace(const std::vector<bool>& out, int axis) const {
+    const diagnosis::Triad own = axis < 3 ? diagnosis::Triad::gyro : diagnosis::Triad::accelerometer;
+    for (std::size_t k = 0; other_triad_ && k < out.size(); ++k) {
+      if (out[k] && models_[k].effect->triad == own) {
+        return false;
+      }
+    }
+    return true;
   }
   // Of choices of one name those that a law most probably replaces: a law each.
   std::optional<Choice> replaced_one_by_one(const std::vector<Choice>& all) const {
@@ -135,6 +149,7 @@ class NamesAgainstLaws {
   const DiscoveryOptions& of_laws_;
   const Progress& progress_;
   HeldNames held_;
+  bool other_triad_ = false;                    // of laws, for there is a remainder
   std::vector<diagnosis::ModelEffect> models_;  // [names]
 };
 
@@ -145,8 +160,7 @@ bool names_stand_alone(const diagnosis::Diagnosis& d) {
                                      [](const diagnosis::ModelEffect& m) { return m.effect->sensor != nullptr; });
   const bool process =
       std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
-  return d.verdict == diagnosis::DiagnosisVerdict::named && d.faults.empty() && of_sensor && !process &&
-         !d.unexplained && !d.remainder;
+  return d.verdict == diagnosis::DiagnosisVerdict::named && d.faults.empty() && of_sensor && !process && !d.unexplained;
 }
 
 std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit, double least_log_odds,

@@ -1,6 +1,8 @@
 // Laws in the place of names that leave nothing. Of a law that no catalogue holds an effect may make so much that the rest is lost in noise:
 // g-sensitivity takes up a law of the gimbal's angles, two names may take up one creep, and a second name a law beside a true effect. The
 // search is asked what it says of the recording with one of the names in it, with all of them, and with those that laws replace one by one.
+// A remainder is of a name whose form differs a little, and no law of the same sensors takes its place; one of the other triad may: a gyro
+// that follows rate and force moves the direction of gravity as products of two accelerometers do, all but a tenth.
 #pragma once
 
 #include <optional>
@@ -19,7 +21,7 @@ struct LawsForNames {
   double log_odds = 0.0;  // of its laws against these names, each with what it costs (explanation_cost.hpp)
 };
 
-// Whether names of sensors are all that the diagnosis says: nothing is left, nothing of another form, and no process stands beside them.
+// Whether names of sensors are all that the diagnosis says, a remainder aside: nothing else is left, and no process stands beside them.
 bool names_stand_alone(const diagnosis::Diagnosis& diagnosis);
 
 // Recordings of one unit, all of them explained, some by names that stand alone: each by its own names, or all of them by the same laws in
