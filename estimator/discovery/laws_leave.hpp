@@ -21,7 +21,7 @@ Left left_by(const UnitRecording& recording, const LawFit& fit, std::span<const 
              bool coloured);
 
 // The 24 of each recording by itself with the processes in the filter and coefficients and constants of the laws free: sigma holds what
-// a new offset at each turn does to them. A pass for each recording, and one more where laws are told.
+// a new offset at each turn does to them. Two passes for each recording.
 ClassAverage beside_processes(std::span<const UnitRecording> recordings, const LawFit& fit,
                               std::span<const DiscoveredProcess> processes, const std::stop_token& stop = {});
 

@@ -8,8 +8,8 @@ import makers as makers_tables
 import published
 import silent as silent_gyros
 import words
-from answers import SITE, accelerometers, check, gyro_scales, near, parameters
-from sensors import DEG, EARTH, G0, GRAVITY
+from answers import SITE, accelerometers, check, gyro_scales, names, near, parameters
+from sensors import DEG, EARTH, G0, GRAVITY, LATITUDE_DEG
 
 
 def positions(operator, rng):
@@ -21,6 +21,9 @@ def positions(operator, rng):
     answer = operator.answer("poses", "means.csv", *SITE)
     for k in range(3):   # of the Earth's rate only the vertical part is known without a heading
         near(f"gyro mean {'xyz'[k]}, deg/h", answer["gyros"]["bias"][k], answer["gyros"]["bias_sigma"][k], truth["g"].bias[k], numpy.linalg.norm(EARTH), 3600 / DEG)
+    answer = operator.answer("poses", "means.csv")   # nobody says the place: what the Earth turns along the vertical is no g-sensitivity
+    seen, sigma = answer["gyros"]["latitude_seen_deg"], answer["gyros"]["latitude_seen_sigma_deg"]
+    check(f"latitude {seen} +- {sigma}; nothing named: {names(answer)}", seen is not None and abs(seen - LATITUDE_DEG) < 5 * sigma and not names(answer))
     known = parameters(operator.answer("poses", "counts.txt"), "accelerometers")
     for k, axis in enumerate("xyz"):
         p = known[f"scale_{axis}"]

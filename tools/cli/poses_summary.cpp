@@ -391,8 +391,9 @@ std::string turns_words(const PoseDiagnosis& d) {
 
 std::string turns_line(const PoseDiagnosis& d) {
   const std::string earth =
-      d.latitude_seen ? fmt::format("the gyros see the Earth's rate: latitude {:.0f} +- {:.0f} deg by it, taken out\n",
-                                    *d.latitude_seen / units::degree, d.latitude_seen_sigma / units::degree)
+      d.latitude_seen ? fmt::format("the gyros see the Earth's rate: latitude {:.0f} +- {:.0f} deg{} taken out\n",
+                                    *d.latitude_seen / units::degree, d.latitude_seen_sigma / units::degree,
+                                    d.earth_taken_out ? " by it," : ", vertical part")
                       : std::string();
   return earth + turns_words(d);
 }

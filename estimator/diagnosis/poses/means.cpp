@@ -175,6 +175,8 @@ void judge_means(const PoseMeans& means, double alpha, std::vector<Pose>& poses,
     for (std::size_t k = 0; k < poses.size(); ++k) {
       poses[k].gyro -= earth.rate[k];
     }
+    d.latitude_seen = earth.latitude;
+    d.latitude_seen_sigma = earth.latitude_sigma;
     judge_gyros(input, poses, duration_s, d.has_temperature, 0.5 * alpha, d);
     mark_earth(input, d);
   }

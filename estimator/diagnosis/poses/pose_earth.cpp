@@ -132,6 +132,44 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
   return earth;
 }
 
+// Where neither latitude nor heading is known the vertical part is: it stands along u in all three axes alike. It is taken where it is likelier
+// than none by e^6 and within the Earth's rate by 3 sigma. An isotropic g-sensitivity of that size does the same, and no pose parts them.
+EarthInPoses vertical_part(const PoseInput& input, const std::vector<Pose>& poses) {
+  EarthInPoses earth;
+  earth.rate.assign(poses.size(), Vector3::Zero());
+  constexpr std::size_t enough = 6;
+  if (poses.size() < enough) {
+    return earth;
+  }
+  std::vector<Vector3> up, reading;
+  for (const Pose& p : poses) {
+    up.emplace_back(p.u.normalized());
+    reading.push_back(p.gyro);
+  }
+  const Eigen::MatrixX3d y = projected(reading, poses), a = projected(up, poses);
+  const double square = a.squaredNorm();
+  if (!(square > 0.1 * static_cast<double>(poses.size()))) {
+    return earth;  // hardly turned over: it stands with the bias
+  }
+  const double omega = earth::omega_ie_n(0.0).norm() / input.gyro_unit;
+  const double rate = a.cwiseProduct(y).sum() / square, left = (y - rate * a).squaredNorm();
+  const double free = 3.0 * static_cast<double>(poses.size() - 1);
+  const double sigma = std::sqrt(left / (free - 1.0) / square);
+  constexpr double likelier = 6.0, sure = 3.0;
+  if (0.5 * free * std::log(y.squaredNorm() / std::max(1e-300, left)) < likelier ||
+      std::abs(rate) - sure * sigma > omega) {
+    return earth;
+  }
+  const auto latitude_of = [omega](double vertical) { return std::asin(std::clamp(vertical / omega, -1.0, 1.0)); };
+  earth.latitude = latitude_of(rate);
+  earth.latitude_sigma =
+      std::max(latitude_of(rate + sigma) - *earth.latitude, *earth.latitude - latitude_of(rate - sigma));
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    earth.rate[k] = rate * up[k];
+  }
+  return earth;
+}
+
 }  // namespace
 
 EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
@@ -143,7 +181,8 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   constexpr std::size_t enough = 4;  // 3 biases and a heading of 12 readings
   if (!input.latitude) {
     double left = HUGE_VAL;
-    return carried && poses.size() > enough ? earth_of_any_latitude(input, poses, left) : earth;
+    earth = carried && poses.size() > enough ? earth_of_any_latitude(input, poses, left) : earth;
+    return earth.heading ? earth : vertical_part(input, poses);
   }
   const Vector3 omega_n = earth::omega_ie_n(*input.latitude) / input.gyro_unit;  // north, up, east
   const auto less_vertical = [&](double up) {

@@ -19,7 +19,7 @@ struct EarthInPoses {
   bool heading = false;         // whether the readings show the heading: likelier by e^6 than without a horizontal part
 };
 
-// The vertical part, Omega sin L along the calibrated u, is known where the latitude is. The horizontal part, Omega cos L, points to a north
+// The vertical part, Omega sin L along the calibrated u, is known where the latitude is; where it is not, as the readings show it. The horizontal part, Omega cos L, points to a north
 // that one heading makes known in all poses, for the gyros carry it through the turns. That it is there needs no proof: the likeliest
 // heading is taken, whether it shows or not. `carried`: whether no turn between poses was clipped or left out; otherwise the
 // horizontal part is left to what the poses scatter by.
