@@ -45,14 +45,14 @@ PassInput pass_with(const ImuData& data, const UnitRecording& recording, std::sp
 }
 
 // `rest`, about the recording's calibration, less what the effects beside it are off by.
-diagnosis::CorrectedRecording less_effects(const UnitRecording& recording, diagnosis::CorrectedRecording rest) {
+diagnosis::CorrectedRecording less_effects(const UnitRecording& recording, const diagnosis::CorrectedRecording& rest) {
   const diagnosis::RecordingContext context(rest.data());
   const PassInput input = diagnosis::forward_pass(rest.data(), recording.calibration);
   EffectColumns columns(context, recording.beside);
   const ColumnSums sums = run_columns(input, trace_pass(input), columns);
   const Eigen::VectorXd move = solve_scaled(sums.information, sums.score);
-  constexpr double largest_step =
-      0.33;  // of a constant's logarithm: beyond that its signature is no longer nearly linear in it
+  // Of a constant's logarithm: beyond that its signature is no longer nearly linear in it.
+  constexpr double largest_step = 0.33;
   diagnosis::Correction correction;
   Eigen::Index at = 0;
   for (const EffectTerm& term : recording.beside) {
