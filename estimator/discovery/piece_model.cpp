@@ -139,7 +139,9 @@ PieceModel::PieceModel(const PieceSums& sums, const Dictionary& dictionary,
       information_(std::move(information)),
       score_(sums.sums.score),
       square_(sums.sums.square),
-      raw_square_(sums.sums.square) {}
+      raw_square_(sums.sums.square) {
+  choose({});
+}
 
 Eigen::VectorXd PieceModel::column(int axis, const Eigen::Ref<const Eigen::VectorXd>& means) const {
   Eigen::VectorXd all = Eigen::VectorXd::Zero(score_.size());
