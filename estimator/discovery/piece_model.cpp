@@ -168,11 +168,11 @@ void PieceModel::take_off(Eigen::MatrixXd image, Eigen::MatrixXd A, Eigen::Vecto
   chosen_image_ = std::move(image);
   chosen_score_ = std::move(score);
   chosen_information_ = std::move(A);
-  Eigen::MatrixXd solved = chosen_information_;
-  solved.diagonal() *= 1.0 + rounding;
-  chosen_solver_.compute(solved);
   square_ = raw_square_;
   if (chosen_score_.size() > 0) {
+    Eigen::MatrixXd solved = chosen_information_;
+    solved.diagonal() *= 1.0 + rounding;
+    chosen_solver_.compute(solved);
     square_ -= chosen_score_.dot(chosen_solver_.solve(chosen_score_));
   }
 }

@@ -110,7 +110,7 @@ class PieceModel {
   double square_ = 0.0, raw_square_ = 0.0;
   Eigen::MatrixXd chosen_, chosen_image_;  // X, none where it is no vector over pieces; G X
   Eigen::MatrixXd chosen_information_;
-  Eigen::LDLT<Eigen::MatrixXd> chosen_solver_;
+  Eigen::LDLT<Eigen::MatrixXd> chosen_solver_{Eigen::MatrixXd::Identity(1, 1)};  // not asked while nothing is chosen
   Eigen::VectorXd chosen_score_;
 };
 
