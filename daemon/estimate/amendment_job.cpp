@@ -79,9 +79,7 @@ CalibrationResult result_with_laws(const diagnosis::Diagnosis& diagnosis, const 
   CalibrationResult result = diagnosis.calibration;
   result.value = beyond.found.average.parameters.front();
   result.covariance = beyond.found.average.covariance.front();
-  if (!diagnosis.model.empty()) {
-    result.covariance += diagnosis.open_beside_named;
-  }
+  result.covariance += diagnosis.open_beside_named;
   result.sigma = result.covariance.diagonal().cwiseSqrt();
   judge_parameters(result, options.tolerance);
   Consistency& consistency = result.consistency;

@@ -214,9 +214,7 @@ diagnosis::Diagnosis with_laws(diagnosis::Diagnosis diagnosis, const Discovery* 
     if (explains(found)) {
       diagnosis.value = diagnosis.value_as_named = value;
       diagnosis.covariance = covariance;
-      if (!diagnosis.model.empty()) {
-        diagnosis.covariance += diagnosis.open_beside_named;
-      }
+      diagnosis.covariance += diagnosis.open_beside_named;
     } else {  // neither is right: sigma holds both
       const ParameterVector moved = value - diagnosis.value;
       diagnosis.covariance += covariance + moved * moved.transpose();

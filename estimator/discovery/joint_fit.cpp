@@ -1,6 +1,5 @@
 #include "estimator/discovery/joint_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -12,19 +11,9 @@
 namespace selfcal::discovery {
 namespace {
 
-// Columns nearer than this to the span of the others are collinear with them.
-constexpr double least_left = 1e-9;
 // The logarithm of a constant moves by no more in one round: beyond that its signature is no longer nearly linear in it.
 constexpr double largest_step = 0.33;
 constexpr double told_correlation = 0.5;
-
-Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& G) {
-  const Eigen::VectorXd scale = G.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd A = scale.asDiagonal() * G * scale.asDiagonal();
-  A.diagonal().array() += least_left;
-  const Eigen::MatrixXd inverse = A.ldlt().solve(Eigen::MatrixXd::Identity(G.rows(), G.cols()));
-  return scale.asDiagonal() * inverse * scale.asDiagonal();
-}
 
 std::vector<EffectTerm> terms_on(const JointStart& start, std::size_t r) {
   std::vector<EffectTerm> terms;
@@ -171,7 +160,7 @@ class Fitter {
   }
 
   JointFit solve() {
-    const Eigen::MatrixXd covariance = scaled_inverse(information_);
+    const Eigen::MatrixXd covariance = solve_scaled(information_, Eigen::MatrixXd::Identity(count_, count_));
     const Eigen::VectorXd move = covariance * score_;
     for (FittedRecording& r : recordings_) {
       r.parameters += r.shift * move;

@@ -10,6 +10,12 @@
 namespace selfcal::diagnosis {
 namespace {
 
+// Logarithm of the odds of what leaves the square `with` against what leaves `than`, of n poses.
+double likelier(double than, double with, std::size_t n) {
+  const double free = 3.0 * static_cast<double>(n - 1);
+  return 0.5 * free * std::log(than / std::max(1e-300, with));
+}
+
 // A horizontal direction in each pose, sensor axes: that of the first pose, carried by the gyros. What they read at rest is their
 // bias, with the Earth's rate in it, so that nothing turns while the sensor stands.
 std::vector<Vector3> carried_direction(const PoseInput& input, const std::vector<Pose>& poses) {
@@ -104,13 +110,9 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
   for (int k = -tenths; k <= tenths; ++k) {
     try_at(coarse + 0.1 * k * units::degree);
   }
-  const double free = 3.0 * static_cast<double>(poses.size() - 1);
-  const auto likelier = [free](double than, double with) {
-    return 0.5 * free * std::log(than / std::max(1e-300, with));
-  };
   constexpr double than_none = 8.0, than_other = 6.0;
-  earth.heading = likelier(projected(plain, poses).squaredNorm(), best.with) > than_none &&
-                  likelier(std::max(of_hemisphere[0], of_hemisphere[1]), best.with) > than_other;
+  earth.heading = likelier(projected(plain, poses).squaredNorm(), best.with, poses.size()) > than_none &&
+                  likelier(std::max(of_hemisphere[0], of_hemisphere[1]), best.with, poses.size()) > than_other;
   left_square = best.with;
   if (!earth.heading) {
     return earth;
@@ -119,7 +121,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
   // By the likelihood over the grid, whose step is no finer than this.
   double weights = 0.0, square = 0.0;
   for (const auto& [angle, left] : all) {
-    const double weight = std::exp(-likelier(left, best.with));
+    const double weight = std::exp(-likelier(left, best.with, poses.size()));
     weights += weight;
     square += weight * (angle - latitude) * (angle - latitude);
   }
@@ -155,9 +157,8 @@ EarthInPoses vertical_part(const PoseInput& input, const std::vector<Pose>& pose
   const double rate = a.cwiseProduct(y).sum() / square, left = (y - rate * a).squaredNorm();
   const double free = 3.0 * static_cast<double>(poses.size() - 1);
   const double sigma = std::sqrt(left / (free - 1.0) / square);
-  constexpr double likelier = 6.0, sure = 3.0;
-  if (0.5 * free * std::log(y.squaredNorm() / std::max(1e-300, left)) < likelier ||
-      std::abs(rate) - sure * sigma > omega) {
+  constexpr double than_none = 6.0, sure = 3.0;
+  if (likelier(y.squaredNorm(), left, poses.size()) < than_none || std::abs(rate) - sure * sigma > omega) {
     return earth;
   }
   const auto latitude_of = [omega](double vertical) { return std::asin(std::clamp(vertical / omega, -1.0, 1.0)); };
@@ -207,10 +208,9 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   for (std::size_t k = 0; k < poses.size(); ++k) {
     second.emplace_back(poses[k].u.normalized().cross(first[k]));
   }
-  const double free = 3.0 * static_cast<double>(poses.size() - 1);
-  constexpr double likelier = 6.0;
-  const auto shows = [free](double without, double with) {
-    return 0.5 * free * std::log(without / std::max(1e-300, with)) > likelier;
+  const auto shows = [&poses](double without, double with) {
+    constexpr double than_without = 6.0;
+    return likelier(without, with, poses.size()) > than_without;
   };
   Heading found = find_heading(poses, less_vertical(omega_n.y()), first, second, omega_n.x());
   const Heading other = find_heading(poses, less_vertical(-omega_n.y()), first, second, omega_n.x());
@@ -222,7 +222,7 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
     constexpr double contradicts = 8.0;
     constexpr double sigmas = 5.0;
     const bool elsewhere = any.latitude && std::abs(*any.latitude - *input.latitude) > sigmas * any.latitude_sigma;
-    if (elsewhere && 0.5 * free * std::log(found.with / std::max(1e-300, left)) > contradicts) {
+    if (elsewhere && likelier(found.with, left, poses.size()) > contradicts) {
       return any;
     }
   }

@@ -175,7 +175,9 @@ void write_down(const SearchResult& found, const Judgement& j, Diagnosis& d) {
   d.value = found.value;
   d.value_as_named = found.value_as_named;
   d.covariance = found.covariance;
-  d.open_beside_named = found.open_beside_named;
+  if (!d.model.empty()) {
+    d.open_beside_named = found.open_beside_named;
+  }
   d.sigma = d.covariance.diagonal().cwiseSqrt();
 }
 
