@@ -15,6 +15,17 @@ bool significant(const diagnosis::FindingParameter& p) {
   return !(std::abs(p.value) < shown_sigma * p.sigma);  // a sigma that is not known hides nothing
 }
 
+// The coefficient that is most sigma from zero where none is `shown_sigma` from it but all together are; null: not so.
+const diagnosis::FindingParameter* only_together(const diagnosis::Finding& f) {
+  if (f.parameters.size() < 2 || f.significance < shown_sigma ||
+      std::any_of(f.parameters.begin(), f.parameters.end(), significant)) {
+    return nullptr;
+  }
+  return &*std::max_element(f.parameters.begin(), f.parameters.end(), [](const auto& a, const auto& b) {
+    return std::abs(a.value) / a.sigma < std::abs(b.value) / b.sigma;
+  });
+}
+
 }  // namespace
 
 std::string finding_text(const diagnosis::Finding& f) {
@@ -27,8 +38,17 @@ std::string finding_text(const diagnosis::Finding& f) {
   if (!f.equation.empty()) {
     text += fmt::format("    {}\n", f.equation);
   }
+  // Coefficients that the recording knows only together: the largest one stands for them.
+  const diagnosis::FindingParameter* const largest = only_together(f);
+  if (largest != nullptr) {
+    text += fmt::format("    {:<10} {}, the largest; known only together with others\n", largest->name,
+                        with_sigma(largest->value, largest->sigma, largest->unit));
+  }
   std::vector<std::string> small;
   for (const diagnosis::FindingParameter& p : f.parameters) {
+    if (&p == largest) {
+      continue;
+    }
     if (significant(p)) {
       text += fmt::format("    {:<10} {}\n", p.name, with_sigma(p.value, p.sigma, p.unit));
     } else {

@@ -1,4 +1,4 @@
-// What `selfcal status` prints of an INS: no line beyond the terminal, nothing lost where it is broken.
+// What the program prints of an INS and of a finding: no line beyond the terminal, nothing lost where it is broken.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tools/cli/finding_text.hpp"
 #include "tools/cli/online_text.hpp"
 
 namespace selfcal::cli {
@@ -90,6 +91,21 @@ TEST(StatusText, ARunFitsIntoEightyColumns) {
   EXPECT_THAT(text, HasSubstr("position 19 of 19, pages 4055 of 4056, ends in 2940 s\n"));
   EXPECT_THAT(text, HasSubstr("23 of 24 parameters to tolerance\n"));
   EXPECT_THAT(text, HasSubstr("bus               can0: up, the INS answers\n"));
+}
+
+// Squares of the three components of gravity add up to one: two coefficients of them are known by their difference.
+TEST(FindingText, CoefficientsKnownOnlyTogetherAreNotAllZero) {
+  diagnosis::Finding finding;
+  finding.effect = "accel_cross_coupling";
+  finding.significance = 22.1;
+  finding.parameters = {{"z_xz", "ug/g^2", 2.3, 2.9}, {"z_xx", "ug/g^2", 10.4, 3.8}, {"z_yy", "ug/g^2", -5.7, 3.8}};
+  const std::string together = finding_text(finding);
+  EXPECT_THAT(together, HasSubstr("z_xx       10.4 +- 3.8 ug/g^2, the largest; known only together with others\n"));
+  EXPECT_THAT(together, HasSubstr("within 3 sigma of zero: z_xz, z_yy\n"));
+  finding.parameters[1].sigma = 0.5;
+  const std::string alone = finding_text(finding);
+  EXPECT_THAT(alone, HasSubstr("z_xx       10.40 +- 0.50 ug/g^2\n"));
+  EXPECT_THAT(alone, testing::Not(HasSubstr("together")));
 }
 
 }  // namespace
