@@ -78,7 +78,7 @@ std::string head_text(const ByAttitude& d) {
   return text;
 }
 
-std::string gyros_text(const ByAttitude& d, const Units& shown) {
+std::string gyros_text(const ByAttitude& d, const ReadingUnits& shown) {
   std::string text;
   constexpr double nominal = 0.5;  // beyond half the gyros' unit is not that which was told
   const double unit = d.raw_per_si;
@@ -109,7 +109,7 @@ std::string gyros_text(const ByAttitude& d, const Units& shown) {
   return text;
 }
 
-std::string around_text(const ByAttitude& d, const Units& shown) {
+std::string around_text(const ByAttitude& d, const ReadingUnits& shown) {
   std::string text;
   if (d.gravity) {
     const diagnosis::GravityByAttitude& g = *d.gravity;
@@ -147,7 +147,7 @@ std::string around_text(const ByAttitude& d, const Units& shown) {
 
 }  // namespace
 
-std::string attitude_text(const ByAttitude& d, const Units& shown) {
+std::string attitude_text(const ByAttitude& d, const ReadingUnits& shown) {
   if (!d.failure.empty()) {
     return fmt::format("attitude: not used: {}\n", d.failure);
   }

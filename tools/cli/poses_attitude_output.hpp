@@ -9,7 +9,7 @@
 
 namespace selfcal::cli {
 
-std::string attitude_text(const diagnosis::ByAttitude& d, const Units& shown);
+std::string attitude_text(const diagnosis::ByAttitude& d, const ReadingUnits& shown);
 nlohmann::ordered_json attitude_json(const diagnosis::ByAttitude& d);
 
 }  // namespace selfcal::cli

@@ -19,7 +19,7 @@ std::string three(const std::array<double, 3>& v, double unit) {
   return fmt::format("{:.4g}/{:.4g}/{:.4g}", v[0] / unit, v[1] / unit, v[2] / unit);
 }
 
-std::string clipping_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+std::string clipping_text(const diagnosis::PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text;
   for (const diagnosis::LeftOut& out : d.left_out) {
     text += fmt::format("left out: {:.2f} to {:.2f} s, {} sample{}: {}\n", out.first_s, out.last_s, out.samples,
@@ -38,7 +38,8 @@ std::string clipping_text(const diagnosis::PoseDiagnosis& d, const Units& shown)
 }
 
 // Parameters that the poses determine, and the names of those that they do not.
-std::string parameters_text(const std::vector<diagnosis::PoseParameter>& parameters, const Units& shown, bool gyro) {
+std::string parameters_text(const std::vector<diagnosis::PoseParameter>& parameters, const ReadingUnits& shown,
+                            bool gyro) {
   std::string text, open;
   for (const diagnosis::PoseParameter& p : parameters) {
     if (!p.determined) {
@@ -60,7 +61,7 @@ std::string parameters_text(const std::vector<diagnosis::PoseParameter>& paramet
   return text;
 }
 
-std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text = fmt::format("accelerometers: {}; |f| - g {:.3f} mg rms",
                                  !d.accel_adequate ? "misfit"
                                  : d.accel_tested  ? "adequate"
@@ -95,7 +96,7 @@ std::string accelerometers_text(const diagnosis::PoseDiagnosis& d, const Units& 
   return text;
 }
 
-std::string effect_text(const diagnosis::PoseEffect& e, const Units& shown) {
+std::string effect_text(const diagnosis::PoseEffect& e, const ReadingUnits& shown) {
   std::string text;
   for (std::size_t k = 0; k < e.value.size(); ++k) {
     text +=
@@ -114,7 +115,7 @@ std::string confounded_text(const diagnosis::PoseDiagnosis& d) {
                       : text + ": the order of the poses is that of time; the same poses in another order tell\n";
 }
 
-std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+std::string gyros_text(const diagnosis::PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text =
       fmt::format("gyros in the poses, {}: bias {} +- {}{}\n", shown.gyro_name, three(d.gyro_bias, shown.gyro),
                   three(d.gyro_bias_sigma, shown.gyro), d.earth_taken_out ? ", the Earth's rate taken out" : "");
@@ -167,7 +168,7 @@ std::string gyros_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
   return text;
 }
 
-std::string turns_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+std::string turns_text(const diagnosis::PoseDiagnosis& d, const ReadingUnits& shown) {
   if (d.turns == 0) {
     return "no turn between poses is usable: scale factors and misalignment of the gyros are not seen\n";
   }
@@ -218,7 +219,7 @@ std::string axis_text(const diagnosis::ReadOutAxis& a) {
   return text;
 }
 
-std::string read_outs_text(const diagnosis::ReadOuts& r, const Units& shown) {
+std::string read_outs_text(const diagnosis::ReadOuts& r, const ReadingUnits& shown) {
   std::string text = "angle read-outs:\n";
   for (const diagnosis::ReadOutAxis& a : r.axes) {
     text += axis_text(a);
@@ -263,7 +264,7 @@ std::string noise_text(const std::vector<diagnosis::RestNoise>& all, const char*
 }
 
 // Of a log with one triad: what both together would say is left out.
-std::string one_triad_text(const diagnosis::PoseDiagnosis& d, const Units& shown) {
+std::string one_triad_text(const diagnosis::PoseDiagnosis& d, const ReadingUnits& shown) {
   if (d.sensors == diagnosis::Sensors::accelerometers) {
     return (d.by_poses ? accelerometers_text(d, shown) : std::string()) +
            noise_text(d.accel_noise, "accelerometers", shown.accel, shown.accel_name);
@@ -280,7 +281,7 @@ std::string one_triad_text(const diagnosis::PoseDiagnosis& d, const Units& shown
 }  // namespace
 
 std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si) {
-  const Units shown = units_of(si);
+  const ReadingUnits shown = units_of(si);
   if (d.dividing_head) {
     std::string text = head_text(*d.dividing_head);
     for (const std::string& words : d.invisible) {

@@ -147,7 +147,7 @@ std::string what_decides(const PoseDiagnosis& d) {
              : std::string();
 }
 
-std::string findings(const PoseDiagnosis& d, const Units& shown) {
+std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text;
   for (const PoseEffect& e : d.gyro_named) {
     text += effect_line(d, e, shown.gyro, shown.gyro_name);
@@ -323,7 +323,7 @@ void add_row(const std::vector<PoseParameter>& all, const std::string& label, co
 std::array<std::string, 3> of_axes(const std::string& stem) { return {stem + "_x", stem + "_y", stem + "_z"}; }
 
 Row gyro_row(const char* what, const std::array<double, 3>& value, const std::array<double, 3>& sigma,
-             const Units& shown, const std::array<bool, 3>& axes) {
+             const ReadingUnits& shown, const std::array<bool, 3>& axes) {
   const Scaled in = scaled(shown.gyro_short, shown.gyro, value);
   Row row{fmt::format("gyro {}, {}", what, in.name), {}};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -333,8 +333,8 @@ Row gyro_row(const char* what, const std::array<double, 3>& value, const std::ar
 }
 
 // Gyros that see the Earth are told in degrees an hour.
-Units of_headings(bool si) {
-  Units shown = units_of(si);
+ReadingUnits of_headings(bool si) {
+  ReadingUnits shown = units_of(si);
   if (si) {
     shown.gyro = units::degree_per_hour;
     shown.gyro_name = shown.gyro_short = "deg/h";
@@ -342,7 +342,7 @@ Units of_headings(bool si) {
   return shown;
 }
 
-std::string table(const PoseDiagnosis& d, const Units& shown) {
+std::string table(const PoseDiagnosis& d, const ReadingUnits& shown) {
   std::vector<Row> rows = {{"", {"x", "y", "z"}}};
   const bool raw_scale = std::any_of(d.accel_parameters.begin(), d.accel_parameters.end(),
                                      [](const PoseParameter& p) { return p.unit == "raw/g"; });
@@ -398,7 +398,7 @@ std::string turns_line(const PoseDiagnosis& d) {
   return earth + turns_words(d);
 }
 
-std::string read_outs(const diagnosis::ReadOuts& r, const Units& shown) {
+std::string read_outs(const diagnosis::ReadOuts& r, const ReadingUnits& shown) {
   std::string text;
   for (const diagnosis::ReadOutAxis& a : r.axes) {
     const Eigen::Index k = main_axis(a);
@@ -462,7 +462,7 @@ std::string unseen(const PoseDiagnosis& d) {
 }  // namespace
 
 std::string poses_summary(const PoseDiagnosis& d, bool si) {
-  const Units shown = units_of(si);
+  const ReadingUnits shown = units_of(si);
   if (d.dividing_head) {
     return head_text(*d.dividing_head) + unseen(d);
   }

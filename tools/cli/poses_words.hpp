@@ -11,13 +11,15 @@
 namespace selfcal::cli {
 
 // Readings in a unit that people know.
-struct Units {
+struct ReadingUnits {
   double gyro = 1.0, accel = 1.0;
   const char *gyro_name = "raw units", *accel_name = "raw units";
   const char *gyro_short = "raw", *accel_short = "raw";
 };
 
-inline Units units_of(bool si) { return si ? Units{units::degree, 9.80665e-3, "deg/s", "mg", "deg/s", "mg"} : Units{}; }
+inline ReadingUnits units_of(bool si) {
+  return si ? ReadingUnits{units::degree, 9.80665e-3, "deg/s", "mg", "deg/s", "mg"} : ReadingUnits{};
+}
 
 // The sensor axis that the table's axis mostly turns.
 inline Eigen::Index main_axis(const diagnosis::ReadOutAxis& a) {

@@ -17,12 +17,12 @@ std::optional<AccelJump> find_accel_jump(const std::vector<Pose>& poses, double 
   }
   const std::vector<double> time_s = middles(poses);
   Eigen::Index best = 0;
-  Comparison of_best;
+  RowComparison of_best;
   std::vector<double> square(static_cast<std::size_t>(n), HUGE_VAL);  // what a step before each pose leaves
   for (Eigen::Index first = side; first + side <= n; ++first) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(n, 3);
     columns.bottomRows(n - first) = -model.jacobian.bottomLeftCorner(n - first, 3);  // of a reading's bias, raw
-    Comparison c = compare(model.jacobian, columns, model.residual, time_s, true);
+    RowComparison c = compare(model.jacobian, columns, model.residual, time_s, true);
     square[static_cast<std::size_t>(first)] = c.with.square;
     if (c.log_p < of_best.log_p) {
       of_best = std::move(c);

@@ -96,7 +96,7 @@ void Gyros::take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& 
       of_parts(k, static_cast<Eigen::Index>(j)) = poses_[static_cast<std::size_t>(k)].part == parts[j] ? 1.0 : 0.0;
     }
   }
-  std::array<Comparison, 3> answers;
+  std::array<RowComparison, 3> answers;
   double log_p = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     answers[axis] = compare(known_[axis], of_parts, y_[axis], time_s_, true);
@@ -162,7 +162,7 @@ bool Gyros::take_step(const PoseInput& input, const PoseEffect& chosen, double l
   double log_p = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const Comparison c = compare(known_[i], column, y_[i], time_s_, true);
+    const RowComparison c = compare(known_[i], column, y_[i], time_s_, true);
     const double beside = log_p_beside_flicker(poses_, time_s_, axis, known_[i], column, y_[i], two_sigma);
     log_p = std::min(log_p, std::max(c.log_p, beside));
     jump.size(axis) = c.with.value(known_[i].cols());
@@ -187,7 +187,7 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
-    const Comparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
+    const RowComparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
     const double beside_flicker =
         with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i], two_sigma) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;
@@ -347,8 +347,8 @@ void judge_accelerometers(AccelModel& model, const std::vector<Pose>& poses, dou
       if (trial.columns.cols() == 0) {
         continue;
       }
-      const Comparison c = compare(model.jacobian, model.weight.asDiagonal() * trial.columns, model.residual, time_s,
-                                   changes_with_time(effect, duration_s, 3));
+      const RowComparison c = compare(model.jacobian, model.weight.asDiagonal() * trial.columns, model.residual, time_s,
+                                      changes_with_time(effect, duration_s, 3));
       d.accel_tried.push_back(effect_in_force(trial, c, model.jacobian.cols()));
       beside.push_back({c.log_p, c.with.value.head<9>(), c.with.sigma.head<9>()});
     }

@@ -77,7 +77,7 @@ Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duratio
   return at_pose(effect, NAN, pose, duration_s).velocity;
 }
 
-void add_coefficients(const Trial& trial, const Comparison& c, Eigen::Index known, PoseEffect& effect) {
+void add_coefficients(const Trial& trial, const RowComparison& c, Eigen::Index known, PoseEffect& effect) {
   for (std::size_t j = 0; j < trial.names.size(); ++j) {
     effect.parameters.push_back(trial.names[j]);
     effect.value.push_back(c.with.value(known + static_cast<Eigen::Index>(j)));
@@ -85,7 +85,7 @@ void add_coefficients(const Trial& trial, const Comparison& c, Eigen::Index know
   }
 }
 
-PoseEffect effect_in_force(const Trial& trial, const Comparison& c, Eigen::Index known) {
+PoseEffect effect_in_force(const Trial& trial, const RowComparison& c, Eigen::Index known) {
   PoseEffect p;
   p.effect = trial.effect;
   p.constant = trial.constant;
@@ -175,8 +175,8 @@ Regression regress(const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
   return r;
 }
 
-Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
-                   const std::vector<double>& time_s, bool of_time) {
+RowComparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                      const std::vector<double>& time_s, bool of_time) {
   const auto n = y.size();
   if (of_time) {
     const Regression with = regress(joined(known, columns), y);
@@ -184,7 +184,7 @@ Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns,
   }
   const Whitener white(known, y, time_s);
   const Eigen::VectorXd whitened = white(y);
-  Comparison c;
+  RowComparison c;
   c.with = regress(white(joined(known, columns)), whitened);
   c.log_p = log_p_of(regress(white(known), whitened), c.with, n);
   c.with.held_out_rms = regress(joined(known, columns), y).held_out_rms;  // in the reading's unit

@@ -32,12 +32,12 @@ class Whitener {
 
 // With and without the columns. Of the pose an effect is asked beside a random walk, for poses that follow one another differ in time
 // too; what changes with time (`of_time`) is asked beside white noise, for a walk would be its rival.
-struct Comparison {
+struct RowComparison {
   Regression with;
   double log_p = 0.0;
 };
-Comparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
-                   const std::vector<double>& time_s, bool of_time);
+RowComparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                      const std::vector<double>& time_s, bool of_time);
 // The same of a gyro beside the white noise of its means and a 1/f noise as large as the halves of the poses differ by beyond that: a poor
 // gyro's bias wanders by it, and the lowest frequency of a few poses looks like any slow drift. Minus infinity where the halves show none.
 // S(f) = h/f has the Allan variance 2 ln 2 h; means over the time a of it that lie d apart differ by 2 h (ln(d/a) + 3/2) in the square.
@@ -55,9 +55,9 @@ struct Trial {
   std::vector<std::string> names;
 };
 // Adds the trial's coefficients to an effect: those behind the first `known` ones of the comparison.
-void add_coefficients(const Trial& trial, const Comparison& c, Eigen::Index known, PoseEffect& effect);
+void add_coefficients(const Trial& trial, const RowComparison& c, Eigen::Index known, PoseEffect& effect);
 // An effect in |f|, as the comparison has it.
-PoseEffect effect_in_force(const Trial& trial, const Comparison& c, Eigen::Index known);
+PoseEffect effect_in_force(const Trial& trial, const RowComparison& c, Eigen::Index known);
 // d(specific force)/d(coefficient) at a pose, SI, [3 x coefficients], of an effect that changes neither with time nor with a constant.
 Eigen::Matrix3Xd force_at(const Effect& effect, const Pose& pose, double duration_s);
 Trial trial_of(const Effect& effect, double constant, const std::vector<Pose>& poses, double duration_s, int axis);

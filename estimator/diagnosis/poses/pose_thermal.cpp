@@ -24,7 +24,7 @@ Eigen::MatrixXd columns_of(const Trial& trial, const AccelModel& model) {
 PoseEffect attempt(const Effect& effect, const Eigen::MatrixXd& known, const AccelModel& model,
                    const std::vector<Pose>& poses, double duration_s) {
   const Trial trial = trial_of(effect, NAN, poses, duration_s, 3);
-  const Comparison c = compare(known, columns_of(trial, model), model.residual, middles(poses), false);
+  const RowComparison c = compare(known, columns_of(trial, model), model.residual, middles(poses), false);
   return effect_in_force(trial, c, known.cols());
 }
 

@@ -78,7 +78,7 @@ TEST(FlickerInPoses, LooksLikeADriftBesideWhiteNoise) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     const Log log = drawn(1.0, 0.0, seed);
     const Eigen::MatrixXd ramp = Eigen::Map<const Eigen::VectorXd>(log.time_s.data(), pose_count);
-    const Comparison c = compare(Eigen::MatrixXd::Ones(pose_count, 1), ramp, log.y, log.time_s, true);
+    const RowComparison c = compare(Eigen::MatrixXd::Ones(pose_count, 1), ramp, log.y, log.time_s, true);
     below += c.log_p < std::log(0.01) ? 1 : 0;
   }
   EXPECT_GT(below, 20);
