@@ -39,10 +39,10 @@ struct Frame {
   explicit Frame(const AxisOrder& order) : to_b(order.matrix().transpose()), mirrored(to_b.determinant() < 0.0) {
     rotated = mirrored ? Matrix3(-to_b) : to_b;
   }
-  Matrix3 C_ib(const Rest& rest) const {
+  Matrix3 C_ib(const SensedRest& rest) const {
     return rotated * (mirrored ? rest.C_ib_mirrored : rest.C_ib) * rotated.transpose();
   }
-  Matrix3 turn(const Turn& t) const {
+  Matrix3 turn(const SensedTurn& t) const {
     return matrix_from_rotation_vector(rotated * (mirrored ? t.by_gyros_mirrored : t.by_gyros));
   }
 };
@@ -53,7 +53,7 @@ double squared(double angle, double sigma) { return angle * angle / (sigma * sig
 
 double turns_misfit(const Witnesses& w, const Frame& gyros, const ReadOutOrder& read_out) {
   double sum = 0.0;
-  for (const Turn& t : w.turns) {
+  for (const SensedTurn& t : w.turns) {
     const Matrix3 by_gimbal = read_out.C_vb(t.from).transpose() * read_out.C_vb(t.to);
     sum += squared(Eigen::AngleAxisd(by_gimbal.transpose() * gyros.turn(t)).angle(), angle_sigma);
   }
@@ -79,7 +79,7 @@ struct GravityByReadOut {
 GravityByReadOut gravity_by_read_out(const Witnesses& w, const Matrix3& accel_to_b, const ReadOutOrder& read_out) {
   std::vector<Vector3> up;
   Vector3 mean = Vector3::Zero();
-  for (const Rest& r : w.rests) {
+  for (const SensedRest& r : w.rests) {
     up.emplace_back(read_out.C_vb(r.angles) * (accel_to_b * r.force).normalized());
     mean += up.back();
   }
@@ -139,7 +139,7 @@ class Tables {
     for (const AxisOrder& order : all_axis_orders()) {
       frames_.emplace_back(order);
       std::vector<Matrix3>& C_ib = attitudes_.emplace_back();
-      for (const Rest& r : w.rests) {
+      for (const SensedRest& r : w.rests) {
         C_ib.push_back(frames_.back().C_ib(r));
       }
       earth_.push_back(earth_by_gyros(w, frames_.back(), C_ib));
@@ -301,7 +301,7 @@ Witness PairMisfit::odd() const {
 PairMisfit pair_misfit(const Witnesses& w) {
   const Frame right{AxisOrder{}};
   std::vector<Matrix3> C_ib;
-  for (const Rest& r : w.rests) {
+  for (const SensedRest& r : w.rests) {
     C_ib.push_back(r.C_ib);
   }
   const auto per = [](double sum, std::size_t count) { return count > 0 ? sum / static_cast<double>(count) : 0.0; };

@@ -150,11 +150,9 @@ struct TurnFit {
 
 std::optional<TurnFit> fit_turns(const Witnesses& w) {
   Matrix3 cross = Matrix3::Zero(), normal = Matrix3::Zero();
-  for (const Turn& t : w.turns) {
-    const Matrix3 from = gimbal_matrix(t.from.outer, t.from.inner), to = gimbal_matrix(t.to.outer, t.to.inner);
-    const Vector3 expected = rotation_vector_from_matrix(from.transpose() * to);
-    cross += t.by_gyros * expected.transpose();
-    normal += expected * expected.transpose();
+  for (const SensedTurn& t : w.turns) {
+    cross += t.by_gyros * t.by_gimbal.transpose();
+    normal += t.by_gimbal * t.by_gimbal.transpose();
   }
   const Eigen::JacobiSVD<Matrix3> svd(normal, Eigen::ComputeFullU | Eigen::ComputeFullV);
   if (svd.singularValues()(0) == 0.0) {
@@ -180,16 +178,13 @@ bool turns_agree(const Witnesses& w) {
   if (fit && (fit->measured - fit->seen).cwiseAbs().maxCoeff() > plausible_turn) {
     return false;
   }
-  return std::none_of(w.turns.begin(), w.turns.end(), [&](const Turn& t) {
-    const double by_gimbal =
-        Eigen::AngleAxisd(gimbal_matrix(t.from.outer, t.from.inner).transpose() * gimbal_matrix(t.to.outer, t.to.inner))
-            .angle();
-    return t.by_gyros.norm() > least_turn && by_gimbal < 0.1 * t.by_gyros.norm();
+  return std::none_of(w.turns.begin(), w.turns.end(), [&](const SensedTurn& t) {
+    return t.by_gyros.norm() > least_turn && t.by_gimbal.norm() < 0.1 * t.by_gyros.norm();
   });
 }
 
 // rms over g of how gravity, turned back by the gyros, differs from one dwell to the next.
-double gravity_scatter(const std::vector<Rest>& dwells) {
+double gravity_scatter(const std::vector<SensedRest>& dwells) {
   double differences = 0.0, square = 0.0;
   for (std::size_t k = 1; k < dwells.size(); ++k) {
     const Vector3 before = dwells[k - 1].C_ib * dwells[k - 1].force;
@@ -200,7 +195,7 @@ double gravity_scatter(const std::vector<Rest>& dwells) {
 }
 
 // Gravity, turned back by the gyros, must point the same way in one dwell and the next, but for the 15 deg/h of the Earth.
-bool gravity_agrees(const std::vector<Rest>& dwells) {
+bool gravity_agrees(const std::vector<SensedRest>& dwells) {
   constexpr double inconsistent = 0.15;  // half an hour on the Earth, a gimbal off by degrees
   constexpr double longest_s = 1200.0;
   return dwells.size() < 2 ||
@@ -211,7 +206,7 @@ bool gravity_agrees(const std::vector<Rest>& dwells) {
 // By the gimbal. Vehicles stand on their wheels.
 bool upside_down(const Witnesses& w) {
   double up = 0.0;
-  for (const Rest& r : w.rests) {
+  for (const SensedRest& r : w.rests) {
     up += (gimbal_matrix(r.angles.outer, r.angles.inner) * r.force.normalized()).y();
   }
   return w.gimbal && !w.rests.empty() && up < -0.5 * static_cast<double>(w.rests.size());
@@ -221,7 +216,7 @@ bool upside_down(const Witnesses& w) {
 
 std::string span_words(const Witnesses& w) {
   double outer = 0.0, inner = 0.0;
-  for (const Turn& t : w.turns) {
+  for (const SensedTurn& t : w.turns) {
     outer = std::max(outer, std::abs(t.to.outer - t.from.outer));
     inner = std::max(inner, std::abs(t.to.inner - t.from.inner));
   }
@@ -309,13 +304,13 @@ struct SensedEarth {
 
 // Mean rates of dwells are w_k = C_k' w + drift, w the Earth's in space; with gravity's direction in the same dwell the
 // latitude is the arc sine of their product. None where dwells are few or alike, or the base sways.
-std::optional<SensedEarth> sense_earth(const std::vector<Rest>& dwells) {
+std::optional<SensedEarth> sense_earth(const std::vector<SensedRest>& dwells) {
   constexpr std::size_t enough = 6;
   constexpr double told_apart = 0.1;  // of the information that dwells all about have
   constexpr double steady = 0.05 * earth::rotation_rate;
   Matrix6 normal = Matrix6::Zero();
   Vector6 right = Vector6::Zero();
-  for (const Rest& r : dwells) {
+  for (const SensedRest& r : dwells) {
     Eigen::Matrix<double, 3, 6> row;
     row << r.C_ib.transpose(), Matrix3::Identity();
     normal += row.transpose() * row;
@@ -331,7 +326,7 @@ std::optional<SensedEarth> sense_earth(const std::vector<Rest>& dwells) {
   const Vector3 rate = fit.head<3>();
   SensedEarth sensed{fit.tail<3>()};
   double misfit = 0.0, square = 0.0;
-  for (const Rest& r : dwells) {
+  for (const SensedRest& r : dwells) {
     const Vector3 own = r.C_ib.transpose() * rate;
     misfit += (r.rate - own - sensed.drift).squaredNorm() / n;
     const double angle = std::asin(std::clamp(own.normalized().dot(r.force.normalized()), -1.0, 1.0));
@@ -402,7 +397,7 @@ void find_wrong_axes(const ImuData& data, const std::vector<Segment>& segments, 
   const Witnesses w = gather_witnesses(data, segments);
   if (!w.rests.empty() && witnesses_agree(w, data.size(), data.site, faults)) {
     double up = 0.0;
-    for (const Rest& r : w.rests) {
+    for (const SensedRest& r : w.rests) {
       up += (gimbal_matrix(r.angles.outer, r.angles.inner) * r.force.normalized()).y();
     }
     latitude_by_gyros(data, segments, w.gimbal && up > 0.5 * static_cast<double>(w.rests.size()), faults);

@@ -16,14 +16,16 @@ struct GimbalAngles {
 
 // One rotation, from a second before it to a second after it. Where the axes of the gyros are a mirror image of the right
 // ones the increments turn the other way, and what many of them add up to has to be integrated apart.
-struct Turn {
+// All rotation vectors are followed from sample to sample: half a turn has a sense, and more than that its length.
+struct SensedTurn {
   Vector3 by_gyros;           // rotation vector of the increments, b as given
   Vector3 by_gyros_mirrored;  // of the increments' opposite
+  Vector3 by_gimbal;          // of the read-outs; zero where there are none
   GimbalAngles from, to;
 };
 
 // One dwell without its first and last second.
-struct Rest {
+struct SensedRest {
   Vector3 rate = Vector3::Zero(), force = Vector3::Zero();  // means, b as given: rad/s, m/s^2
   Matrix3
       C_ib = Matrix3::Identity(),
@@ -36,8 +38,8 @@ struct Rest {
 
 struct Witnesses {
   bool gimbal = false;  // there are read-outs
-  std::vector<Turn> turns;
-  std::vector<Rest> rests;
+  std::vector<SensedTurn> turns;
+  std::vector<SensedRest> rests;
 };
 
 // `drift` (rad/s) is taken from the gyros before they are integrated.

@@ -2,6 +2,7 @@
 // recording mended as told holds no fault any more.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <numbers>
 #include <random>
@@ -94,6 +95,16 @@ struct Fault {
 
 const Fault faults[] = {
     {"nothing", [](Samples&) {}, "", ""},
+    {"within_half_a_circle",
+     [](Samples& s) {
+       for (double& angle : s.outer) {
+         angle = std::remainder(angle, 2.0 * std::numbers::pi);
+       }
+       for (double& angle : s.inner) {
+         angle = std::remainder(angle, 2.0 * std::numbers::pi);
+       }
+     },
+     "", ""},
     {"outer_reversed", [](Samples& s) { multiply(s.outer, -1.0); }, "wrong_sign",
      "the read-out gimbal_outer_rad is reversed: gyros and accelerometers agree with each other; negate it"},
     {"inner_reversed", [](Samples& s) { multiply(s.inner, -1.0); }, "wrong_sign",
@@ -161,23 +172,46 @@ const Fault faults[] = {
 
 struct Place {
   const char* name;
-  const char* schedule;
+  Schedule (*schedule)();
   Attitude vehicle;  // rad
   double latitude_deg;
 };
 
+// Both axes both ways, by 180 and 270 deg at a time: where such a turn begins and ends does not say its sense.
+Schedule half_turns() {
+  Schedule schedule;
+  schedule.rotation_s = 8.0;
+  for (const auto& [outer, inner] : std::initializer_list<std::pair<double, double>>{{0.0, 0.0},
+                                                                                     {180.0, 0.0},
+                                                                                     {180.0, 90.0},
+                                                                                     {0.0, 90.0},
+                                                                                     {0.0, 270.0},
+                                                                                     {90.0, 270.0},
+                                                                                     {90.0, 90.0},
+                                                                                     {270.0, 90.0},
+                                                                                     {270.0, 180.0},
+                                                                                     {0.0, 180.0},
+                                                                                     {0.0, 0.0},
+                                                                                     {90.0, 0.0},
+                                                                                     {90.0, 180.0}}) {
+    schedule.positions.push_back({outer, inner});
+    schedule.dwell_s.push_back(30.0);
+  }
+  return schedule;
+}
+
 const Place places[] = {
-    {"horizontal_level", "horizontal", {0.02, -0.03, 0.6}, 40.0},
-    {"horizontal_tilted", "horizontal", {-0.15, 0.2, 2.6}, -33.0},
-    {"table2_tilted", "table2", {0.1, 0.12, 4.0}, 52.0},
+    {"horizontal_level", [] { return *named_schedule("horizontal", 30.0, 5.0); }, {0.02, -0.03, 0.6}, 40.0},
+    {"horizontal_tilted", [] { return *named_schedule("horizontal", 30.0, 5.0); }, {-0.15, 0.2, 2.6}, -33.0},
+    {"table2_tilted", [] { return *named_schedule("table2", 30.0, 5.0); }, {0.1, 0.12, 4.0}, 52.0},
+    {"half_turns", half_turns, {-0.1, 0.06, 1.1}, 28.0},
 };
 
 class OddOneOut : public testing::TestWithParam<std::tuple<Place, Fault, int>> {};
 
 TEST_P(OddOneOut, IsNamedWithItsMend) {
   const auto& [place, fault, seed] = GetParam();
-  const IdealRecording ideal(*named_schedule(place.schedule, 30.0, 5.0), place.vehicle,
-                             {place.latitude_deg * units::degree, 2.0, 50.0}, rate_hz);
+  const IdealRecording ideal(place.schedule(), place.vehicle, {place.latitude_deg * units::degree, 2.0, 50.0}, rate_hz);
   ImuData data = ideal.data();
   Samples samples;
   samples.theta.assign(data.delta_theta.begin(), data.delta_theta.end());
