@@ -2,8 +2,9 @@
 """Holds the source tree to its module boundaries: python3 check.py ROOT
 
 Reads every #include of our own code and prints one line, "file:line: what", for each that points against the
-arrows below; then checks that no file is too long, that each folder of the top level explains itself, and that no identifier
-of our own INS's profile stands in C++ outside of tests.
+arrows below; then checks that no file is too long, that each folder of the top level explains itself, that no identifier
+of our own INS's profile stands in C++ outside of tests, and that no two types of one namespace have one name: the linker takes
+what it has of either for the other.
 Exit status 1 if anything was found.
 """
 import re
@@ -69,6 +70,11 @@ LEAST_OWN = 0x100
 TOML_NUMBER = re.compile(r"^\s*(?:did|routine|serial|software|in_force|inactive|factory|request|response|functional|status)"
                          r"\s*=\s*(0x[0-9A-Fa-f]+)")
 HEX_NUMBER = re.compile(r"\b0[xX][0-9A-Fa-f']+")
+
+# As clang-format writes them: what begins a line is in no function and in no type.
+NAMESPACE = re.compile(r"^namespace(?:\s+([\w:]+))?\s*\{")
+NAMESPACE_END = re.compile(r"^\}\s*// namespace")
+TYPE = re.compile(r"^(?:template <.*>\s*)?(?:struct|class|enum(?: class)?)\s+(\w+)(?!\s*::)\b[^;]*\{")
 
 # Paths generated at build time; written <like/this>, so never mistaken for files of ours.
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -139,8 +145,31 @@ def number_complaints(root, path, own):
                 yield f"{source}:{number}: {match[0]} is our own INS's: it stands in {OWN_PROFILE} alone"
 
 
+def types_of(path):
+    """(line number, qualified name) of each type that other files may know."""
+    within = []
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        if match := NAMESPACE.match(line):
+            within.append(match[1])
+        elif NAMESPACE_END.match(line) and within:
+            within.pop()
+        elif (match := TYPE.match(line)) and None not in within:
+            yield number, "::".join([*within, match[1]])
+
+
+def type_complaints(root, path, known):
+    source = path.relative_to(root).as_posix()
+    if source.startswith("tests/"):
+        return
+    for number, name in types_of(path):
+        if name in known:
+            yield f"{source}:{number}: {name} is another type in {known[name]}"
+        known.setdefault(name, source)
+
+
 def complaints(root):
     own = own_numbers(root)
+    types = {}
     for folder in TOP_LEVEL:
         if not (root / folder / "README.md").is_file():
             yield f"{folder}/: has no README.md"
@@ -153,6 +182,7 @@ def complaints(root):
             if path.suffix in CODE:
                 yield from include_complaints(root, path)
                 yield from number_complaints(root, path, own)
+                yield from type_complaints(root, path, types)
 
 
 def main():

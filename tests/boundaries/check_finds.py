@@ -12,7 +12,8 @@ KEPT = {
     "estimator/models/imu_data.hpp": '#include "estimator/geometry/rotation.hpp"\n',
     "estimator/navigation/navigator.hpp": '#include "estimator/models/imu_data.hpp"\n',
     "estimator/statistics/distributions.hpp": "",
-    "estimator/passes/pass.hpp": '#include "estimator/navigation/navigator.hpp"\n',
+    "estimator/passes/pass.hpp": '#include "estimator/navigation/navigator.hpp"\nnamespace ins {\nstruct Turn;\nclass Pass::Turn {\n};\n'
+                                 'struct Turn {\n};\n}  // namespace ins\n',
     "estimator/diagnosis/search.cpp": '#include "estimator/passes/pass.hpp"\n  std::snprintf(text, 8, "%d", 1);\n'
                                       '  bool same = a.effect == b.effect;  // not a.id == b.id\n  f.id = "walk";\n',
     "protocol/error.hpp": "#include <tl/expected.hpp>\n",
@@ -24,7 +25,8 @@ KEPT = {
     "sim_ins/gimbal.cpp": '#include "estimator/geometry/rotation.hpp"\n#include "protocol/isotp/codec.hpp"\n',
     "daemon/main.cpp": '#include "estimator/passes/pass.hpp"\n#include <systemd/sd-event.h>\n',
     "tools/cli/main.cpp": '#include "daemon/host/config.hpp"\n#include "sim_ins/config.hpp"\n',
-    "daemon/host/config.hpp": "",
+    "daemon/host/config.hpp": "namespace host {\nstruct Turn {\n};\n}  // namespace host\nnamespace ins {\nnamespace {\nstruct Turn {\n};\n"
+                              "}  // namespace\n}  // namespace ins\n",
     "daemon/ins/ins_client.hpp": '#include "daemon/host/config.hpp"\n',
     "daemon/store/run_store.hpp": '#include "daemon/host/config.hpp"\n',
     "daemon/estimate/estimate_job.hpp": '#include "daemon/store/run_store.hpp"\n',
@@ -71,6 +73,7 @@ BREACHES = {
     "no frame of ours": ("tools/cli/main.cpp", "constexpr int request = 0X640;\n"),
     "nobody includes tests": ("tools/cli/main.cpp", '#include "tests/helper.hpp"\n'),
     "paths from the root": ("daemon/main.cpp", '#include "config.hpp"\n'),
+    "one name, two types": ("tools/cli/main.cpp", "namespace ins {\nclass Turn final : public Move {\n};\n}  // namespace ins\n"),
     "long file": ("daemon/main.cpp", "\n" * (check.LINE_LIMIT + 1)),
     "folder without README": ("config/README.md", None),
 }
