@@ -105,17 +105,21 @@ class Builder {
   }
 
   void kernels() {
+    // What begins anew with a turn, and holds its size until the turn is over, counts by `rest`. Nothing creeps before the first turn.
     add_grid(decays_, "exp(-since/?)", Kernel::creep, {4.0, 7.0, 11.0, 17.0, 26.0, 40.0, 60.0, 90.0, 140.0, 220.0},
-             0.5);
-    // Nothing creeps before the first turn, where `rest` is 1e9.
+             0.4);
+    add_grid(decays_, "exp(-rest/?)", Kernel::creep, {4.0, 11.0, 26.0, 60.0, 140.0}, 0.1);
+    // Relaxation with many time constants (Kohlrausch 1854), fast at first and with a long tail.
+    add_grid(decays_, "exp(-sqrt(since/?))", Kernel::creep, {2.0, 6.0, 18.0, 54.0}, 0.05);
     add_grid(decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
     add_grid(decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {1.0, 4.0, 15.0, 60.0}, 0.1);
-    add_grid(decays_, "exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.3, duration_h_);
+    add_grid(decays_, "exp(-t/?)", Kernel::warm_up, {0.05, 0.1, 0.18, 0.3, 0.5, 0.9}, 0.25, duration_h_);
     // Beside two quantities the constants stand 2.5 apart: a decay between two of them is like one of them to 0.95.
-    add_grid(coarse_decays_, "exp(-since/?)", Kernel::creep, {4.0, 11.0, 26.0, 60.0, 140.0}, 0.5);
+    add_grid(coarse_decays_, "exp(-since/?)", Kernel::creep, {4.0, 11.0, 26.0, 60.0, 140.0}, 0.45);
+    add_grid(coarse_decays_, "exp(-rest/?)", Kernel::creep, {8.0, 45.0}, 0.1);
     add_grid(coarse_decays_, "log(1+rest/?)*sign(n)", Kernel::log_creep, {2.0, 20.0}, 0.1);
     add_grid(coarse_decays_, "log(1+since/?)*sign(n)", Kernel::log_creep, {2.0, 20.0}, 0.1);
-    add_grid(coarse_decays_, "exp(-t/?)", Kernel::warm_up, {0.06, 0.18, 0.5}, 0.3, duration_h_);
+    add_grid(coarse_decays_, "exp(-t/?)", Kernel::warm_up, {0.06, 0.18, 0.5}, 0.25, duration_h_);
     waves();
     quotients();
     for (std::size_t k = 1; k < sums_.pieces.size(); ++k) {

@@ -19,6 +19,7 @@
 #include "estimator/discovery/search_state.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/discovery/stability.hpp"
+#include "estimator/discovery/step_with_turns.hpp"
 #include "estimator/discovery/two_laws.hpp"
 #include "estimator/statistics/distributions.hpp"
 
@@ -103,6 +104,7 @@ class LawSearch::Search {
       const Departed far = departed(laws_on_, state_.fit, k, residual_.available(), options_.stop);
       law.departure_log_p = far.log_p;
       law.departs_with = far.quantity;
+      law.in_step = in_step_with_turns(laws_on_, state_.terms[k]);
     }
     ask_axes(laws);
     std::stable_sort(laws.begin(), laws.end(),

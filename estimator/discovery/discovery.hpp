@@ -65,6 +65,7 @@ struct DiscoveredLaw {
                                  // cannot be told from it, explains most
   double departure_log_p = 0.0;  // that a true form departs as far (departure.hpp), the logarithm
   std::string departs_with;      // the quantity where it departs most
+  bool in_step = false;          // a wave over the time that keeps step with the turns (step_with_turns.hpp)
   double lack_log_p = 0.0;       // that its axis, all laws on it true, leaves as much (lack_of_fit.hpp), the logarithm
   double overlap = 0.0;       // share of what the laws of its axis gain together that none gains alone (known_form.hpp)
   double carries_over = 0.0;  // probability that it leaves at most a tenth of the misfit on a plan never used

@@ -59,6 +59,9 @@ std::string why_unknown(int axis, const std::vector<DiscoveredLaw>& all, std::st
     if (law.departure_log_p < std::log(departure_rate)) {
       return "its form departs from the axis with " + law.departs_with;
     }
+    if (law.in_step) {
+      return "it keeps step with the turns; unequal dwells would tell";
+    }
     if (law.lack_log_p < std::log(departure_rate)) {
       return "positions and turns show more on the axis than it";
     }

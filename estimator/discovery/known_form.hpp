@@ -27,6 +27,7 @@ struct TellingLaws {
 // An axis whose form is none of those found is described only, with all equations on it. It is known by one of these:
 // - a law on it departs from what the axis does (departure.hpp), or the axis holds more than its laws (lack_of_fit.hpp), than of
 //   `departure_rate` of true laws each;
+// - a law on it is a wave over the time that keeps step with the turns (step_with_turns.hpp);
 // - a process of its own stands beside the equation;
 // - three equations share it, or two of which the smaller takes less than half of what the larger does, or of which one
 //   more probably fails on another plan than not, or which share more than a third of what they gain: they are more probably one law

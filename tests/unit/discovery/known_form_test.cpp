@@ -1,10 +1,13 @@
 #include "estimator/discovery/known_form.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <utility>
 #include <vector>
+
+#include "estimator/discovery/step_with_turns.hpp"
 
 using namespace selfcal::discovery;
 
@@ -54,6 +57,34 @@ TEST(KnownForm, AnAxisThatHoldsMoreThanItsLawIsDescribed) {
   EXPECT_EQ(told_and_described({lacks, law(0, 900.0)}), Counts(1, 1));
   lacks.lack_log_p = std::log(departure_rate) + 0.1;
   EXPECT_EQ(told_and_described({lacks, law(0, 900.0)}), Counts(2, 0));
+}
+
+TEST(KnownForm, AWaveThatKeepsStepWithTheTurnsIsDescribed) {
+  DiscoveredLaw wave = law(1, 900.0);
+  wave.in_step = true;
+  const TellingLaws t = tell_laws({wave, law(0, 2000.0)}, {}, departure_rate);
+  EXPECT_EQ(t.told.size(), 1U);
+  ASSERT_EQ(t.described.size(), 1U);
+  EXPECT_THAT(t.described.front().why, testing::StartsWith("it keeps step with the turns"));
+}
+
+// Nineteen turns, 155 s apart: periods of 150.9 to 159.4 s are within half a period of theirs over all.
+TEST(StepWithTurns, IsResolvedByAllTurnsTogether) {
+  std::vector<selfcal::diagnosis::Turn> turns;
+  for (int k = 0; k < 19; ++k) {
+    turns.push_back({150.0 + 155.0 * k, 155.0 + 155.0 * k});
+  }
+  EXPECT_TRUE(in_step(turns, 155.0));
+  EXPECT_TRUE(in_step(turns, 159.0));
+  EXPECT_FALSE(in_step(turns, 160.0));
+  EXPECT_FALSE(in_step(turns, 150.0));
+  EXPECT_TRUE(in_step(turns, 155.0 / 2.0));
+  EXPECT_TRUE(in_step(turns, 155.0 / 3.0));
+  EXPECT_FALSE(in_step(turns, 2.0 * 155.0));
+  turns[7].start_s += 10.0;  // one dwell is longer than the next
+  EXPECT_FALSE(in_step(turns, 155.0));
+  turns.resize(3);
+  EXPECT_FALSE(in_step(turns, 155.0));
 }
 
 // What is described says why, and what is told says nothing.
