@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 
 #include "estimator/diagnosis/data/axes.hpp"
 #include "estimator/diagnosis/data/spikes.hpp"
+#include "estimator/diagnosis/data/usual_step.hpp"
 #include "estimator/models/segments.hpp"
 
 namespace selfcal::diagnosis {
@@ -170,29 +172,38 @@ void time_base(const ImuData& data, std::vector<DataFault>& faults) {
   }
 }
 
-// Median of the changes from sample to sample: the quantum where it is coarse.
+// How long a gyro gives zero in a dwell and counts again in the same, the third longest time: the longest may be those in which it is stuck.
 template <typename Value>
-double usual_step(std::size_t samples, const Value& value) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < samples; ++i) {
-    if (value(i) != value(i - 1)) {
-      steps.push_back(std::abs(value(i) - value(i - 1)));
+double usual_rest_s(const ImuData& data, const std::vector<Segment>& segments, double count, const Value& value) {
+  constexpr std::size_t third = 2;
+  std::vector<std::size_t> rests;
+  for (const Segment& s : segments) {
+    std::size_t start = s.first;
+    for (std::size_t i = s.first + 1; !s.rotation && i < s.last; ++i) {
+      if (value(i) != value(i - 1)) {
+        if (start > s.first && std::abs(value(start)) < 0.5 * count) {
+          rests.push_back(i - start);
+        }
+        start = i;
+      }
     }
   }
-  if (steps.empty()) {
-    return HUGE_VAL;
+  if (rests.size() <= third) {
+    return 0.0;
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  std::nth_element(rests.begin(), rests.begin() + third, rests.end(), std::greater<>());
+  return static_cast<double>(rests[third]) / data.sample_rate_hz;
 }
 
 // An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds where they hardly turn; if the
-// rest of the dwell turns them by more than a few counts in that time, they were stuck. Accelerometers never rest.
-// Adds the stretches of a segment in which an axis gives one value for longer than it can. `count`: its usual step.
+// rest of the dwell turns them by more than a few counts in that time, they were stuck. Where they hardly turn in all of it, as upright ones
+// at the equator, they may rest for a few times what they have rested elsewhere. Accelerometers never rest.
+// Adds the stretches of a segment in which an axis gives one value for longer than it can. `count`: its usual step; `rest_s`: of
+// usual_rest_s().
 template <typename Value>
-void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, const Value& value, DataFault& fault) {
-  constexpr double gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7;
+void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, double rest_s, const Value& value,
+                DataFault& fault) {
+  constexpr double least_gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7, few = 4.0;
   const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
   const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
   double sum = 0.0;
@@ -210,6 +221,8 @@ void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, 
     const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
     const bool left_behind =
         gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s && std::abs(turned) > counts * count;
+    const bool zero = std::abs(value(start)) < 0.5 * count;
+    const double gyro_s = zero ? std::max(least_gyro_s, few * rest_s) : least_gyro_s;
     if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
       fault.first_sample = fault.count == 0 ? start : fault.first_sample;
       fault.count += i - start;
@@ -223,10 +236,11 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const bool gyro = axis < 3;
     const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
-    const double count = usual_step(data.size(), value);
+    const double count = usual_step(1, data.size(), value);
+    const double rest_s = gyro ? usual_rest_s(data, segments, count, value) : 0.0;
     DataFault fault{"frozen_axis", {}, 0, 0};
     for (const Segment& s : segments) {
-      find_stuck(data, s, gyro, count, value, fault);
+      find_stuck(data, s, gyro, count, rest_s, value, fault);
     }
     if (fault.count > 0) {
       fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +

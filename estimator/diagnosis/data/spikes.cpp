@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "estimator/diagnosis/data/usual_step.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -65,6 +66,22 @@ Clipping clipping(const ImuData& data, const Value& value, std::size_t first, st
   return found;
 }
 
+// Median over the dwells: a turn changes by more.
+double step_in_dwells(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis) {
+  std::vector<double> steps;
+  for (const Segment& s : segments) {
+    if (!s.rotation && s.last > s.first) {
+      steps.push_back(usual_step(s.first + 1, s.last, [&](std::size_t i) { return value_at(data, i, axis); }));
+    }
+  }
+  if (steps.empty()) {
+    return 0.0;
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return std::isfinite(*middle) ? *middle : 0.0;
+}
+
 // How far each sample in the dwells stands from what its neighbours make of it (fourth differences: a turn's smooth
 // beginning has none to speak of), in sigma; the samples in time's order.
 struct Departures {
@@ -93,7 +110,8 @@ Departures departures(const ImuData& data, const std::vector<Segment>& segments)
     std::vector<double> sorted = off;
     const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
     std::nth_element(sorted.begin(), at, sorted.end());
-    const double sigma = *at / 1.645;  // the 90 % point of normal noise
+    // The 90 % point of normal noise. Where that is below the quantum single counts stand beyond any multiple of it.
+    const double sigma = std::max(*at / 1.645, 0.25 * step_in_dwells(data, segments, axis));
     for (double& o : off) {
       o = sigma > 0.0 ? o / sigma : 0.0;
     }

@@ -1,12 +1,14 @@
-// Clipping against a rate that is steady to below the quantum: only the first is a fault.
+// Clipping against a rate that is steady to below the quantum, and gyros that are stuck or spike against quiet ones: only the first are faults.
 #include "estimator/diagnosis/data/faults.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include "estimator/geometry/units.hpp"
 
@@ -67,6 +69,67 @@ TEST(DataFaults, AClippedRateIs) {
   for (const double rate_hz : {50.0, 100.0, 200.0}) {
     EXPECT_TRUE(Turning(rate_hz, 20.0).saturated()) << rate_hz << " Hz";
   }
+}
+
+// Gyro y stands upright near the equator: 0.02" of turning a second, counted by 0.5", with white noise of a hundredth of a count.
+ImuData quiet_and_coarse(std::vector<double>& time, std::vector<std::array<double, 3>>& theta,
+                         std::vector<std::array<double, 3>>& velocity) {
+  constexpr double rate_hz = 100.0, quantum = 0.5 * units::arcsecond;
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  const std::array<double, 3> rate{8.0, -0.02, 12.0};  // arcsec/s
+  std::array<double, 3> angle{}, counted{};
+  for (std::size_t i = 0; i < 120000; ++i) {
+    time.push_back(static_cast<double>(i + 1) / rate_hz);
+    theta.emplace_back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      angle[axis] += (rate[axis] / rate_hz + 0.005 * normal(random)) * units::arcsecond;
+      const double count = std::floor(angle[axis] / quantum);
+      theta.back()[axis] = (count - counted[axis]) * quantum;
+      counted[axis] = count;
+    }
+    velocity.push_back({5e-6 * normal(random), 9.78 / rate_hz + 5e-6 * normal(random), 5e-6 * normal(random)});
+  }
+  ImuData data;
+  data.site = {0.0, 2.0, 0.0};
+  data.sample_rate_hz = rate_hz;
+  data.time_s = time;
+  data.delta_theta = theta;
+  data.delta_v = velocity;
+  return data;
+}
+
+TEST(DataFaults, AQuietGyroRestsAtACountAndItsCountsAreNoSpikes) {
+  std::vector<double> time;
+  std::vector<std::array<double, 3>> theta, velocity;
+  ImuData data = quiet_and_coarse(time, theta, velocity);
+  std::size_t longest = 0, run = 0, counts = 0;
+  for (const auto& angle : theta) {
+    counts += angle[1] != 0.0 ? 1 : 0;
+    run = angle[1] == 0.0 ? run + 1 : 0;
+    longest = std::max(longest, run);
+  }
+  ASSERT_GT(longest, 3000U);  // 30 s
+  ASSERT_GT(counts, 20U);
+  const std::vector<DataFault> sound = find_data_faults(data);
+  EXPECT_TRUE(sound.empty()) << sound.front().words;
+  // One that rests for longer than such a gyro does is stuck; what stands out by counts is a spike.
+  for (std::size_t i = 20000; i < 118000; ++i) {
+    theta[i][1] = 0.0;
+  }
+  data.delta_theta = theta;
+  const std::vector<DataFault> stuck = find_data_faults(data);
+  ASSERT_EQ(stuck.size(), 1U);
+  EXPECT_EQ(stuck.front().id, "frozen_axis");
+  theta = {};
+  time = {};
+  velocity = {};
+  data = quiet_and_coarse(time, theta, velocity);
+  theta[30000][1] += 20.0 * 0.5 * units::arcsecond;
+  data.delta_theta = theta;
+  const std::vector<DataFault> spike = find_data_faults(data);
+  ASSERT_EQ(spike.size(), 1U);
+  EXPECT_EQ(spike.front().id, "spike");
 }
 
 }  // namespace
