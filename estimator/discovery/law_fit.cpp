@@ -69,6 +69,20 @@ void refine_constants(std::vector<LawTerm>& terms, const Eigen::VectorXd& value)
   }
 }
 
+// Of a law by one of its constants. A step changes where it stands and nowhere else: its derivative is as wide as a node at least.
+Eigen::ArrayXd derivative(const LawTerm& term, std::size_t constant, const laws::Channels& channels) {
+  constexpr double widest = 0.05;
+  const double size = std::max(std::abs(term.constants[constant]), 1e-6);
+  Eigen::ArrayXd slope;
+  for (double step = derivative_step; step < widest && (slope.size() == 0 || (slope == 0.0).all()); step *= 4.0) {
+    std::vector<double> up = term.constants, down = term.constants;
+    up[constant] += step * size;
+    down[constant] -= step * size;
+    slope = (term.expression.evaluate(channels, up) - term.expression.evaluate(channels, down)) / (2.0 * step * size);
+  }
+  return slope;
+}
+
 }  // namespace
 
 Eigen::VectorXd column_scale(const std::vector<LawTerm>& terms, const Eigen::VectorXd& coefficient) {
@@ -97,12 +111,7 @@ LawColumns::LawColumns(const LawMotion& motion, const NodeTable& table, const st
   }
   for (const LawTerm& term : terms) {
     for (std::size_t c = 0; derivatives && c < term.constants.size(); ++c) {
-      std::vector<double> up = term.constants, down = term.constants;
-      const double step = derivative_step * std::max(std::abs(up[c]), 1e-6);
-      up[c] += step;
-      down[c] -= step;
-      put(term.axis, (term.expression.evaluate(table.channels, up) - term.expression.evaluate(table.channels, down)) /
-                         (2.0 * step));
+      put(term.axis, derivative(term, c, table.channels));
     }
   }
 }
