@@ -7,6 +7,7 @@
 
 #include "estimator/diagnosis/regression/evidence.hpp"
 #include "estimator/discovery/pieces.hpp"
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal::discovery {
 
@@ -211,13 +212,51 @@ void describe(const JointSums& sums, const Eigen::VectorXd& scale, LawFit& fit) 
   }
 }
 
+// The time of a step, to a second: what it gains falls by the distance from the true time and not by its square, so that Gauss-Newton
+// comes nearer by seconds only.
+void place_step(std::span<const LawRecording> recordings, std::vector<LawTerm>& terms, std::size_t k,
+                const std::stop_token& stop) {
+  constexpr int rounds = 6;
+  constexpr double farthest_s = 128.0;
+  std::vector<LawTerm> others = terms;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+  for (int round = 0; round < rounds && !stop.stop_requested(); ++round) {
+    std::vector<LawTerm> places = {terms[k]};
+    for (double away = 1.0; away <= farthest_s; away *= 2.0) {
+      for (const double to : {-away, away}) {
+        LawTerm moved = terms[k];
+        moved.constants.front() += to / units::hour;
+        if (moved.constants.front() > moved.least && moved.constants.front() < moved.most) {
+          places.push_back(std::move(moved));
+        }
+      }
+    }
+    const std::vector<SingleFit> fits = fit_each(recordings, others, places, stop);
+    const auto best = std::max_element(fits.begin(), fits.end(),
+                                       [](const SingleFit& a, const SingleFit& b) { return a.gain < b.gain; });
+    if (best == fits.begin()) {
+      return;
+    }
+    terms[k] = places[static_cast<std::size_t>(best - fits.begin())];
+  }
+}
+
 }  // namespace
+
+bool is_step(const LawTerm& law) {
+  return law.constants.size() == 1 && law.expression.text().find("sign(t-?)") != std::string::npos;
+}
 
 LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> terms, int rounds,
                 const std::stop_token& stop) {
   LawFit fit;
   const int constants = constants_of(terms);
   const std::vector<int> linear = first_numbers(terms.size());
+  for (std::size_t k = 0; k < terms.size() && rounds > 0; ++k) {
+    if (is_step(terms[k])) {
+      place_step(recordings, terms, k, stop);
+    }
+  }
   double best = -1.0;
   for (int round = 0; round <= (constants > 0 ? rounds : 0); ++round) {
     const JointSums sums = sum_jointly(recordings, terms, stop);

@@ -14,6 +14,7 @@
 #include "estimator/diagnosis/ideal_recording.hpp"
 #include "estimator/discovery/piece_model.hpp"
 #include "estimator/discovery/scene.hpp"
+#include "estimator/discovery/search_state.hpp"
 #include "estimator/discovery/shortlist.hpp"
 #include "estimator/geometry/units.hpp"
 
@@ -112,6 +113,27 @@ TEST(Pieces, AnEffectBesideALawIsProjectedOutOfEverything) {
   for (Eigen::Index k = 0; k < sensor_parameter_count; ++k) {
     EXPECT_NEAR(by_law(k), by_both(k), 1e-4 * std::sqrt(of_both(k, k))) << k;
     EXPECT_NEAR(of_law(k, k) / of_both(k, k), 1.0, 1e-4) << k;
+  }
+}
+
+// From a piece's edge Gauss-Newton came two seconds nearer, and its derivative was nothing where no second begins.
+TEST(LawFit, AStepIsPlacedToASecondWhereverTheSearchBegan) {
+  const Unit unit;
+  const Scene without({unit.ideal.data(), unit.calibration});
+  LawTerm step{4, *laws::Expression::parse("sign(t-?)"), {403.3 / units::hour}, 0.01, 0.3};
+  const NodeTable table = collect_nodes(without.motion, without.input);
+  const diagnosis::CorrectedRecording with =
+      without_laws(without.motion, table, without.input, {step}, Eigen::VectorXd::Constant(1, -8.0));
+  Scene scene({with.data(), unit.calibration});
+  scene.table = collect_nodes(scene.motion, scene.input);
+  const std::vector<LawRecording> recordings = {{scene.motion, scene.table, scene.input, scene.trace}};
+  for (const double from_s : {387.6, 412.4, 330.0}) {
+    step.constants = {from_s / units::hour};
+    const LawFit fit = fit_laws(recordings, {step}, constant_rounds);
+    EXPECT_NEAR(fit.terms.front().constants.front() * units::hour, 403.3, 1.0) << from_s;
+    EXPECT_NEAR(fit.coefficient(0), 8.0, 0.2) << from_s;
+    EXPECT_TRUE(fit.recordings.front().covariance.allFinite()) << from_s;
+    EXPECT_GT(fit.covariance(1, 1), 0.0) << from_s;
   }
 }
 
