@@ -217,13 +217,13 @@ void describe(const JointSums& sums, const Eigen::VectorXd& scale, LawFit& fit) 
 void place_step(std::span<const LawRecording> recordings, std::vector<LawTerm>& terms, std::size_t k,
                 const std::stop_token& stop) {
   constexpr int rounds = 6;
-  constexpr double farthest_s = 128.0;
+  constexpr int farthest_s = 128;
   std::vector<LawTerm> others = terms;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
   for (int round = 0; round < rounds && !stop.stop_requested(); ++round) {
     std::vector<LawTerm> places = {terms[k]};
-    for (double away = 1.0; away <= farthest_s; away *= 2.0) {
-      for (const double to : {-away, away}) {
+    for (int away = 1; away <= farthest_s; away *= 2) {
+      for (const int to : {-away, away}) {
         LawTerm moved = terms[k];
         moved.constants.front() += to / units::hour;
         if (moved.constants.front() > moved.least && moved.constants.front() < moved.most) {
