@@ -100,9 +100,6 @@ class LawSearch::Search {
         law.sigma = std::max(law.sigma, spread->coefficient);
         law.constants.front().sigma = std::max(law.constants.front().sigma, spread->constant);
       }
-      if (is_step(state_.terms[k])) {
-        law.constants.front().sigma = std::hypot(law.constants.front().sigma, step_sigma_h);
-      }
       law.carries_over /= result_.instead ? 1.0 + result_.instead->odds : 1.0;
       const Departed far = departed(laws_on_, state_.fit, k, residual_.available(), options_.stop);
       law.departure_log_p = far.log_p;

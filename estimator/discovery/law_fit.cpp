@@ -194,10 +194,28 @@ std::vector<int> first_numbers(std::size_t count) {
   return all;
 }
 
+// A change at a time that is fitted, alone or times something.
+bool is_step(const LawTerm& law) {
+  return law.constants.size() == 1 && law.expression.text().find("sign(t-?)") != std::string::npos;
+}
+
+// A step is placed to a second, so much of the recording as one value of a law holds.
+void add_second_of_steps(LawFit& fit) {
+  constexpr double square_of_second = 1.0 / 12.0 / (units::hour * units::hour);
+  auto at = static_cast<Eigen::Index>(fit.terms.size());
+  for (const LawTerm& term : fit.terms) {
+    if (is_step(term)) {
+      fit.covariance(at, at) += square_of_second;
+    }
+    at += static_cast<Eigen::Index>(term.constants.size());
+  }
+}
+
 // Coefficients with the constants unknown, what each term gains, and what it gains on what was left out.
 void describe(const JointSums& sums, const Eigen::VectorXd& scale, LawFit& fit) {
   const Eigen::MatrixXd G = scale.asDiagonal() * sums.information * scale.asDiagonal();
   fit.covariance = solve(G, scale.asDiagonal() * sums.score).covariance;
+  add_second_of_steps(fit);
   fit.gain.clear();
   fit.collinear.clear();
   fit.held_out_gain.clear();
@@ -242,10 +260,6 @@ void place_step(std::span<const LawRecording> recordings, std::vector<LawTerm>& 
 }
 
 }  // namespace
-
-bool is_step(const LawTerm& law) {
-  return law.constants.size() == 1 && law.expression.text().find("sign(t-?)") != std::string::npos;
-}
 
 LawFit fit_laws(std::span<const LawRecording> recordings, std::vector<LawTerm> terms, int rounds,
                 const std::stop_token& stop) {

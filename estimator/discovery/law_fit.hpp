@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <limits>
 #include <span>
 #include <stop_token>
@@ -30,10 +29,6 @@ struct LawTerm {
 
 // Of the same form on the same axis, whatever their constants are.
 bool same_law(const LawTerm& a, const LawTerm& b);
-
-// A change at a time that is fitted, alone or times something. It is placed to a second, so much of the recording as one value of a law holds.
-bool is_step(const LawTerm& law);
-inline const double step_sigma_h = 1.0 / std::sqrt(12.0) / 3600.0;
 
 // One recording that laws are fitted to. All must outlive it; `table` and `trace` are those of a pass with this input, a
 // forward pass about the calibrated recording.
