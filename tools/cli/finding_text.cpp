@@ -38,19 +38,13 @@ std::string finding_text(const diagnosis::Finding& f) {
   if (!f.equation.empty()) {
     text += fmt::format("    {}\n", f.equation);
   }
-  // Coefficients that the recording knows only together: the largest one stands for them.
+  // Of coefficients that the recording knows only together the largest one stands for them.
   const diagnosis::FindingParameter* const largest = only_together(f);
-  if (largest != nullptr) {
-    text += fmt::format("    {:<10} {}, the largest; known only together with others\n", largest->name,
-                        with_sigma(largest->value, largest->sigma, largest->unit));
-  }
   std::vector<std::string> small;
   for (const diagnosis::FindingParameter& p : f.parameters) {
-    if (&p == largest) {
-      continue;
-    }
-    if (significant(p)) {
-      text += fmt::format("    {:<10} {}\n", p.name, with_sigma(p.value, p.sigma, p.unit));
+    if (significant(p) || &p == largest) {
+      text += fmt::format("    {:<10} {}{}\n", p.name, with_sigma(p.value, p.sigma, p.unit),
+                          &p == largest ? ", the largest; known only together with others" : "");
     } else {
       small.push_back(p.name);
     }
