@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <utility>
 
 #include "estimator/diagnosis/data/axes.hpp"
 #include "estimator/diagnosis/data/spikes.hpp"
 #include "estimator/diagnosis/data/usual_step.hpp"
 #include "estimator/models/segments.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -163,13 +165,26 @@ void time_base(const ImuData& data, std::vector<DataFault>& faults) {
   for (std::size_t i = 1; i < data.size(); ++i) {
     dt.push_back(data.time_s[i] - data.time_s[i - 1]);
   }
-  std::nth_element(dt.begin(), dt.begin() + static_cast<std::ptrdiff_t>(dt.size() / 2), dt.end());
-  const double rate = 1.0 / dt[dt.size() / 2];
+  const double rate = 1.0 / median(std::move(dt));
   if (std::abs(rate / data.sample_rate_hz - 1.0) > 1e-3) {
     faults.push_back({"time_base",
                       number("time stamps run at %.6g Hz, the rate is stated as %.6g Hz", rate, data.sample_rate_hz), 0,
                       data.size()});
   }
+}
+
+// Samples [first, last) cut where the value changes.
+template <typename Value>
+std::vector<std::pair<std::size_t, std::size_t>> runs_of_one_value(std::size_t first, std::size_t last,
+                                                                   const Value& value) {
+  std::vector<std::pair<std::size_t, std::size_t>> runs;
+  for (std::size_t start = first, i = first + 1; start < last; ++i) {
+    if (i >= last || value(i) != value(start)) {
+      runs.emplace_back(start, i);
+      start = i;
+    }
+  }
+  return runs;
 }
 
 // How long a gyro gives zero in a dwell and counts again in the same, the third longest time: the longest may be those in which it is stuck.
@@ -178,13 +193,13 @@ double usual_rest_s(const ImuData& data, const std::vector<Segment>& segments, d
   constexpr std::size_t third = 2;
   std::vector<std::size_t> rests;
   for (const Segment& s : segments) {
-    std::size_t start = s.first;
-    for (std::size_t i = s.first + 1; !s.rotation && i < s.last; ++i) {
-      if (value(i) != value(i - 1)) {
-        if (start > s.first && std::abs(value(start)) < 0.5 * count) {
-          rests.push_back(i - start);
-        }
-        start = i;
+    if (s.rotation) {
+      continue;
+    }
+    const auto runs = runs_of_one_value(s.first, s.last, value);
+    for (std::size_t k = 1; k + 1 < runs.size(); ++k) {
+      if (std::abs(value(runs[k].first)) < 0.5 * count) {
+        rests.push_back(runs[k].second - runs[k].first);
       }
     }
   }
@@ -211,12 +226,8 @@ void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, 
     sum += value(i);
   }
   const auto n = static_cast<double>(last - first);
-  std::size_t start = first;
-  for (std::size_t i = first + 1; i <= last; ++i) {
-    if (i < last && value(i) == value(start)) {
-      continue;
-    }
-    const auto length = static_cast<double>(i - start);
+  for (const auto& [start, end] : runs_of_one_value(first, last, value)) {
+    const auto length = static_cast<double>(end - start);
     const double length_s = length / data.sample_rate_hz;
     const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
     const bool left_behind =
@@ -225,10 +236,9 @@ void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, 
     const double gyro_s = zero ? std::max(least_gyro_s, few * rest_s) : least_gyro_s;
     if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
       fault.first_sample = fault.count == 0 ? start : fault.first_sample;
-      fault.count += i - start;
-      fault.stretches.push_back({start, i, gyro});
+      fault.count += end - start;
+      fault.stretches.push_back({start, end, gyro});
     }
-    start = i;
   }
 }
 

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "estimator/diagnosis/data/usual_step.hpp"
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -74,12 +76,8 @@ double step_in_dwells(const ImuData& data, const std::vector<Segment>& segments,
       steps.push_back(usual_step(s.first + 1, s.last, [&](std::size_t i) { return value_at(data, i, axis); }));
     }
   }
-  if (steps.empty()) {
-    return 0.0;
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return std::isfinite(*middle) ? *middle : 0.0;
+  const double step = steps.empty() ? 0.0 : median(std::move(steps));
+  return std::isfinite(step) ? step : 0.0;
 }
 
 // How far each sample in the dwells stands from what its neighbours make of it (fourth differences: a turn's smooth

@@ -1,10 +1,12 @@
 // What an axis changes by from one sample to the next. Private to this folder.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
+
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -18,12 +20,7 @@ double usual_step(std::size_t first, std::size_t last, const Value& value) {
       steps.push_back(std::abs(value(i) - value(i - 1)));
     }
   }
-  if (steps.empty()) {
-    return HUGE_VAL;
-  }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return steps.empty() ? HUGE_VAL : median(std::move(steps));
 }
 
 }  // namespace selfcal::diagnosis

@@ -15,11 +15,23 @@
 namespace selfcal::diagnosis {
 namespace {
 
-// Dwells of 20 s between turns of 5 s about z at 25.7 deg/s, ramps half cosines of 1.5 s; counts of 0.1", clipped.
-struct Turning {
+struct Samples {
   std::vector<double> time;
   std::vector<std::array<double, 3>> theta, velocity;
 
+  std::vector<DataFault> faults(double latitude) const {
+    ImuData data;
+    data.site = {latitude, 2.0, 0.0};
+    data.sample_rate_hz = 1.0 / (time[1] - time[0]);
+    data.time_s = time;
+    data.delta_theta = theta;
+    data.delta_v = velocity;
+    return find_data_faults(data);
+  }
+};
+
+// Dwells of 20 s between turns of 5 s about z at 25.7 deg/s, ramps half cosines of 1.5 s; counts of 0.1", clipped.
+struct Turning : Samples {
   // `across`: share of the turns that y has; it is noisy by a count.
   explicit Turning(double rate_hz, double clip_deg_per_s, double across = 0.0) {
     std::mt19937 random(1);
@@ -40,14 +52,8 @@ struct Turning {
     }
   }
   bool saturated() const {
-    ImuData data;
-    data.site = {0.7, 2.0, 0.0};
-    data.sample_rate_hz = 1.0 / (time[1] - time[0]);
-    data.time_s = time;
-    data.delta_theta = theta;
-    data.delta_v = velocity;
-    const std::vector<DataFault> faults = find_data_faults(data);
-    return std::any_of(faults.begin(), faults.end(), [](const DataFault& f) { return f.id == "saturation"; });
+    const std::vector<DataFault> found = faults(0.7);
+    return std::any_of(found.begin(), found.end(), [](const DataFault& f) { return f.id == "saturation"; });
   }
 };
 
@@ -72,62 +78,50 @@ TEST(DataFaults, AClippedRateIs) {
 }
 
 // Gyro y stands upright near the equator: 0.02" of turning a second, counted by 0.5", with white noise of a hundredth of a count.
-ImuData quiet_and_coarse(std::vector<double>& time, std::vector<std::array<double, 3>>& theta,
-                         std::vector<std::array<double, 3>>& velocity) {
+Samples quiet_and_coarse() {
+  Samples s;
   constexpr double rate_hz = 100.0, quantum = 0.5 * units::arcsecond;
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
   const std::array<double, 3> rate{8.0, -0.02, 12.0};  // arcsec/s
   std::array<double, 3> angle{}, counted{};
   for (std::size_t i = 0; i < 120000; ++i) {
-    time.push_back(static_cast<double>(i + 1) / rate_hz);
-    theta.emplace_back();
+    s.time.push_back(static_cast<double>(i + 1) / rate_hz);
+    s.theta.emplace_back();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       angle[axis] += (rate[axis] / rate_hz + 0.005 * normal(random)) * units::arcsecond;
       const double count = std::floor(angle[axis] / quantum);
-      theta.back()[axis] = (count - counted[axis]) * quantum;
+      s.theta.back()[axis] = (count - counted[axis]) * quantum;
       counted[axis] = count;
     }
-    velocity.push_back({5e-6 * normal(random), 9.78 / rate_hz + 5e-6 * normal(random), 5e-6 * normal(random)});
+    s.velocity.push_back({5e-6 * normal(random), 9.78 / rate_hz + 5e-6 * normal(random), 5e-6 * normal(random)});
   }
-  ImuData data;
-  data.site = {0.0, 2.0, 0.0};
-  data.sample_rate_hz = rate_hz;
-  data.time_s = time;
-  data.delta_theta = theta;
-  data.delta_v = velocity;
-  return data;
+  return s;
 }
 
 TEST(DataFaults, AQuietGyroRestsAtACountAndItsCountsAreNoSpikes) {
-  std::vector<double> time;
-  std::vector<std::array<double, 3>> theta, velocity;
-  ImuData data = quiet_and_coarse(time, theta, velocity);
+  const Samples samples = quiet_and_coarse();
   std::size_t longest = 0, run = 0, counts = 0;
-  for (const auto& angle : theta) {
+  for (const auto& angle : samples.theta) {
     counts += angle[1] != 0.0 ? 1 : 0;
     run = angle[1] == 0.0 ? run + 1 : 0;
     longest = std::max(longest, run);
   }
   ASSERT_GT(longest, 3000U);  // 30 s
   ASSERT_GT(counts, 20U);
-  const std::vector<DataFault> sound = find_data_faults(data);
+  const std::vector<DataFault> sound = samples.faults(0.0);
   EXPECT_TRUE(sound.empty()) << sound.front().words;
   // One that rests for longer than such a gyro does is stuck; what stands out by counts is a spike.
+  Samples dead = samples;
   for (std::size_t i = 20000; i < 118000; ++i) {
-    theta[i][1] = 0.0;
+    dead.theta[i][1] = 0.0;
   }
-  data.delta_theta = theta;
-  const std::vector<DataFault> stuck = find_data_faults(data);
+  const std::vector<DataFault> stuck = dead.faults(0.0);
   ASSERT_EQ(stuck.size(), 1U);
   EXPECT_EQ(stuck.front().id, "frozen_axis");
-  theta = {};
-  time = {};
-  velocity = {};
-  data = quiet_and_coarse(time, theta, velocity);
-  theta[30000][1] += 20.0 * 0.5 * units::arcsecond;
-  data.delta_theta = theta;
-  const std::vector<DataFault> spike = find_data_faults(data);
+  Samples struck = samples;
+  struck.theta[30000][1] += 20.0 * 0.5 * units::arcsecond;
+  const std::vector<DataFault> spike = struck.faults(0.0);
   ASSERT_EQ(spike.size(), 1U);
   EXPECT_EQ(spike.front().id, "spike");
 }
