@@ -2,25 +2,16 @@
 
 Frames: n north, up, east; C_nb = C_nv Rz(outer) Ry(inner), C_nv = Ry(-heading) Rz(pitch) Rx(roll).
 """
+import pathlib
+import sys
+
 import h5py
 import numpy as np
 
-EARTH_RATE = 7.292115e-5
+sys.path.insert(1, str(pathlib.Path(__file__).resolve().parents[1] / "second_source"))
+from motion import EARTH_RATE, HORIZONTAL, about, gravity  # noqa: E402
+
 UG = 9.80665e-6
-# Outer, inner: the eighteen turns of 90 deg that the paper's horizontal schedule makes.
-SCHEDULE = [(0, 0), (90, 0), (180, 0), (270, 0), (180, 0), (90, 0), (0, 0), (0, 90), (90, 90), (180, 90), (270, 90),
-            (180, 90), (90, 90), (90, 180), (90, 270), (90, 180), (90, 90), (90, 0), (0, 0)]
-
-
-def rotation(axis, angle):
-    """[n,3,3] rotations about a coordinate axis by angles [n]."""
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.zeros((len(angle), 3, 3))
-    R[:, axis, axis] = 1.0
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R[:, i, i] = R[:, j, j] = c
-    R[:, i, j], R[:, j, i] = -s, s
-    return R
 
 
 def vectors(R):
@@ -30,18 +21,10 @@ def vectors(R):
     return w * np.where(s > 1e-9, np.arcsin(np.minimum(s, 1.0)) / np.maximum(s, 1e-30), 1.0)[:, None]
 
 
-def gravity(latitude, height):
-    """WGS-84, Somigliana, with the free air term to second order."""
-    s2 = np.sin(latitude) ** 2
-    a, f, m = 6378137.0, 1 / 298.257223563, 0.00344978650684
-    g = 9.7803253359 * (1 + 0.00193185265241 * s2) / np.sqrt(1 - 0.00669437999014 * s2)
-    return g * (1 - 2 / a * (1 + f + m - 2 * f * s2) * height + 3 / a ** 2 * height ** 2)
-
-
 class Gimbal:
     def __init__(self, dwell_s, turn_s):
-        self.positions, self.dwell, self.turn = SCHEDULE, dwell_s, turn_s
-        self.duration = len(SCHEDULE) * dwell_s + (len(SCHEDULE) - 1) * turn_s
+        self.positions, self.dwell, self.turn = HORIZONTAL, dwell_s, turn_s
+        self.duration = len(HORIZONTAL) * dwell_s + (len(HORIZONTAL) - 1) * turn_s
 
     def part(self, t):
         period = self.dwell + self.turn
@@ -85,11 +68,11 @@ def write(case, path):
     n, dt = int(gimbal.duration * rate), 1.0 / rate
     edges = np.arange(n + 1) * dt
     one = np.ones(1)
-    C_nv = (rotation(1, -heading * one) @ rotation(2, pitch * one) @ rotation(0, roll * one))[0]
+    C_nv = (about(1, -heading * one) @ about(2, pitch * one) @ about(0, roll * one))[0]
 
     def attitude(t):
         a = gimbal.angles(t)
-        return C_nv @ rotation(2, a[:, 0]) @ rotation(1, a[:, 1])
+        return C_nv @ about(2, a[:, 0]) @ about(1, a[:, 1])
 
     C, C_middle = attitude(edges), attitude(edges[:-1] + 0.5 * dt)
     turn_of_n = np.array([np.cos(latitude), np.sin(latitude), 0.0]) * EARTH_RATE * dt

@@ -23,9 +23,9 @@ def about(axis, angle):
     return R
 
 
-def gravity(latitude_deg, height_m):
-    """WGS-84: Somigliana's formula and the free air term to second order."""
-    s2 = numpy.sin(latitude_deg * DEG) ** 2
+def gravity(latitude, height_m):
+    """WGS-84, latitude in rad: Somigliana's formula and the free air term to second order."""
+    s2 = numpy.sin(latitude) ** 2
     a, f, m = 6378137.0, 1 / 298.257223563, 0.00344978650684
     g = 9.7803253359 * (1 + 0.00193185265241 * s2) / numpy.sqrt(1 - 0.00669437999014 * s2)
     return g * (1 - 2 / a * (1 + f + m - 2 * f * s2) * height_m + 3 / a**2 * height_m**2)
@@ -52,7 +52,7 @@ class Motion:
         self.duration_s = len(plan) * dwell_s + (len(plan) - 1) * turn_s
         heading, pitch, roll = (angle * DEG for angle in attitude_deg)
         self.C_nv = about(1, -heading) @ about(2, pitch) @ about(0, roll)
-        self.gravity = gravity(latitude_deg, 50.0)
+        self.gravity = gravity(latitude_deg * DEG, 50.0)
         self.earth = EARTH_RATE * numpy.array([numpy.cos(latitude_deg * DEG), numpy.sin(latitude_deg * DEG), 0.0])
 
     def gimbal(self, t):
