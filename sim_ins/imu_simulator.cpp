@@ -159,6 +159,14 @@ void ImuSimulator::take(const PhysicsEffect& effect) {
   if (const SensorEquation equation = sensor_equation(effect.id)) {
     effects_.push_back({equation, v});
     needs_angular_acceleration_ |= sim::needs_angular_acceleration(effect.id);
+  } else if (effect.id == "accel_load_lag" || effect.id == "gyro_load_lag") {
+    Matrix3 per_g;
+    per_g << v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8];
+    memories_.push_back({effect.id.starts_with("gyro"), per_g, TurnMemory(TurnMemory::Of::load, v[9])});
+  } else if (effect.id == "accel_turn_heat" || effect.id == "gyro_turn_heat") {
+    Matrix3 per_rad = Matrix3::Zero();
+    per_rad.col(0) = axes(0);
+    memories_.push_back({effect.id.starts_with("gyro"), per_rad, TurnMemory(TurnMemory::Of::travel, v[3])});
   } else if (effect.id == "accel_gyro_time_offset") {
     accel_delay_s_ += v[0];
   } else if (effect.id == "gyro_noise_level") {
@@ -247,6 +255,9 @@ IdealIncrement ImuSimulator::output_at(double t) {
       effect.equation(effect.values, context, deviation);
     }
   }
+  for (ActiveMemory& active : memories_) {
+    (active.gyro ? deviation.domega : deviation.df) += active.gain * active.memory.at(t, motion_);
+  }
   if (!laws_.empty()) {
     add_laws(t, state, deviation);
   }
@@ -258,7 +269,7 @@ IdealIncrement ImuSimulator::integrate(double begin, double end) {
   static const double node3 = std::sqrt(0.6);
   static const double node2 = 1.0 / std::sqrt(3.0);
   const GimbalMotion& gimbal = motion_.gimbal();
-  const bool constant = motion_.base_still() && effects_.empty() && laws_.empty();
+  const bool constant = motion_.base_still() && effects_.empty() && laws_.empty() && memories_.empty();
   const bool turning = gimbal.turning(begin - std::abs(accel_delay_s_), end + std::abs(accel_delay_s_));
   IdealIncrement sum;
   const auto add = [&](double t, double weight) {

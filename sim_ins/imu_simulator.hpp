@@ -13,6 +13,7 @@
 #include "sim_ins/random.hpp"
 #include "sim_ins/sensor_physics.hpp"
 #include "sim_ins/true_motion.hpp"
+#include "sim_ins/turn_memory.hpp"
 
 namespace selfcal::sim {
 
@@ -60,6 +61,11 @@ class ImuSimulator {
     double walk = 0.0;
     Random random;
   };
+  struct ActiveMemory {
+    bool gyro = false;
+    Matrix3 gain;  // rad/s or m/s^2 per unit of the memory
+    TurnMemory memory;
+  };
   struct Line {  // spectral line on the sensors' output
     Vector3 domega, df;
     double angular_frequency = 0.0;
@@ -94,6 +100,7 @@ class ImuSimulator {
   Random gyro_noise_, accel_noise_, instability_, readout_, integral_;
   std::vector<ActiveEffect> effects_;
   std::vector<ActiveLaw> laws_;
+  std::vector<ActiveMemory> memories_;
   std::vector<std::array<double, 2>> senses_;  // of the axes after k turns have begun
   double mean_temperature_c_ = 0.0;
   // A bias that wanders and comes back: Gauss-Markov, first order.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <numbers>
 
 #include "estimator/geometry/units.hpp"
 
@@ -15,6 +16,7 @@ constexpr double dph = units::degree_per_hour;
 constexpr double ug = units::micro_g;
 constexpr double ppm = units::ppm;
 constexpr double arcsec = units::arcsecond;
+constexpr double revolution = 2.0 * std::numbers::pi;
 constexpr double per_deg_s = 1.0 / units::degree;  // 1/(deg/s) in s/rad
 
 // Three axes of one unit; and a 3 x 3 matrix, row (affected axis) first.
@@ -72,6 +74,10 @@ constexpr std::array cross{P{"x_yy", "ug/g^2", ug}, P{"x_zz", "ug/g^2", ug}, P{"
                            P{"y_xz", "ug/g^2", ug}, P{"z_xx", "ug/g^2", ug}, P{"z_yy", "ug/g^2", ug},
                            P{"z_xz", "ug/g^2", ug}, P{"z_yz", "ug/g^2", ug}, P{"z_xy", "ug/g^2", ug}};
 constexpr auto relaxation = join(axes("ug", ug), std::array{tau(60.0)});
+constexpr auto accel_lag = join(matrix("ug/g", ug), std::array{tau(60.0)});
+constexpr auto gyro_lag = join(matrix("deg/h/g", dph), std::array{tau(60.0)});
+constexpr auto accel_heat = join(axes("ug/rev", ug / revolution), std::array{tau(300.0)});
+constexpr auto gyro_heat = join(axes("deg/h/rev", dph / revolution), std::array{tau(300.0)});
 constexpr auto size_effect = matrix("cm", 0.01);  // rows: accelerometer, columns: its place in b
 constexpr auto lever_arm = axes("cm", 0.01);
 constexpr std::array time_offset{P{"tau", "ms", 1e-3}};
@@ -119,7 +125,7 @@ constexpr auto hysteresis = axes("ug", ug);
 constexpr std::array gimbal_field{P{"outer_x", "deg/h", dph}, P{"outer_y", "deg/h", dph}, P{"outer_z", "deg/h", dph},
                                   P{"inner_x", "deg/h", dph}, P{"inner_y", "deg/h", dph}, P{"inner_z", "deg/h", dph}};
 
-constexpr std::array<EffectDescription, 37> effects{{
+constexpr std::array<EffectDescription, 41> effects{{
     {"gyro_g_sensitivity", true, gyro_g},
     {"gyro_magnetic_sensitivity", true, gyro_magnetic},
     {"gyro_scale_asymmetry", true, gyro_asymmetry},
@@ -135,6 +141,10 @@ constexpr std::array<EffectDescription, 37> effects{{
     {"accel_cubic", true, cubic},
     {"accel_cross_coupling", true, cross},
     {"accel_relaxation", true, relaxation},
+    {"accel_load_lag", true, accel_lag},
+    {"gyro_load_lag", true, gyro_lag},
+    {"accel_turn_heat", true, accel_heat},
+    {"gyro_turn_heat", true, gyro_heat},
     {"accel_size_effect", true, size_effect},
     {"imu_lever_arm", true, lever_arm},
     {"accel_gyro_time_offset", true, time_offset},

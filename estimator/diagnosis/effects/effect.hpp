@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "estimator/diagnosis/effects/turn_memory.hpp"
 #include "estimator/geometry/earth.hpp"
 #include "estimator/geometry/rotation.hpp"
 
@@ -34,6 +35,8 @@ struct EffectContext {
   double temperature = NAN;                // less its mean over the recording, degC; NaN: no channel
   Vector3 field_b;                         // magnetic field of an axial dipole Earth, gauss
   Vector3 earth_rate_b = Vector3::Zero();  // direction of the Earth's rate, unit length; zero: not known
+  // Of the load u and of the angle that the gimbal's axes travelled (rad, first element); nullptr: not known.
+  const TurnMemory *load_memory = nullptr, *travel_memory = nullptr;
 };
 
 struct EffectParameter {
@@ -109,6 +112,14 @@ inline double decay_integral(const EffectContext& c, double tau) {
 // int (1 - exp(-t/tau)) dt over the stretch.
 inline double warm_up_integral(const EffectContext& c, double tau) {
   return c.dt - tau * (std::exp(-c.start_s / tau) - std::exp(-c.end_s / tau));
+}
+// int (lag(u) - u) dt over the stretch, g s: the load of the last minutes less the present one. Zero where it is not known.
+inline Vector3 lag_integral(const EffectContext& c, double tau) {
+  return c.load_memory == nullptr ? Vector3::Zero() : Vector3(-c.load_memory->integral(c.start_s, c.end_s, tau));
+}
+// int A dt over the stretch, rad s: A the angle travelled, of which exp(-s/tau) counts s after.
+inline double travel_integral(const EffectContext& c, double tau) {
+  return c.travel_memory == nullptr ? 0.0 : c.travel_memory->integral(c.start_s, c.end_s, tau).x();
 }
 // Adds `value` per axis to the diagonal of the first three columns.
 inline void add_axes(Columns columns, const Vector3& value) { columns.leftCols<3>().diagonal() += value; }

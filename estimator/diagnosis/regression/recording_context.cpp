@@ -8,13 +8,16 @@
 #include <span>
 #include <utility>
 
+#include "estimator/geometry/units.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
 constexpr double division_s = 0.02;
 constexpr double creeping_s = 15.0;
 constexpr std::size_t creeping_divisions = 10;
-constexpr double margin_s = 0.5;        // between a turn as found and as it was
+constexpr double margin_s = 0.5;  // between a turn as found and as it was
+constexpr double piece_s = 0.1;
 constexpr double turn_margin_s = 0.25;  // segments are told apart by quarters of a second
 
 // Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a
@@ -72,6 +75,56 @@ RecordingContext::RecordingContext(const ImuData& data, ReferenceResidual refere
       turns_.push_back({start_of_turn(s), end_of_turn(s)});
     }
   }
+  remember_turns();
+}
+
+Vector3 RecordingContext::load(std::size_t first, std::size_t last) const {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t i = first; i < last; ++i) {
+    sum += Eigen::Map<const Vector3>(data_.delta_v[i].data());
+  }
+  return sum * data_.sample_rate_hz / (units::standard_gravity * static_cast<double>(last - first));
+}
+
+// By read-outs where there are any; the gyros sense the Earth's rate and the base's too.
+double RecordingContext::travelled(std::size_t first, std::size_t last) const {
+  if (data_.gimbal_outer.empty() || data_.gimbal_inner.empty() || first == 0) {
+    return mean_rate(first, last).norm() * static_cast<double>(last - first) / data_.sample_rate_hz;
+  }
+  const auto by = [&](std::span<const double> angle) {  // read-outs are those of the ends of samples
+    return std::abs(std::remainder(angle[last - 1] - angle[first - 1], 2.0 * std::numbers::pi));
+  };
+  return by(data_.gimbal_outer) + by(data_.gimbal_inner);
+}
+
+// In pieces of a tenth of a second, the load from the mean of the dwell before a turn to that of the dwell after it: a base that sways
+// makes no load of its own.
+void RecordingContext::remember_turns() {
+  const auto piece = static_cast<std::size_t>(std::max(1.0, std::round(piece_s * data_.sample_rate_hz)));
+  std::vector<TurnChanges> loads, travels;
+  for (std::size_t k = 1; k + 1 < segments_.size(); ++k) {
+    const Segment& turn = segments_[k];
+    if (!turn.rotation || turn.last <= turn.first) {
+      continue;
+    }
+    TurnChanges of_load, of_travel;
+    of_load.step_s = of_travel.step_s = static_cast<double>(piece) / data_.sample_rate_hz;
+    of_load.first_s = data_.time_s[turn.first] - 1.0 / data_.sample_rate_hz - start_s_;
+    of_travel.first_s = of_load.first_s + 0.5 * of_load.step_s;
+    Vector3 before = load(segments_[k - 1].first, segments_[k - 1].last);
+    for (std::size_t first = turn.first; first < turn.last; first += piece) {
+      const std::size_t last = std::min(first + piece, turn.last);
+      const Vector3 now = load(first, last);
+      of_load.change.emplace_back(now - before);
+      of_travel.change.emplace_back(travelled(first, last), 0.0, 0.0);
+      before = now;
+    }
+    of_load.change.emplace_back(load(segments_[k + 1].first, segments_[k + 1].last) - before);
+    loads.push_back(std::move(of_load));
+    travels.push_back(std::move(of_travel));
+  }
+  load_memory_ = TurnMemory(std::move(loads));
+  travel_memory_ = TurnMemory(std::move(travels));
 }
 
 std::size_t RecordingContext::segment_at(double t) const {
@@ -179,6 +232,8 @@ EffectContext RecordingContext::of(const SensorBlock& block) const {
     c.since_turn_start_s = std::max(0.0, block.start_s - next[-1].end_s);
     c.since_turn_end_s = block.end_s - next[-1].end_s;
   }
+  c.load_memory = &load_memory_;
+  c.travel_memory = &travel_memory_;
   c.turning = next != turns_.end() && 0.5 * (block.start_s + block.end_s) > next->start_s;
   if (!data_.gimbal_outer.empty() && !data_.gimbal_inner.empty()) {
     c.outer = angle_in_the_middle(data_.gimbal_outer, block);

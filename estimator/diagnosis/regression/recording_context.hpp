@@ -52,6 +52,9 @@ class RecordingContext {
   bool turns_around(double t) const;
   double start_of_turn(const Segment& rotation) const;
   double end_of_turn(const Segment& rotation) const;
+  void remember_turns();
+  Vector3 load(std::size_t first, std::size_t last) const;      // mean over samples [first, last), g
+  double travelled(std::size_t first, std::size_t last) const;  // by the gimbal's axes together, rad
   bool collect_ramp(std::size_t first, std::size_t last, std::vector<double>& time, std::vector<double>& rate) const;
 
   const ImuData& data_;
@@ -59,6 +62,7 @@ class RecordingContext {
   InnovationColour colour_;
   std::vector<Segment> segments_;
   std::vector<Turn> turns_;
+  TurnMemory load_memory_{{}}, travel_memory_{{}};
   std::size_t samples_per_division_;  // 20 ms
   double start_s_, mean_temperature_ = 0.0;
   Vector3 field_n_;  // gauss

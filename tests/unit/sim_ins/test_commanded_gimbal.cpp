@@ -22,6 +22,9 @@ TEST(CommandedGimbal, GivesTheSamplesOfTheWholeMotion) {
   ConcealedPhysics physics;
   physics.effects.push_back(
       {"accel_relaxation", {50.0 * 9.80665e-6, 0.0, 0.0, 60.0}});  // x y z, tau: it knows the moves
+  physics.effects.push_back(
+      {"accel_load_lag", {0.0, 0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 5.0}});  // and the load before each
+  physics.effects.push_back({"gyro_turn_heat", {0.0, 0.0, 1e-5, 5.0}});
   CommandedGimbal gimbal(exact(), 3, physics, {});
   gimbal.power_on(0.0);
   ASSERT_TRUE(gimbal.start(10.0));
