@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "estimator/passes/calibration.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
@@ -27,6 +28,18 @@ std::vector<std::pair<int, std::string>> parts_of(const SearchState& state) {
 // gains less than half of what it gains in the fit follows the noise.
 constexpr double least_held_out_share = 0.5;
 
+// A law that moves one of the 24 by more than this share of what a sensor may have is all but one of them: rate of an axis of b beside half
+// a degree of misalignment is the Earth's rate along that axis, and some other drift of such a form the truth.
+constexpr double most_of_a_limit = 0.5;
+
+bool moves_the_24_too_far(const LawFit& fit, std::size_t k) {
+  const auto column = static_cast<Eigen::Index>(k);
+  const ParameterVector most = most_of_a_limit * plausible_limit();
+  return std::any_of(fit.recordings.begin(), fit.recordings.end(), [&](const FittedRecording& r) {
+    return (r.shift.col(column).array().abs() * std::abs(fit.coefficient(column)) > most.array()).any();
+  });
+}
+
 }  // namespace
 
 double log_p_of_law(double gain, std::size_t constants, double cost) {
@@ -34,7 +47,8 @@ double log_p_of_law(double gain, std::size_t constants, double cost) {
 }
 
 bool stands(const LawFit& fit, std::size_t k) {
-  return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k] && !fit.terms[k].at_its_limit();
+  return fit.held_out_gain[k] > least_held_out_share * 0.5 * fit.gain[k] && !fit.terms[k].at_its_limit() &&
+         !moves_the_24_too_far(fit, k);
 }
 
 double cost_of_laws(const SearchState& state) { return std::accumulate(state.costs.begin(), state.costs.end(), 0.0); }

@@ -26,7 +26,8 @@ constexpr double shares = 2.0;
 
 // Logarithm of the probability that noise gains as much, corrected for all functions.
 double log_p_of_law(double gain, std::size_t constants, double cost);
-// Whether law k of the fit gains on what is left out what it would gain there, were it true, with a constant inside its range.
+// Whether law k of the fit gains on what is left out what it would gain there, were it true, with a constant inside its range, and
+// leaves the 24 where a sensor may have them.
 bool stands(const LawFit& fit, std::size_t k);
 double cost_of_laws(const SearchState& state);
 std::vector<LawTerm> all_but(std::vector<LawTerm> terms, std::size_t k);

@@ -22,14 +22,26 @@ const double line_log_p = std::log(1e-4);
 
 bool of_spectrum(const Effect& effect) { return effect.constant.kind == EffectConstant::Kind::spectrum; }
 
-// Frequencies of the lines, each once.
-std::vector<double> frequencies_of(const std::vector<InnovationLine>& lines) {
+// A base sways within the dwells. What swings more slowly than the gimbal turns is whatever differs from one position to the next: a
+// drift with the product of two forces, at positions that alternate, is a line at half the turns' frequency.
+double slowest_sway_hz(const RecordingContext& context) {
+  constexpr double within = 0.9;  // of the shortest time from turn to turn
+  const std::vector<Turn>& turns = context.turns();
+  double shortest_s = context.data().time_s.back() - context.data().time_s.front();
+  for (std::size_t k = 1; k < turns.size(); ++k) {
+    shortest_s = std::min(shortest_s, turns[k].start_s - turns[k - 1].start_s);
+  }
+  return 1.0 / (within * shortest_s);
+}
+
+// Frequencies of the lines from `least_hz` on, each once.
+std::vector<double> frequencies_of(const std::vector<InnovationLine>& lines, double least_hz) {
   constexpr double apart_hz = 1e-3;
   std::vector<double> known;
   for (const InnovationLine& line : lines) {
     const bool near =
         std::any_of(known.begin(), known.end(), [&](double f) { return std::abs(f - line.frequency_hz) < apart_hz; });
-    if (line.log_p < line_log_p && !near) {
+    if (line.log_p < line_log_p && line.frequency_hz >= least_hz && !near) {
       known.push_back(line.frequency_hz);
     }
   }
@@ -55,7 +67,8 @@ Stage first_stage(const RecordingContext& context, const PassInput& input) {
   selection.hypothesis.noise = input.noise;
   selection.alternatives = variants_for(context, {});
   Stage stage = linearised(context, point, selection);
-  const std::vector<double> frequencies = frequencies_of(innovation_lines(stage.model.rows(), input.interval_s));
+  const std::vector<double> frequencies =
+      frequencies_of(innovation_lines(stage.model.rows(), input.interval_s), slowest_sway_hz(context));
   if (!frequencies.empty()) {
     selection.alternatives = variants_for(context, frequencies);
     stage = linearised(context, point, selection);
