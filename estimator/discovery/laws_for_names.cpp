@@ -1,6 +1,7 @@
 #include "estimator/discovery/laws_for_names.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -106,6 +107,24 @@ class NamesAgainstLaws {
     return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
   }
 
+  // `out` with those names that stay and of which nothing is left when all is fitted together with the laws; none where there are none.
+  std::optional<std::vector<bool>> without_the_empty(const LawsForNames& found, std::vector<bool> out) const {
+    constexpr double not_there = 0.01;
+    const LawFit& fit = found.search.fitted().fit;
+    if (found.rest.effects().empty()) {
+      return std::nullopt;
+    }
+    const auto joint = found.rest.beside(fit.terms, fit.coefficient, of_laws_.stop);
+    bool more = false;
+    for (std::size_t e = 0; joint && e < joint->effects.size(); ++e) {
+      const auto name = std::find(held_.names().begin(), held_.names().end(), joint->effects[e].effect);
+      if (name != held_.names().end() && joint->effects[e].log_p_none > std::log(not_there)) {
+        out[static_cast<std::size_t>(name - held_.names().begin())] = more = true;
+      }
+    }
+    return more ? std::optional(std::move(out)) : std::nullopt;
+  }
+
  private:
   double most_of(const std::vector<bool>& out, double least) {
     const double more = dearer(out, 1);
@@ -179,6 +198,7 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
   NamesAgainstLaws against(unit, *less_names, of_laws, progress);
   constexpr int most_searches = 3;
   std::optional<LawsForNames> best;
+  std::vector<bool> out;  // of the best
   int searches = 0;
   for (const Choice& choice : against.choices(2.0 * least_log_odds)) {
     if (searches == most_searches || (best && choice.most <= 2.0 * best->log_odds) || of_laws.stop.stop_requested()) {
@@ -187,6 +207,14 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
     ++searches;
     auto found = against.search(choice.out);
     if (found && found->log_odds >= least_log_odds && (!best || found->log_odds > best->log_odds)) {
+      best.emplace(std::move(*found));
+      out = choice.out;
+    }
+  }
+  // A name with many coefficients gains by noise alone what makes it seem worth keeping.
+  if (const auto without = best ? against.without_the_empty(*best, out) : std::nullopt) {
+    auto found = against.search(*without);
+    if (found && found->log_odds >= least_log_odds) {
       best.emplace(std::move(*found));
     }
   }
