@@ -31,6 +31,14 @@ double probability_on(const DiscoveredLaw& law, int axis) {
   return total > 0.0 ? on_axis / total : 0.0;
 }
 
+// Whether another law of the axis is a function of the same quantities and no others: both are terms of a series.
+bool in_a_series(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) {
+  return std::any_of(all.begin(), all.end(), [&](const DiscoveredLaw& other) {
+    return &other != &law && other.term.axis == law.term.axis &&
+           other.term.expression.variables() == law.term.expression.variables();
+  });
+}
+
 bool has_shadow(const DiscoveredLaw& law, const std::vector<DiscoveredLaw>& all) {
   return std::any_of(all.begin(), all.end(), [&](const DiscoveredLaw& weak) {
     return weak.term.axis != law.term.axis && weak.gain < shadow_share * law.gain &&
@@ -67,6 +75,9 @@ std::string why_unknown(int axis, const std::vector<DiscoveredLaw>& all, std::st
     }
     if (law.overlap > largest_overlap) {
       return "it and another of the axis do each other's work";
+    }
+    if (in_a_series(law, all)) {
+      return "it and another of the axis follow the same quantities: terms of one law";
     }
     if (has_shadow(law, all)) {
       return "a much weaker one may as well be of this axis";

@@ -31,7 +31,7 @@ struct TellingLaws {
 // - a process of its own stands beside the equation;
 // - three equations share it, or two of which the smaller takes less than half of what the larger does, or of which one
 //   more probably fails on another plan than not, or which share more than a third of what they gain: they are more probably one law
-//   whose form none of them has;
+//   whose form none of them has; the same where two are functions of the same quantities and of no others;
 // - the only law of all is strong and more probably fails on another plan than not (`unsure`): all that stands in its class is nearly it on
 //   these recordings and something else elsewhere, and none of it is known to be the law;
 // - a law that takes less than a tenth of what its law takes may as well follow this axis: that is what the form lacks.

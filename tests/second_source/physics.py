@@ -52,6 +52,39 @@ def mechanism(random):
     return "an offset drawn at each turn", lambda k: numpy.random.default_rng(seed).normal(0, 1, 99)[k["n"].astype(int)]
 
 
+def per_turn(known, source):
+    """The mean of the source over the turn that has last begun, times its length in s; 0 before the first."""
+    number, step = known["n"].astype(int), 3600.0 * (known["t"][1] - known["t"][0])
+    return (numpy.bincount(number, weights=source * step) * (numpy.arange(number.max() + 1) > 0))[number]
+
+
+def other_mechanism(random):
+    """The same, of other kinds: what no list that selfcal has names."""
+    kind = random.choice(["deadband", "ripple", "late heat", "by the angle", "rectified", "rub", "sticks and slips", "overload"])
+    axis, angle = random.choice(["fx", "fy", "fz"]), random.choice(["outer", "inner"])
+    if kind == "deadband":  # nothing comes out below a threshold
+        width = random.uniform(0.05, 0.3)
+        return f"{axis} clipped at {width:.2f} g", lambda k: -numpy.clip(k[axis], -width, width)
+    if kind == "ripple":  # of a bearing
+        times, phase = int(random.integers(5, 10)), random.uniform(-3, 3)
+        return f"sin({times} {angle})", lambda k: numpy.sin(times * k[angle] + phase)
+    if kind == "late heat":  # inside, the temperature of the case arrives late
+        tau = random.uniform(100, 400)
+        return f"T behind itself, tau {tau:.0f} s", lambda k: settled(k, tau, k["T"]) - k["T"]
+    if kind == "by the angle":
+        tau, rate = random.uniform(15, 80), {"outer": "wo", "inner": "wi"}[angle]
+        return f"creep by the last turn of {angle}, tau {tau:.0f} s", lambda k: per_turn(k, k[rate]) * numpy.exp(-k["since"] / tau)
+    if kind == "rectified":  # vibration of the drive
+        return "square of the gimbal's rates, 2 s late", lambda k: settled(k, 2.0, k["wo"] ** 2 + k["wi"] ** 2)
+    if kind == "rub":  # begins, and grows
+        start = random.uniform(0.1, 0.4)
+        return f"root of the time from {start:.2f} h on", lambda k: numpy.sqrt(numpy.maximum(0.0, k["t"] - start))
+    if kind == "sticks and slips":  # a tilt that goes back in two jumps
+        first, second = sorted(random.uniform(5, 50, 2))
+        return f"{axis} until {first:.0f} s, half until {second:.0f} s", lambda k: k[axis] * ((k["rest"] < first) + (k["rest"] < second)) / 2
+    return f"{axis}^3 over its own fourth power", lambda k: k[axis] ** 3 / (1.0 + k[axis] ** 4)
+
+
 def beside_the_24(signal, known, axis):
     """What the parameters of this axis cannot take."""
     if axis.startswith("accel"):

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,8 +27,17 @@ DiscoveredLaw law(int axis, double gain, double carries_over = 0.9) {
   return l;
 }
 
+void follow(DiscoveredLaw& l, std::string_view expression) {
+  l.term.expression = *selfcal::laws::Expression::parse(expression);
+}
+
+// Each law follows a quantity of its own.
 std::pair<std::size_t, std::size_t> told_and_described(std::vector<DiscoveredLaw> laws,
                                                        std::vector<DiscoveredProcess> processes = {}) {
+  constexpr std::array quantities = {"fx", "t", "abs(si)"};
+  for (std::size_t k = 0; k < laws.size(); ++k) {
+    follow(laws[k], quantities.at(k));
+  }
   const TellingLaws t = tell_laws(std::move(laws), processes, departure_rate);
   return {t.told.size(), t.described.size()};
 }
@@ -49,6 +60,20 @@ TEST(KnownForm, TwoOfOneAxisThatDoEachOthersWorkAreDescribed) {
   EXPECT_EQ(told_and_described(laws), Counts(3, 0));
   laws[0].overlap = laws[1].overlap = 0.4;
   EXPECT_EQ(told_and_described(laws), Counts(1, 2));
+}
+
+TEST(KnownForm, TwoTermsOfOneLawAreDescribed) {
+  std::vector<DiscoveredLaw> laws = {law(5, 900.0), law(5, 800.0)};
+  const auto told = [&](std::string_view one, std::string_view other) {
+    follow(laws[0], one);
+    follow(laws[1], other);
+    return tell_laws(laws, {}, departure_rate).told.size();
+  };
+  EXPECT_EQ(told("sin(outer)**3*sin(2*outer)", "sin(3*outer)*sin(outer)**2"), 0U);
+  EXPECT_EQ(told("fx*abs(si)", "si*fx**2"), 0U);
+  EXPECT_EQ(told("fx*abs(si)", "fx**2"), 2U);
+  laws[1].term.axis = 4;
+  EXPECT_EQ(told("fx", "fx**2"), 2U);
 }
 
 TEST(KnownForm, AnAxisThatHoldsMoreThanItsLawIsDescribed) {

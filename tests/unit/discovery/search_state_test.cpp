@@ -4,6 +4,9 @@
 
 #include <cmath>
 
+#include "estimator/geometry/sensor_parameters.hpp"
+#include "estimator/geometry/units.hpp"
+
 namespace selfcal::discovery {
 namespace {
 
@@ -47,6 +50,29 @@ TEST(OtherExplanation, WhatIsLessProbableIsNone) {
 
 TEST(OtherExplanation, OtherNumbersAreNoOtherExplanation) {
   EXPECT_FALSE(other_explanation(of_law(0.5), of_law(0.6), 0.1, 0.01));
+}
+
+// A law of 2 units whose unit moves a misalignment of the gyros. A degree is what a sensor may have.
+bool stands_where_it_moves(double per_unit_rad) {
+  LawFit fit;
+  fit.terms = {creep(0.5)};
+  fit.coefficient = Eigen::VectorXd::Constant(1, -2.0);
+  fit.gain = {100.0};
+  fit.held_out_gain = {49.0};
+  fit.recordings.resize(2);
+  for (FittedRecording& r : fit.recordings) {
+    r.shift = Eigen::MatrixXd::Zero(sensor_parameter_count, 2);
+  }
+  fit.recordings.back().shift(parameter::gyro_misalignment, 0) = per_unit_rad;
+  fit.recordings.back().shift(parameter::gyro_misalignment, 1) = 1.0;  // of its constant
+  return stands(fit, 0);
+}
+
+TEST(Stands, WhatLeavesTheTwentyFourWhereASensorMayHaveThem) {
+  EXPECT_TRUE(stands_where_it_moves(0.0));
+  EXPECT_TRUE(stands_where_it_moves(0.24 * units::degree));
+  EXPECT_FALSE(stands_where_it_moves(0.26 * units::degree));
+  EXPECT_FALSE(stands_where_it_moves(-0.26 * units::degree));
 }
 
 }  // namespace
