@@ -16,8 +16,8 @@ namespace {
 constexpr double division_s = 0.02;
 constexpr double creeping_s = 15.0;
 constexpr std::size_t creeping_divisions = 10;
-constexpr double margin_s = 0.5;  // between a turn as found and as it was
-constexpr double piece_s = 0.1;
+constexpr double margin_s = 0.5;        // between a turn as found and as it was
+constexpr double piece_s = 0.1;         // of a turn that is remembered
 constexpr double turn_margin_s = 0.25;  // segments are told apart by quarters of a second
 
 // Where a rate c (E - t)^p that was averaged over stretches around the times given runs out: E, with p = 1 or 2 (a
