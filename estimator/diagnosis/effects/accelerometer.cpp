@@ -8,16 +8,10 @@ namespace selfcal::diagnosis {
 namespace {
 
 constexpr std::array creep_tau_s = {10.0, 20.0, 35.0, 60.0, 100.0, 170.0};
-constexpr std::array load_tau_s = {12.0, 35.0, 100.0};
 
 // Creep after each turn.
 void relaxation(const EffectContext& c, double tau, Columns velocity, Columns /*angle*/) {
   add_axes(velocity, Vector3::Constant(decay_integral(c, tau)));
-}
-
-// Flexures and mountings are anelastic: what a load does to them sets in late.
-void load_lag(const EffectContext& c, double tau, Columns velocity, Columns /*angle*/) {
-  add_matrix(velocity, lag_integral(c, tau));
 }
 
 // Bias linear in time.
@@ -105,17 +99,6 @@ std::vector<Effect> accelerometer_effects() {
                  .parameters = product_parameters(),
                  .triad = Triad::accelerometer,
                  .sensor = cross_coupling});
-  all.push_back({.id = "accel_load_lag",
-                 .words = "accelerometer error that follows a change of load late",
-                 .place = 232,
-                 .equation = "df = K (lag(u) - u), lag: first order, tau",
-                 .excited = "first minutes of the dwells after a turn, by what the load was before it",
-                 .experiment = "one face reached from several others",
-                 .parameters = matrix_parameters("ug/g", units::micro_g, 20.0),
-                 .constant = time_constant(load_tau_s),
-                 .triad = Triad::accelerometer,
-                 .sensor = load_lag,
-                 .since_turns = true});
   return all;
 }
 

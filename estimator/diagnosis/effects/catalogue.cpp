@@ -41,7 +41,8 @@ EffectConstant time_constant(std::span<const double> grid) {
 const std::vector<Effect>& catalogue() {
   static const std::vector<Effect> all = [] {
     std::vector<Effect> effects;
-    for (auto* family : {thermal_effects, accelerometer_effects, gyro_effects, mounting_effects, base_effects}) {
+    for (auto* family :
+         {thermal_effects, accelerometer_effects, gyro_effects, mounting_effects, base_effects, after_turn_effects}) {
       for (Effect& effect : family()) {
         effects.push_back(std::move(effect));
       }

@@ -1,4 +1,4 @@
-// The five families of effects. An effect stands in one of them: a row and an equation.
+// The six families of effects. An effect stands in one of them: a row and an equation.
 #pragma once
 
 #include <vector>
@@ -12,6 +12,7 @@ std::vector<Effect> accelerometer_effects();
 std::vector<Effect> gyro_effects();
 std::vector<Effect> mounting_effects();
 std::vector<Effect> base_effects();
+std::vector<Effect> after_turn_effects();
 
 // A bias that warms up, temperature not measured: effects of their own, and what a drift in time leaves some of.
 Effect accel_warm_up();

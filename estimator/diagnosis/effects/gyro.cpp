@@ -35,12 +35,6 @@ void magnetic_sensitivity(const EffectContext& c, double /*constant*/, Columns /
   add_matrix(angle, c.field_b * c.dt);
 }
 
-// The mass unbalance of an anelastic mounting moves late.
-void load_lag(const EffectContext& c, double tau, Columns /*velocity*/, Columns angle) {
-  add_matrix(angle, lag_integral(c, tau));
-}
-
-constexpr std::array load_tau_s = {12.0, 35.0, 100.0};
 constexpr std::array zone_rates = {0.2 * units::degree_per_hour, 5.0 * units::degree_per_hour,
                                    20.0 * units::degree_per_hour};
 constexpr EffectConstant zone_width = {.kind = EffectConstant::Kind::grid,
@@ -133,17 +127,6 @@ std::vector<Effect> gyro_effects() {
                  .sensor = magnetic_sensitivity,
                  .lack_of_fit = attitude_functions(),
                  .needs_heading = true});
-  all.push_back({.id = "gyro_load_lag",
-                 .words = "gyro drift that follows a change of load late",
-                 .place = 205,
-                 .equation = "dw = K (lag(u) - u), lag: first order, tau",
-                 .excited = "first minutes of the dwells after a turn, by what the load was before it",
-                 .experiment = "one face reached from several others",
-                 .parameters = matrix_parameters("deg/h/g", units::degree_per_hour, 0.01),
-                 .constant = time_constant(load_tau_s),
-                 .triad = Triad::gyro,
-                 .sensor = load_lag,
-                 .since_turns = true});
   return all;
 }
 

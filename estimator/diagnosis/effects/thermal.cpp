@@ -1,6 +1,5 @@
 // Biases and scales that follow the temperature: the channel's where there is one, else a warm-up.
 #include <array>
-#include <numbers>
 
 #include "estimator/diagnosis/effects/families.hpp"
 #include "estimator/geometry/units.hpp"
@@ -34,16 +33,6 @@ void gyro_scale_follows(const EffectContext& c, double /*constant*/, Columns /*v
   add_axes(angle, c.temperature * c.angle);
 }
 
-// The motors warm the block with each turn, and it cools.
-void accel_heated(const EffectContext& c, double tau, Columns velocity, Columns /*angle*/) {
-  add_axes(velocity, Vector3::Constant(travel_integral(c, tau)));
-}
-void gyro_heated(const EffectContext& c, double tau, Columns /*velocity*/, Columns angle) {
-  add_axes(angle, Vector3::Constant(travel_integral(c, tau)));
-}
-
-constexpr std::array heat_tau_s = {60.0, 150.0, 400.0, 1000.0};
-constexpr double revolution = 2.0 * std::numbers::pi;
 constexpr std::array bias_tau_s = {60.0, 120.0, 240.0, 480.0, 960.0, 1920.0};
 // A time constant far beyond the recording stands for a linear drift.
 constexpr std::array scale_tau_s = {120.0, 480.0, 1920.0, 30000.0};
@@ -162,28 +151,6 @@ std::vector<Effect> thermal_effects() {
                                                .triad = Triad::gyro,
                                                .temperature = TemperatureUse::measured,
                                                .sensor = gyro_scale_follows}));
-  all.push_back({.id = "accel_turn_heat",
-                 .words = "accelerometer bias that follows the heat of the gimbal's turns",
-                 .place = 172,
-                 .equation = "df_i = h_i A, A' = |turn rate| - A/tau",
-                 .excited = "dwells after turns, most after many in short time",
-                 .experiment = "long dwells between few turns, then many turns at once",
-                 .parameters = axis_parameters("ug/rev", units::micro_g / revolution, 100.0),
-                 .constant = time_constant(heat_tau_s),
-                 .triad = Triad::accelerometer,
-                 .sensor = accel_heated,
-                 .since_turns = true});
-  all.push_back({.id = "gyro_turn_heat",
-                 .words = "gyro drift that follows the heat of the gimbal's turns",
-                 .place = 174,
-                 .equation = "dw_i = h_i A, A' = |turn rate| - A/tau",
-                 .excited = "dwells after turns, most after many in short time",
-                 .experiment = "long dwells between few turns, then many turns at once",
-                 .parameters = axis_parameters("deg/h/rev", units::degree_per_hour / revolution, 0.05),
-                 .constant = time_constant(heat_tau_s),
-                 .triad = Triad::gyro,
-                 .sensor = gyro_heated,
-                 .since_turns = true});
   return all;
 }
 

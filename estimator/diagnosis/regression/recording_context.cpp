@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -45,6 +46,15 @@ double rate_runs_out(const std::vector<double>& time, const std::vector<double>&
   return time.front() - best(0) / best(1);
 }
 
+// Of samples [first, last).
+Vector3 sum_over(std::span<const std::array<double, 3>> increments, std::size_t first, std::size_t last) {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t i = first; i < last; ++i) {
+    sum += Eigen::Map<const Vector3>(increments[i].data());
+  }
+  return sum;
+}
+
 // A read-out is that of the end of its sample: of an odd number of samples the middle lies between two of them.
 double angle_in_the_middle(std::span<const double> angle, const SensorBlock& block) {
   const std::size_t ends = block.first + block.last;
@@ -79,16 +89,13 @@ RecordingContext::RecordingContext(const ImuData& data, ReferenceResidual refere
 }
 
 Vector3 RecordingContext::load(std::size_t first, std::size_t last) const {
-  Vector3 sum = Vector3::Zero();
-  for (std::size_t i = first; i < last; ++i) {
-    sum += Eigen::Map<const Vector3>(data_.delta_v[i].data());
-  }
-  return sum * data_.sample_rate_hz / (units::standard_gravity * static_cast<double>(last - first));
+  return sum_over(data_.delta_v, first, last) * data_.sample_rate_hz /
+         (units::standard_gravity * static_cast<double>(last - first));
 }
 
 // By read-outs where there are any; the gyros sense the Earth's rate and the base's too.
 double RecordingContext::travelled(std::size_t first, std::size_t last) const {
-  if (data_.gimbal_outer.empty() || data_.gimbal_inner.empty() || first == 0) {
+  if (data_.gimbal_outer.empty() || data_.gimbal_inner.empty()) {
     return mean_rate(first, last).norm() * static_cast<double>(last - first) / data_.sample_rate_hz;
   }
   const auto by = [&](std::span<const double> angle) {  // read-outs are those of the ends of samples
@@ -101,6 +108,10 @@ double RecordingContext::travelled(std::size_t first, std::size_t last) const {
 // makes no load of its own.
 void RecordingContext::remember_turns() {
   const auto piece = static_cast<std::size_t>(std::max(1.0, std::round(piece_s * data_.sample_rate_hz)));
+  std::vector<Vector3> means;  // of the load in dwells
+  for (const Segment& s : segments_) {
+    means.push_back(s.rotation ? Vector3::Zero() : load(s.first, s.last));
+  }
   std::vector<TurnChanges> loads, travels;
   for (std::size_t k = 1; k + 1 < segments_.size(); ++k) {
     const Segment& turn = segments_[k];
@@ -111,7 +122,7 @@ void RecordingContext::remember_turns() {
     of_load.step_s = of_travel.step_s = static_cast<double>(piece) / data_.sample_rate_hz;
     of_load.first_s = data_.time_s[turn.first] - 1.0 / data_.sample_rate_hz - start_s_;
     of_travel.first_s = of_load.first_s + 0.5 * of_load.step_s;
-    Vector3 before = load(segments_[k - 1].first, segments_[k - 1].last);
+    Vector3 before = means[k - 1];
     for (std::size_t first = turn.first; first < turn.last; first += piece) {
       const std::size_t last = std::min(first + piece, turn.last);
       const Vector3 now = load(first, last);
@@ -119,7 +130,7 @@ void RecordingContext::remember_turns() {
       of_travel.change.emplace_back(travelled(first, last), 0.0, 0.0);
       before = now;
     }
-    of_load.change.emplace_back(load(segments_[k + 1].first, segments_[k + 1].last) - before);
+    of_load.change.emplace_back(means[k + 1] - before);
     loads.push_back(std::move(of_load));
     travels.push_back(std::move(of_travel));
   }
@@ -203,11 +214,7 @@ Vector3 RecordingContext::rate_at(std::size_t sample) const {
 }
 
 Vector3 RecordingContext::mean_rate(std::size_t first, std::size_t last) const {
-  Vector3 sum = Vector3::Zero();
-  for (std::size_t i = first; i < last; ++i) {
-    sum += Eigen::Map<const Vector3>(data_.delta_theta[i].data());
-  }
-  return sum * data_.sample_rate_hz / static_cast<double>(last - first);
+  return sum_over(data_.delta_theta, first, last) * data_.sample_rate_hz / static_cast<double>(last - first);
 }
 
 EffectContext RecordingContext::of(const SensorBlock& block) const {
