@@ -314,6 +314,11 @@ double with_variance(double sigma, double linear_before, double linear) {
 
 }  // namespace
 
+bool FittedEffect::nothing_left() const {
+  constexpr double not_there = 0.01;
+  return log_p_none > std::log(not_there);
+}
+
 bool FittedEffect::all_common() const {
   return std::all_of(common.begin(), common.end(), [](bool one) { return one; });
 }

@@ -47,6 +47,7 @@ struct FittedEffect {
   std::vector<EffectFit> each;                 // of the recordings that can hold it
 
   bool all_common() const;
+  bool nothing_left() const;  // p of log_p_none above 0.01
 };
 
 // A law's coefficient and one of an effect's of which the recordings tell little more than a combination.

@@ -1,7 +1,6 @@
 #include "estimator/discovery/laws_for_names.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -107,20 +106,25 @@ class NamesAgainstLaws {
     return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
   }
 
-  // `out` with those names that stay and of which nothing is left when all is fitted together with the laws; none where there are none.
-  std::optional<std::vector<bool>> without_the_empty(const LawsForNames& found, std::vector<bool> out) const {
-    constexpr double not_there = 0.01;
-    const LawFit& fit = found.search.fitted().fit;
+  // The names in whose place `found` has laws, and those that stay and of which nothing is left when all is fitted together with the laws;
+  // none where there are no such.
+  std::optional<std::vector<bool>> with_the_empty(const LawsForNames& found) const {
     if (found.rest.effects().empty()) {
       return std::nullopt;
     }
+    const LawFit& fit = found.search.fitted().fit;
     const auto joint = found.rest.beside(fit.terms, fit.coefficient, of_laws_.stop);
+    if (!joint) {
+      return std::nullopt;
+    }
+    std::vector<bool> out;
     bool more = false;
-    for (std::size_t e = 0; joint && e < joint->effects.size(); ++e) {
-      const auto name = std::find(held_.names().begin(), held_.names().end(), joint->effects[e].effect);
-      if (name != held_.names().end() && joint->effects[e].log_p_none > std::log(not_there)) {
-        out[static_cast<std::size_t>(name - held_.names().begin())] = more = true;
-      }
+    for (const diagnosis::Effect* name : held_.names()) {
+      const bool replaced = std::find(found.names.begin(), found.names.end(), name) != found.names.end();
+      const bool empty = std::any_of(joint->effects.begin(), joint->effects.end(),
+                                     [name](const FittedEffect& e) { return e.effect == name && e.nothing_left(); });
+      out.push_back(replaced || empty);
+      more = more || empty;
     }
     return more ? std::optional(std::move(out)) : std::nullopt;
   }
@@ -198,7 +202,6 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
   NamesAgainstLaws against(unit, *less_names, of_laws, progress);
   constexpr int most_searches = 3;
   std::optional<LawsForNames> best;
-  std::vector<bool> out;  // of the best
   int searches = 0;
   for (const Choice& choice : against.choices(2.0 * least_log_odds)) {
     if (searches == most_searches || (best && choice.most <= 2.0 * best->log_odds) || of_laws.stop.stop_requested()) {
@@ -208,12 +211,11 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
     auto found = against.search(choice.out);
     if (found && found->log_odds >= least_log_odds && (!best || found->log_odds > best->log_odds)) {
       best.emplace(std::move(*found));
-      out = choice.out;
     }
   }
   // A name with many coefficients gains by noise alone what makes it seem worth keeping.
-  if (const auto without = best ? against.without_the_empty(*best, out) : std::nullopt) {
-    auto found = against.search(*without);
+  if (const auto out = best ? against.with_the_empty(*best) : std::nullopt) {
+    auto found = against.search(*out);
     if (found && found->log_odds >= least_log_odds) {
       best.emplace(std::move(*found));
     }

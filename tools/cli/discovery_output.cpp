@@ -20,7 +20,6 @@ using discovery::Discovery;
 using nlohmann::ordered_json;
 
 constexpr std::size_t members_shown = 6;
-constexpr double not_there = 0.01;  // p above which a named effect is nothing once all is fitted together
 
 // Two digits of sigma, and the value to the same place.
 std::string with_sigma(double value, double sigma, std::string_view unit) {
@@ -209,7 +208,7 @@ std::string fitted_text(const discovery::FittedEffect& effect) {
                   : effect.all_common()
                       ? fmt::format(": the same in all recordings that can hold it ({})", p_text(effect.log_p_common))
                       : fmt::format(": not the same in all recordings ({})", p_text(effect.log_p_common)));
-  if (effect.log_p_none > std::log(not_there)) {
+  if (effect.nothing_left()) {
     return text +
            fmt::format("    nothing is left of it when all is fitted together ({})\n", p_text(effect.log_p_none));
   }
