@@ -160,9 +160,7 @@ void ImuSimulator::take(const PhysicsEffect& effect) {
     effects_.push_back({equation, v});
     needs_angular_acceleration_ |= sim::needs_angular_acceleration(effect.id);
   } else if (effect.id == "accel_load_lag" || effect.id == "gyro_load_lag") {
-    Matrix3 per_g;
-    per_g << v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8];
-    memories_.push_back({effect.id.starts_with("gyro"), per_g, TurnMemory(TurnMemory::Of::load, v[9])});
+    memories_.push_back({effect.id.starts_with("gyro"), matrix_of(v), TurnMemory(TurnMemory::Of::load, v[9])});
   } else if (effect.id == "accel_turn_heat" || effect.id == "gyro_turn_heat") {
     Matrix3 per_rad = Matrix3::Zero();
     per_rad.col(0) = axes(0);

@@ -15,11 +15,6 @@ using Context = SensorContext;
 using Deviation = SensorDeviation;
 
 Vector3 vector_at(Values p, std::size_t first) { return {p[first], p[first + 1], p[first + 2]}; }
-Matrix3 matrix_of(Values p) {
-  Matrix3 m;
-  m << p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8];
-  return m;
-}
 
 void gyro_g_sensitivity(Values p, const Context& c, Deviation& d) { d.domega += matrix_of(p) * c.u(); }
 
@@ -161,6 +156,12 @@ constexpr std::array<std::pair<std::string_view, SensorEquation>, 23> equations{
 }};
 
 }  // namespace
+
+Matrix3 matrix_of(std::span<const double> p) {
+  Matrix3 m;
+  m << p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8];
+  return m;
+}
 
 Vector3 SensorContext::u() const { return f_ib_b / units::standard_gravity; }
 

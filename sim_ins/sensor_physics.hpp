@@ -34,6 +34,9 @@ struct SensorDeviation {
 // p: the effect's values, SI, in the order of its description. Adds to the deviation.
 using SensorEquation = void (*)(std::span<const double> p, const SensorContext& context, SensorDeviation& deviation);
 
+// Of the first nine values, row by row.
+Matrix3 matrix_of(std::span<const double> p);
+
 // nullptr for the effects that act on the base, the noise, the sampling or the data.
 SensorEquation sensor_equation(std::string_view effect_id);
 // Whether the equation reads angular_acceleration.

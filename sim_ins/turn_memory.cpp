@@ -39,11 +39,10 @@ Vector3 TurnMemory::at(double t, const TrueMotion& motion) {
     memory_.emplace_back(Vector3::Zero());
     load_ = load_at(0.0, motion);
   }
+  const double kept = std::exp(-step_s / tau_s_);
+  const double left = (1.0 - kept) * tau_s_ / step_s;  // at the end of a step, of what changes evenly over it
   while (memory_.size() < before + 2) {
     const double begin_s = static_cast<double>(memory_.size() - 1) * step_s;
-    const double kept = std::exp(-step_s / tau_s_);
-    // Of what changes evenly over the step, (1 - kept) tau/step is left at its end.
-    const double left = (1.0 - kept) * tau_s_ / step_s;
     memory_.emplace_back(kept * memory_.back() + left * change(begin_s, begin_s + step_s, motion));
   }
   const double part = place - static_cast<double>(before);

@@ -12,10 +12,8 @@ namespace selfcal::sim {
 // them: within a step x changes evenly to 1e-5 of a turn's change.
 class TurnMemory {
  public:
-  enum class Of {
-    load,
-    travel
-  };  // x: -u, g, b axes; the angle travelled by both axes of the gimbal, rad, first element
+  // x: -u, g, b axes; or the angle travelled by both axes of the gimbal, rad, first element.
+  enum class Of { load, travel };
   TurnMemory(Of of, double tau_s) : of_(of), tau_s_(tau_s) {}
 
   // y at time t >= 0. The same motion at every call.

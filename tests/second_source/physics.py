@@ -53,7 +53,7 @@ def mechanism(random):
 
 
 def per_turn(known, source):
-    """The mean of the source over the turn that has last begun, times its length in s; 0 before the first."""
+    """The integral over the time in s of a source that acts in turns, over the turn that has last begun; 0 before the first."""
     number, step = known["n"].astype(int), 3600.0 * (known["t"][1] - known["t"][0])
     return (numpy.bincount(number, weights=source * step) * (numpy.arange(number.max() + 1) > 0))[number]
 

@@ -54,8 +54,8 @@ std::string effects_page() {
       R"(An effect is physics that the 24 parameters leave out. `selfcal diagnose` names effects by these ids, and a physics file
 conceals them in a simulation. In the equations *i* is a sensor axis, *u* the specific force over g, *f* the specific force, *w*
 the angular rate, *A* the angle that the gimbal turned lately, *s* the time since the end of the last turn, *t* the time since the
-start, *T* the temperature less its mean. `df` and `dw` add to the sensor's output. The typical size is what such sensors show; the diagnosis states for each recording
-with which significance it would see that size (`expected_z` in its JSON).
+start, *T* the temperature less its mean. `df` and `dw` add to the sensor's output. The typical size is what such sensors show; the
+diagnosis states for each recording with which significance it would see that size (`expected_z` in its JSON).
 
 ## Effects that the diagnosis names
 
