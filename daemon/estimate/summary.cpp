@@ -95,7 +95,19 @@ std::string largest_correction(const Diagnosis& d) {
   return fmt::format("{} is {} {}, not {}", p.name, with.value, p.unit, without.value);
 }
 
-// Every kind of finding once, with how many there are of one that is there several times.
+// ", or as well ...": what explains the recording no worse than what is named.
+std::string or_as_well(const Finding& f) {
+  if (f.equivalent.empty()) {
+    return {};
+  }
+  const std::size_t more = f.equivalent.size() - 1;
+  return fmt::format(", or as well {}{}", effect_words(f.equivalent.front()),
+                     more == 0   ? std::string()
+                     : more == 1 ? ", or " + effect_words(f.equivalent.back())
+                                 : fmt::format(", or one of {} others", more));
+}
+
+// Every kind of finding once, with how many there are of one that is there several times, and what else it may be.
 std::vector<std::string> kinds_of(const Diagnosis& d) {
   std::vector<std::string> effects, words;
   for (const Finding& f : d.findings) {
@@ -103,7 +115,7 @@ std::vector<std::string> kinds_of(const Diagnosis& d) {
       const auto same = std::ranges::count(d.findings, f.effect, &Finding::effect);
       const bool lines = f.effect == "vibration_line" && same > 1;
       effects.push_back(f.effect);
-      words.push_back(effect_words(f.effect) + (lines ? fmt::format(", {} of them", same) : std::string()));
+      words.push_back(effect_words(f.effect) + (lines ? fmt::format(", {} of them", same) : or_as_well(f)));
     }
   }
   return words;

@@ -119,6 +119,12 @@ TEST(Summary, TheCauseIsNamedWhereTheDiagnosisKnowsIt) {
   const JudgedResult named = judged(inconsistent_result(), default_tolerance(), {}, {"my file.h5", 0}, creep());
   EXPECT_EQ(named.summary.standing, SummaryStanding::bad);
   EXPECT_THAT(named.summary.verdict, HasSubstr("creep of the accelerometers after each turn"));
+  // What explains it no worse is no detail.
+  diagnosis::Diagnosis either = creep();
+  either.findings.front().equivalent = {"accel_turn_heat"};
+  EXPECT_THAT(summary_of(either, {"r.h5", 0}).verdict,
+              HasSubstr("creep of the accelerometers after each turn, or as well accelerometer bias that follows the "
+                        "heat of the gimbal's turns."));
   EXPECT_THAT(named.summary.cause, HasSubstr("x 49.81 +- 0.58 ug, 85 sigma"));
   EXPECT_THAT(named.summary.cause, HasSubstr("accel_bias_x is 81.0 ug, not 100.0"));
   EXPECT_EQ(named.summary.next, "selfcal diagnose 'my file.h5'");
