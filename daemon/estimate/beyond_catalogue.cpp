@@ -267,7 +267,8 @@ std::string instead_words(const discovery::OtherExplanation& instead) {
 std::string laws_words(const diagnosis::LawsInstead& instead) {
   std::vector<std::string> all;
   for (const diagnosis::LawsInstead::Law& law : instead.laws) {
-    all.push_back(fmt::format("{} follows {}", law.axis, law.expression));
+    all.push_back(law.process.empty() ? fmt::format("{} follows {}", law.axis, law.expression)
+                                      : fmt::format("{} takes a new offset at each turn", law.axis));
   }
   return first_of(std::move(all), " and ", " ");
 }

@@ -91,6 +91,7 @@ ordered_json to_json(const diagnosis::LawsInstead& instead) {
   for (const diagnosis::LawsInstead::Law& law : instead.laws) {
     laws.push_back({{"axis", law.axis},
                     {"expression", law.expression},
+                    {"process", law.process},
                     {"coefficient", law.coefficient},
                     {"sigma", law.sigma},
                     {"unit", unit_of_axis(law.place)}});

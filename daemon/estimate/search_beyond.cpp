@@ -17,12 +17,28 @@ namespace {
 using diagnosis::Diagnosis;
 using diagnosis::LawsInstead;
 
-// The 24 over both explanations. Beside laws the names that stay are fitted anew.
-void hold_both(Diagnosis& d, const discovery::LawsForNames& rivals, const discovery::LawFit& fit,
+// The 24 over the names and what may stand in their place.
+void average(Diagnosis& d, LawsInstead instead, const ParameterVector& value, const ParameterMatrix& covariance) {
+  const double weight = instead.odds / (1.0 + instead.odds);
+  const ParameterVector apart = value - d.value;
+  d.value += weight * apart;
+  d.covariance += weight * (covariance - d.covariance) + weight * (1.0 - weight) * apart * apart.transpose();
+  d.sigma = d.covariance.diagonal().cwiseSqrt();
+  d.instead = std::move(instead);
+}
+
+// Beside processes.
+void hold_both(Diagnosis& d, LawsInstead instead, const discovery::Discovery& processes) {
+  for (const discovery::DiscoveredProcess& p : processes.processes) {
+    instead.laws.push_back(
+        {p.axis, std::string(name_of_axis(p.axis)), {}, p.size, p.sigma, std::string(discovery::name_of(p.kind))});
+  }
+  average(d, std::move(instead), processes.average.parameters.front(), processes.average.covariance.front());
+}
+
+// Beside laws the names that stay are fitted anew.
+void hold_both(Diagnosis& d, LawsInstead instead, const discovery::LawsForNames& rivals, const discovery::LawFit& fit,
                const std::stop_token& stop) {
-  LawsInstead instead;
-  instead.names = rivals.names;
-  instead.odds = std::exp(rivals.log_odds);
   discovery::FittedRecording other = fit.recordings.front();
   Eigen::VectorXd coefficient = fit.coefficient;
   Eigen::MatrixXd of_coefficient = fit.covariance;
@@ -42,15 +58,11 @@ void hold_both(Diagnosis& d, const discovery::LawsForNames& rivals, const discov
     instead.laws.push_back({term.axis, std::string(name_of_axis(term.axis)), term.expression.text(term.constants),
                             coefficient(row), std::sqrt(of_coefficient(row, row))});
   }
-  const double weight = instead.odds / (1.0 + instead.odds);
-  const ParameterVector apart = other.parameters - d.value;
-  d.value += weight * apart;
-  d.covariance += weight * (other.covariance - d.covariance) + weight * (1.0 - weight) * apart * apart.transpose();
-  d.sigma = d.covariance.diagonal().cwiseSqrt();
-  d.instead = std::move(instead);
+  average(d, std::move(instead), other.parameters, other.covariance);
 }
 
-// Of names that stand alone: laws that are far likelier, in the place of some or all of them; of one recording others are kept in `first`.
+// Of names that stand alone: laws or processes that are far likelier, in the place of some or all of them; of one recording others are kept in
+// `first`.
 std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::DiagnosedRecording> unit, Diagnosis& first,
                                                 const discovery::DiscoveryOptions& of_laws,
                                                 const discovery::Progress& progress) {
@@ -60,16 +72,25 @@ std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::Diagn
     return std::nullopt;
   }
   const discovery::LawFit fit = rivals->search.fitted().fit;  // telling takes it away
-  if (rivals->log_odds >= std::log(far_likelier)) {
+  const bool processes = fit.terms.empty(), likelier = rivals->log_odds >= std::log(far_likelier);
+  LawsInstead instead;
+  instead.names = rivals->names;
+  instead.odds = std::exp(rivals->log_odds);
+  if (likelier || processes) {
     discovery::Discovery told = rivals->search.told();
-    if (!told.laws.empty() && explains(&told)) {
+    const bool any = !told.laws.empty() || processes;
+    if (likelier && any && explains(&told)) {
       first = std::move(rivals->without.front());
       first.unexplained = first.mismatch = true;
       return BeyondSearch{std::move(rivals->rest), std::move(told)};
     }
+    if (processes && unit.size() == 1) {
+      hold_both(first, std::move(instead), told);
+      return std::nullopt;
+    }
   }
   if (unit.size() == 1) {
-    hold_both(first, *rivals, fit, of_laws.stop);
+    hold_both(first, std::move(instead), *rivals, fit, of_laws.stop);
   }
   return std::nullopt;
 }

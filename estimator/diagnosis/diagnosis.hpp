@@ -84,6 +84,7 @@ struct LawsInstead {
     int place = 0;  // of the axis: gyro x, y, z, accelerometer x, y, z
     std::string axis, expression;
     double coefficient = 0.0, sigma = 0.0;  // ug or deg/h
+    std::string process = {};               // "jump per turn" of that size; empty: an equation
   };
   std::vector<Law> laws;
   std::vector<const Effect*> names;  // in whose place; the others stand beside the laws too

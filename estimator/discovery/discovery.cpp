@@ -29,7 +29,6 @@ namespace {
 constexpr std::size_t shortlist_size = 12;  // refined exactly in each step
 constexpr std::size_t class_size = 40;      // looked at exactly for the class
 constexpr std::size_t members_averaged = 8;
-constexpr double process_count = 2.0 * axis_count;
 
 double log_p(const Candidate& c) { return log_p_of_law(c.gain, c.term.constants.size(), c.cost); }
 

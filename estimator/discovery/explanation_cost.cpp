@@ -22,6 +22,8 @@ double cost_of_laws(std::size_t laws, double rows) {
 
 double cost_of_a_name(double rows) { return of_a_name + of_a_coefficient(rows); }
 
+double cost_of_a_size(double draws) { return of_a_coefficient(draws); }
+
 double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows) {
   constexpr double counts = 3.0;
   double cost = 0.0;

@@ -13,6 +13,8 @@ namespace selfcal::discovery {
 // `rows`: of the recording that is explained.
 double cost_of_laws(std::size_t laws, double rows);
 double cost_of_a_name(double rows);
+// Of a process' size, which so many draws show. What its freedom costs is in its likelihood.
+double cost_of_a_size(double draws);
 // Of a name's coefficients those count that the recording shows.
 double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows);
 

@@ -1,10 +1,13 @@
 #include "estimator/discovery/held_names.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
 #include "estimator/discovery/column_shares.hpp"
+#include "estimator/discovery/explanation_cost.hpp"
+#include "estimator/discovery/process.hpp"
 #include "estimator/discovery/shortlist.hpp"
 
 namespace selfcal::discovery {
@@ -125,10 +128,29 @@ double HeldNames::with_one_physics(const std::vector<bool>& out, const Eigen::Ve
   return gain_of(place.transpose() * beside_.information * place, place.transpose() * score);
 }
 
-double HeldNames::most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed) {
-  const Columns c = columns(out);
+void HeldNames::look_at(const Columns& c) {
   model_->look_at(sums_.sums.score + beside_.with_pieces * c.in, c.square);
   model_->choose(beside_.with_pieces(Eigen::all, c.stay), beside_.information(c.stay, c.stay), c.score(c.stay));
+}
+
+double HeldNames::by_names(const std::vector<bool>& out) const { return columns(out).by_names; }
+
+double HeldNames::jumps_beyond(const std::vector<bool>& out, const std::function<bool(int)>& allowed) {
+  const Columns c = columns(out);
+  look_at(c);
+  double gain = 0.0;
+  for (int axis = 0; axis < axis_count; ++axis) {
+    if (allowed(axis)) {
+      const ProcessFit jumps = fit_process(*model_, sums_, ProcessKind::jump_per_turn, axis);
+      gain += std::max(0.0, 2.0 * (jumps.log_likelihood_gain - std::log(process_count)) - cost_of_a_size(dwells()));
+    }
+  }
+  return gain - c.by_names;
+}
+
+double HeldNames::most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed) {
+  const Columns c = columns(out);
+  look_at(c);
   std::vector<std::vector<LawTerm>> alone;
   double over_pieces = 0.0;
   for (Candidate& candidate : Shortlist(sums_, dictionary_).best(*model_, shortlist_size)) {

@@ -24,6 +24,7 @@ class HeldNames {
   // Of sensors, in the order of `less.effects()`.
   const std::vector<const diagnosis::Effect*>& names() const { return names_; }
   double rows() const { return sums_.sums.rows; }
+  double dwells() const { return sums_.pieces.back().dwell + 1.0; }
 
   // By how much more than the names for which `out` says so do, the best function makes the square fall in their place, all other names
   // fitted anew: found over the pieces, and where it may be `least` or more exactly, its constants free.
@@ -31,10 +32,16 @@ class HeldNames {
   double most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed);
   // The same of laws, those of each alternative together.
   std::vector<double> beyond(const std::vector<bool>& out, const std::vector<std::vector<LawTerm>>& alternatives) const;
+  // The same of an offset that is drawn anew at each turn, on each axis that shows one and counts: twice the logarithm of what the likelihood
+  // gains, sizes and axes paid for.
+  double jumps_beyond(const std::vector<bool>& out, const std::function<bool(int)>& allowed);
+  // Fall of the square by the names for which `out` says so, all other names fitted beside them.
+  double by_names(const std::vector<bool>& out) const;
 
  private:
   struct Columns;
   Columns columns(const std::vector<bool>& out) const;
+  void look_at(const Columns& columns);
   // Fall of the square by all names, those that are out with one coefficient in all recordings.
   double with_one_physics(const std::vector<bool>& out, const Eigen::VectorXd& score) const;
 

@@ -97,12 +97,13 @@ class NamesAgainstLaws {
     }
     LawSearch search(rest->recordings(), of_laws_, progress_);
     const Discovery& found = search.fitted();
-    const bool allowed = std::all_of(found.fit.terms.begin(), found.fit.terms.end(),
-                                     [&](const LawTerm& law) { return may_replace(out, law.axis); });
-    if (found.fit.terms.empty() || !allowed || !found.processes.empty() || of_laws_.stop.stop_requested()) {
+    const bool laws = !found.fit.terms.empty(), jumps = !found.processes.empty();
+    if (laws == jumps || !may_replace(out, found) || of_laws_.stop.stop_requested()) {
       return std::nullopt;
     }
-    const double log_odds = 0.5 * (held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size()));
+    const double ahead = jumps ? of_jumps(out, found)
+                               : held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size());
+    const double log_odds = 0.5 * ahead;
     return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
   }
 
@@ -132,7 +133,23 @@ class NamesAgainstLaws {
  private:
   double most_of(const std::vector<bool>& out, double least) {
     const double more = dearer(out, 1);
-    return held_.most_beyond(out, least + more, [&](int axis) { return may_replace(out, axis); }) - more;
+    const auto allowed = [&](int axis) { return may_replace(out, axis); };
+    const double of_a_law = held_.most_beyond(out, least + more, allowed) - more;
+    return std::max(of_a_law, held_.jumps_beyond(out, allowed) - dearer(out, 0));
+  }
+  // Twice the logarithm of the odds of the processes that were found.
+  double of_jumps(const std::vector<bool>& out, const Discovery& found) const {
+    const double cost =
+        found.cost_of_processes + static_cast<double>(found.processes.size()) * cost_of_a_size(held_.dwells());
+    return found.misfit_before - found.misfit_after - cost - held_.by_names(out) - dearer(out, 0);
+  }
+  // What was found: laws, or jumps at turns; a walk the catalogue has asked for.
+  bool may_replace(const std::vector<bool>& out, const Discovery& found) const {
+    return std::all_of(found.fit.terms.begin(), found.fit.terms.end(),
+                       [&](const LawTerm& law) { return may_replace(out, law.axis); }) &&
+           std::all_of(found.processes.begin(), found.processes.end(), [&](const DiscoveredProcess& process) {
+             return process.kind == ProcessKind::jump_per_turn && may_replace(out, process.axis);
+           });
   }
   // Whether a law of this axis may stand in the place of these names.
   bool may_replace(const std::vector<bool>& out, int axis) const {

@@ -137,12 +137,12 @@ struct AgainstNames {
   }
 };
 
-// None where an effect or a law follows the temperature: nobody knows that of a rotation that was not made.
+// None where an effect or a law follows the temperature, or a law is a process: nobody knows that of a rotation that was not made.
 std::optional<AgainstNames> against_names(const diagnosis::Diagnosis& d) {
   AgainstNames a;
   std::vector<double> laws, effects;
   for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
-    auto expression = laws::Expression::parse(law.expression);
+    auto expression = laws::Expression::parse(law.expression);  // of a process: nothing
     if (!expression || needs_temperature(*expression)) {
       return std::nullopt;
     }

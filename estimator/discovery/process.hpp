@@ -14,6 +14,8 @@ constexpr std::string_view name_of(ProcessKind kind) {
   return kind == ProcessKind::jump_per_turn ? "jump per turn" : "random walk";
 }
 
+constexpr double process_count = 2.0 * axis_count;  // kinds on axes
+
 struct ProcessFit {
   ProcessKind kind = ProcessKind::jump_per_turn;
   int axis = 0;

@@ -103,8 +103,9 @@ std::string instead_text(const Diagnosis& d) {
   std::string text = fmt::format("\nin the place of {}, odds {:.2g} against it; the sigma of the 24 holds both:\n",
                                  fmt::join(names, " and "), d.instead->odds);
   for (const diagnosis::LawsInstead::Law& law : d.instead->laws) {
-    text += fmt::format("  {}  ({}) * {}\n", law.axis,
-                        with_sigma(law.coefficient, law.sigma, std::string(unit_of_axis(law.place))), law.expression);
+    const std::string size = with_sigma(law.coefficient, law.sigma, std::string(unit_of_axis(law.place)));
+    text += law.process.empty() ? fmt::format("  {}  ({}) * {}\n", law.axis, size, law.expression)
+                                : fmt::format("  {}  {}, {}\n", law.axis, law.process, size);
   }
   return text;
 }

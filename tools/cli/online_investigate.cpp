@@ -220,7 +220,7 @@ class Investigation {
                                      : "one equation is left";
     }
     if (!a.next && !a.instead().is_null()) {
-      return "no further rotation would tell what is named from the equation that may stand in its place";
+      return "no further rotation would tell what is named from what may stand in its place";
     }
     if (!a.next) {
       return a.settled()
@@ -283,11 +283,15 @@ class Investigation {
     }
     if (!a.instead().is_null()) {
       for (const ordered_json& law : a.instead().at("laws")) {
-        say(fmt::format("   or in the place of {} {} = ({:.4g} +- {:.2g} {}) * {}, odds {:.2g}\n",
+        const auto process = law.at("process").get<std::string>();
+        const std::string size = fmt::format("{:.4g} +- {:.2g} {}", law.at("coefficient").get<double>(),
+                                             law.at("sigma").get<double>(), law.at("unit").get<std::string>());
+        say(fmt::format("   or in the place of {} {}{}, odds {:.2g}\n",
                         fmt::join(a.instead().at("names").get<std::vector<std::string>>(), " and "),
-                        law.at("axis").get<std::string>(), law.at("coefficient").get<double>(),
-                        law.at("sigma").get<double>(), law.at("unit").get<std::string>(),
-                        law.at("expression").get<std::string>(), a.instead().at("odds").get<double>()));
+                        law.at("axis").get<std::string>(),
+                        process.empty() ? fmt::format(" = ({}) * {}", size, law.at("expression").get<std::string>())
+                                        : fmt::format(": {}, {}", process, size),
+                        a.instead().at("odds").get<double>()));
       }
       step["instead_of_names"] = a.instead();
     }
