@@ -115,6 +115,11 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
   if (unit.size() == 1) {
     if (auto both = discovery::names_beside_laws(unit.front().data, first, rest->recordings().front(), search.fitted(),
                                                  of_catalogue, of_laws, progress)) {
+      // Beside the names that stand now a law may be one more.
+      if (auto more = discovery::names_beside_laws(unit.front().data, both->diagnosis, both->rest.recordings().front(),
+                                                   both->laws, of_catalogue, of_laws, progress)) {
+        both = std::move(more);
+      }
       first = std::move(both->diagnosis);
       return BeyondSearch{std::move(both->rest), std::move(both->laws)};
     }

@@ -56,6 +56,8 @@ double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
 
 // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
 constexpr double least_share_of_laws = 0.3;
+// Of one law, that an effect makes of it in whose words it may be: constants of effects are tried at a few values.
+constexpr double nearly_all_of_a_law = 0.95;
 
 class Together {
  public:
@@ -161,15 +163,22 @@ const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
 // passed over, and so are those in whose place no effect makes a part worth the name.
 class Guesses {
  public:
+  // `names`: some are named already, beside these laws.
   Guesses(const Together& together, const UnitRecording& recording, const std::vector<ModelEffect>& rejected,
-          const Laws& alone, bool processes, const std::stop_token& stop)
+          const Laws& alone, bool processes, bool names, const std::stop_token& stop)
       : together_(together),
         recording_(recording),
         rejected_(rejected),
         alone_(alone),
         processes_(processes),
         stop_(stop) {
+    if (names) {
+      all_.emplace_back([this] { return not_made_by_any(); });
+      all_.emplace_back([this] { return not_made_best(); });
+      return;
+    }
     all_.emplace_back([this] { return not_made_by_rejected(); });
+    all_.emplace_back([this] { return not_made_by_any(); });
     if (const ModelEffect* name = strongest(rejected)) {
       all_.emplace_back([this, name] { return beside(*name); });
     }
@@ -199,10 +208,44 @@ class Guesses {
     }
     return *reach_;
   }
-  std::optional<Laws> not_made_by_rejected() const {
-    const std::vector<bool> made = made_by_effects(recording_, rejected_, alone_.terms, stop_);
+  std::optional<Laws> without_these(const std::vector<bool>& made) const {
     const bool any = std::find(made.begin(), made.end(), true) != made.end();
     return any ? std::optional(alone_.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
+  }
+  std::optional<Laws> not_made_by_rejected() const {
+    return without_these(made_by_effects(recording_, rejected_, alone_.terms, stop_));
+  }
+  // By no effect of the catalogue, alone or with the others of its axis: beside a strong law that nobody knew an effect may have been too weak
+  // to be rejected even.
+  std::optional<Laws> not_made_by_any() {
+    std::vector<bool> made;
+    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
+      made.push_back(share_of([k](std::size_t law) { return law == k; }) >= nearly_all_of_a_law ||
+                     share_of([&](std::size_t law) { return alone_.terms[law].axis == alone_.terms[k].axis; }) >=
+                         nearly_all_of_a_law);
+    }
+    return without_these(made);
+  }
+  // All but the one that an effect makes best.
+  std::optional<Laws> not_made_best() {
+    std::size_t best = 0;
+    double most = 0.0;
+    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
+      const double share = share_of([k](std::size_t law) { return law == k; });
+      best = share > most ? k : best;
+      most = std::max(most, share);
+    }
+    std::vector<bool> made(alone_.terms.size(), false);
+    made[best] = most >= nearly_all_of_a_law;
+    return without_these(made);
+  }
+  template <typename Of>
+  double share_of(Of of) {
+    std::vector<bool> those;
+    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
+      those.push_back(of(k));
+    }
+    return reach().share(those);
   }
   std::optional<Laws> beside(const ModelEffect& name) {
     return !processes_ && reach().largest_share(*name.effect) < least_share_of_laws ? std::nullopt
@@ -233,17 +276,18 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
                                                  const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                  const DiscoveryOptions& of_laws, const Progress& progress) {
-  if (!d.unexplained || !d.model.empty() || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
+  if (!d.unexplained || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
     return std::nullopt;
   }
   const Together together(data, d, of_catalogue, of_laws, progress);
   std::vector<ModelEffect> rejected;
   std::copy_if(d.rejected_model.begin(), d.rejected_model.end(), std::back_inserter(rejected),
                [](const ModelEffect& m) { return m.effect->sensor != nullptr; });
-  const double least = cost_of(alone, {});
+  const double least = cost_of(alone, d.model);
   const Laws laws_alone = Laws::fitted(alone.fit);
   std::vector<std::string> tried;
-  const Guesses guesses(together, searched, rejected, laws_alone, !alone.processes.empty(), of_laws.stop);
+  const Guesses guesses(together, searched, rejected, laws_alone, !alone.processes.empty(), !d.model.empty(),
+                        of_laws.stop);
   for (const auto& guess : guesses.all()) {
     const std::optional<Laws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
