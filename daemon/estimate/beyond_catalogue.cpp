@@ -20,6 +20,7 @@ using discovery::ProcessKind;
 using nlohmann::ordered_json;
 
 constexpr std::size_t most_told = 3;  // equations in a sentence
+constexpr const char* takes_offsets = "takes a new offset at each turn";
 constexpr double worth_a_word = 0.1;  // odds of another explanation, in a verdict
 constexpr double sure = 0.9;          // that an equation holds on another plan; below it the verdict counts its rivals
 
@@ -54,8 +55,7 @@ std::string processes_words(const std::vector<DiscoveredProcess>& processes, Pro
 
 std::vector<std::string> words_of(const std::vector<DiscoveredProcess>& processes) {
   std::vector<std::string> all = {
-      processes_words(processes, ProcessKind::jump_per_turn, "takes a new offset at each turn",
-                      "take a new offset at each turn"),
+      processes_words(processes, ProcessKind::jump_per_turn, takes_offsets, "take a new offset at each turn"),
       processes_words(processes, ProcessKind::random_walk, "has a bias that walks at random",
                       "have biases that walk at random")};
   std::erase_if(all, [](const std::string& words) { return words.empty(); });
@@ -268,7 +268,7 @@ std::string laws_words(const diagnosis::LawsInstead& instead) {
   std::vector<std::string> all;
   for (const diagnosis::LawsInstead::Law& law : instead.laws) {
     all.push_back(law.process.empty() ? fmt::format("{} follows {}", law.axis, law.expression)
-                                      : fmt::format("{} takes a new offset at each turn", law.axis));
+                                      : fmt::format("{} {}", law.axis, takes_offsets));
   }
   return first_of(std::move(all), " and ", " ");
 }

@@ -73,23 +73,20 @@ std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::Diagn
   }
   const discovery::LawFit fit = rivals->search.fitted().fit;  // telling takes it away
   const bool processes = fit.terms.empty(), likelier = rivals->log_odds >= std::log(far_likelier);
-  LawsInstead instead;
-  instead.names = rivals->names;
-  instead.odds = std::exp(rivals->log_odds);
-  if (likelier || processes) {
-    discovery::Discovery told = rivals->search.told();
-    const bool any = !told.laws.empty() || processes;
-    if (likelier && any && explains(&told)) {
-      first = std::move(rivals->without.front());
-      first.unexplained = first.mismatch = true;
-      return BeyondSearch{std::move(rivals->rest), std::move(told)};
-    }
-    if (processes && unit.size() == 1) {
-      hold_both(first, std::move(instead), told);
-      return std::nullopt;
-    }
+  const bool kept = unit.size() == 1;
+  std::optional<discovery::Discovery> told;
+  if (likelier || (processes && kept)) {
+    told = rivals->search.told();
   }
-  if (unit.size() == 1) {
+  if (likelier && explains(&*told)) {
+    first = std::move(rivals->without.front());
+    first.unexplained = first.mismatch = true;
+    return BeyondSearch{std::move(rivals->rest), std::move(*told)};
+  }
+  LawsInstead instead{{}, rivals->names, std::exp(rivals->log_odds)};
+  if (kept && processes) {
+    hold_both(first, std::move(instead), *told);
+  } else if (kept) {
     hold_both(first, std::move(instead), *rivals, fit, of_laws.stop);
   }
   return std::nullopt;

@@ -253,11 +253,8 @@ class Guesses {
   }
   template <typename Kept>
   std::optional<Laws> where(Kept kept) {
-    std::vector<bool> in_place_of;
-    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
-      in_place_of.push_back(!kept(k));
-    }
-    return reach().share(in_place_of) < least_share_of_laws ? std::nullopt : std::optional(alone_.where(kept));
+    const auto taken = [&kept](std::size_t k) { return !kept(k); };
+    return share_of(taken) < least_share_of_laws ? std::nullopt : std::optional(alone_.where(kept));
   }
 
   const Together& together_;
