@@ -68,11 +68,14 @@ constexpr auto dead_zone =
                                         P{"threshold_y", "deg/h", dph}, P{"threshold_z", "deg/h", dph}});
 constexpr auto quadratic = axes("ug/g^2", ug);
 constexpr auto cubic = axes("ug/g^3", ug);
+// With the squares, as files have it that were written before these were an effect of their own.
 constexpr std::array cross{P{"x_yy", "ug/g^2", ug}, P{"x_zz", "ug/g^2", ug}, P{"x_xy", "ug/g^2", ug},
                            P{"x_xz", "ug/g^2", ug}, P{"x_yz", "ug/g^2", ug}, P{"y_xx", "ug/g^2", ug},
                            P{"y_zz", "ug/g^2", ug}, P{"y_xy", "ug/g^2", ug}, P{"y_yz", "ug/g^2", ug},
                            P{"y_xz", "ug/g^2", ug}, P{"z_xx", "ug/g^2", ug}, P{"z_yy", "ug/g^2", ug},
                            P{"z_xz", "ug/g^2", ug}, P{"z_yz", "ug/g^2", ug}, P{"z_xy", "ug/g^2", ug}};
+constexpr std::array cross_squares{P{"x_yy", "ug/g^2", ug}, P{"x_zz", "ug/g^2", ug}, P{"y_xx", "ug/g^2", ug},
+                                   P{"y_zz", "ug/g^2", ug}, P{"z_xx", "ug/g^2", ug}, P{"z_yy", "ug/g^2", ug}};
 constexpr auto relaxation = join(axes("ug", ug), std::array{tau(60.0)});
 constexpr auto accel_lag = join(matrix("ug/g", ug), std::array{tau(60.0)});
 constexpr auto gyro_lag = join(matrix("deg/h/g", dph), std::array{tau(60.0)});
@@ -125,7 +128,7 @@ constexpr auto hysteresis = axes("ug", ug);
 constexpr std::array gimbal_field{P{"outer_x", "deg/h", dph}, P{"outer_y", "deg/h", dph}, P{"outer_z", "deg/h", dph},
                                   P{"inner_x", "deg/h", dph}, P{"inner_y", "deg/h", dph}, P{"inner_z", "deg/h", dph}};
 
-constexpr std::array<EffectDescription, 41> effects{{
+constexpr std::array<EffectDescription, 42> effects{{
     {"gyro_g_sensitivity", true, gyro_g},
     {"gyro_magnetic_sensitivity", true, gyro_magnetic},
     {"gyro_scale_asymmetry", true, gyro_asymmetry},
@@ -140,6 +143,7 @@ constexpr std::array<EffectDescription, 41> effects{{
     {"accel_quadratic", true, quadratic},
     {"accel_cubic", true, cubic},
     {"accel_cross_coupling", true, cross},
+    {"accel_cross_squares", true, cross_squares},
     {"accel_relaxation", true, relaxation},
     {"accel_load_lag", true, accel_lag},
     {"gyro_load_lag", true, gyro_lag},

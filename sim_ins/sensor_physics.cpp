@@ -76,6 +76,11 @@ void accel_cross_coupling(Values p, const Context& c, Deviation& d) {
     }
   }
 }
+void accel_cross_squares(Values p, const Context& c, Deviation& d) {
+  const Vector3 squares = c.u().cwiseAbs2();
+  d.df += Vector3(p[0] * squares.y() + p[1] * squares.z(), p[2] * squares.x() + p[3] * squares.z(),
+                  p[4] * squares.x() + p[5] * squares.y());
+}
 
 void accel_relaxation(Values p, const Context& c, Deviation& d) {
   if (c.since_turn_s >= 0.0) {
@@ -129,7 +134,7 @@ void gyro_gimbal_field(Values p, const Context& c, Deviation& d) {
   d.domega += vector_at(p, 0) * std::sin(c.outer) + vector_at(p, 3) * std::sin(c.inner);
 }
 
-constexpr std::array<std::pair<std::string_view, SensorEquation>, 23> equations{{
+constexpr std::array<std::pair<std::string_view, SensorEquation>, 24> equations{{
     {"gyro_g_sensitivity", gyro_g_sensitivity},
     {"gyro_magnetic_sensitivity", gyro_magnetic_sensitivity},
     {"gyro_scale_asymmetry", gyro_scale_asymmetry},
@@ -144,6 +149,7 @@ constexpr std::array<std::pair<std::string_view, SensorEquation>, 23> equations{
     {"accel_quadratic", accel_quadratic},
     {"accel_cubic", accel_cubic},
     {"accel_cross_coupling", accel_cross_coupling},
+    {"accel_cross_squares", accel_cross_squares},
     {"accel_relaxation", accel_relaxation},
     {"accel_size_effect", accel_size_effect},
     {"imu_lever_arm", imu_lever_arm},

@@ -15,8 +15,8 @@ using Names = std::vector<std::string_view>;
 const Names axes = {"x", "y", "z"};
 const Names matrix = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};
 const Names warm_up = {"warm_up_x", "warm_up_y", "warm_up_z"};
-const Names products = {"x_yy", "x_zz", "x_xy", "x_xz", "x_yz", "y_xx", "y_zz", "y_xy",
-                        "y_yz", "y_xz", "z_xx", "z_yy", "z_xz", "z_yz", "z_xy"};
+const Names products = {"x_xy", "x_xz", "x_yz", "y_xy", "y_yz", "y_xz", "z_xz", "z_yz", "z_xy"};
+const Names squares = {"x_yy", "x_zz", "y_xx", "y_zz", "z_xx", "z_yy"};
 const DrawnConstant thermal_tau{"tau_s", 150.0, 1500.0};
 
 const EffectDescription& description(std::string_view id) {
@@ -50,6 +50,7 @@ const std::vector<Kind>& table() {
       {"accel_quadratic", catalogue, axes, 20.0, {}, {}, 0.0},
       {"accel_cubic", catalogue, axes, 10.0, {}, {}, 0.0},
       {"accel_cross_coupling", catalogue, products, 20.0, {}, {}, 0.0},
+      {"accel_cross_squares", catalogue, squares, 20.0, {}, {}, 0.0},
       {"accel_relaxation", catalogue, axes, 50.0, {{"tau_s", 15.0, 120.0}}, {}, 0.0},
       {"accel_load_lag", catalogue, matrix, 20.0, {{"tau_s", 15.0, 120.0}}, {}, 0.0},
       {"gyro_load_lag", catalogue, matrix, 0.02, {{"tau_s", 15.0, 120.0}}, {}, 0.0},

@@ -27,22 +27,28 @@ void cubic(const EffectContext& c, double /*constant*/, Columns velocity, Column
   add_axes(velocity, c.u.cwiseAbs2().cwiseProduct(c.u) * c.dt);
 }
 
-// Products of two axes in one accelerometer.
-std::vector<EffectParameter> product_parameters() {
+std::vector<EffectParameter> second_order(std::initializer_list<const char*> names) {
   std::vector<EffectParameter> all;
-  for (const char* name : {"x_xy", "x_xz", "x_yz", "x_yy", "x_zz", "y_xy", "y_yz", "y_xz", "y_xx", "y_zz", "z_xz",
-                           "z_yz", "z_xy", "z_xx", "z_yy"}) {
+  for (const char* name : names) {
     all.push_back({name, "ug/g^2", units::micro_g, 20.0});
   }
   return all;
 }
+// Products of two axes in one accelerometer. Squares of the other axes are an effect of their own: with those of its own axis they add up
+// to the square of gravity, which is a bias, so that beside them a non-linearity has no place of its own.
 void cross_coupling(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
-  constexpr int products[3][5][2] = {{{0, 1}, {0, 2}, {1, 2}, {1, 1}, {2, 2}},
-                                     {{0, 1}, {1, 2}, {0, 2}, {0, 0}, {2, 2}},
-                                     {{0, 2}, {1, 2}, {0, 1}, {0, 0}, {1, 1}}};
+  constexpr int products[3][3][2] = {{{0, 1}, {0, 2}, {1, 2}}, {{0, 1}, {1, 2}, {0, 2}}, {{0, 2}, {1, 2}, {0, 1}}};
   for (int axis = 0; axis < 3; ++axis) {
-    for (int k = 0; k < 5; ++k) {
-      velocity(axis, 5 * axis + k) += c.u(products[axis][k][0]) * c.u(products[axis][k][1]) * c.dt;
+    for (int k = 0; k < 3; ++k) {
+      velocity(axis, 3 * axis + k) += c.u(products[axis][k][0]) * c.u(products[axis][k][1]) * c.dt;
+    }
+  }
+}
+void cross_squares(const EffectContext& c, double /*constant*/, Columns velocity, Columns /*angle*/) {
+  constexpr int other[3][2] = {{1, 2}, {0, 2}, {0, 1}};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int k = 0; k < 2; ++k) {
+      velocity(axis, 2 * axis + k) += c.u(other[axis][k]) * c.u(other[axis][k]) * c.dt;
     }
   }
 }
@@ -93,12 +99,21 @@ std::vector<Effect> accelerometer_effects() {
   all.push_back({.id = "accel_cross_coupling",
                  .words = "accelerometer error from products of two axes (cross-coupling)",
                  .place = 230,
-                 .equation = "df_i = k u_j u_k, j != i or k != i",
+                 .equation = "df_i = k u_j u_k, j != k",
                  .excited = "rotations, tilted dwells",
                  .experiment = "dwells at 45 deg, a tilted base",
-                 .parameters = product_parameters(),
+                 .parameters = second_order({"x_xy", "x_xz", "x_yz", "y_xy", "y_yz", "y_xz", "z_xz", "z_yz", "z_xy"}),
                  .triad = Triad::accelerometer,
                  .sensor = cross_coupling});
+  all.push_back({.id = "accel_cross_squares",
+                 .words = "accelerometer error from the squares of the other axes",
+                 .place = 231,
+                 .equation = "df_i = k u_j^2, j != i",
+                 .excited = "rotations, tilted dwells",
+                 .experiment = "dwells at 45 deg, a tilted base",
+                 .parameters = second_order({"x_yy", "x_zz", "y_xx", "y_zz", "z_xx", "z_yy"}),
+                 .triad = Triad::accelerometer,
+                 .sensor = cross_squares});
   return all;
 }
 

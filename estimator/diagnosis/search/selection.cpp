@@ -20,7 +20,7 @@ constexpr double jump_share = 0.6;
 const double class_log_odds = std::log(100.0);
 // An effect that contains the term gains as much, but for rounding, the grid and a few refits, and keeps this share of its log p in
 // spite of its further coefficients. A choice: too small a share lists an effect more in the class, and names none. Of 20 that
-// gain as much in 209 blind cases none has a share from 0.757 to 0.820; with 0.9 a flexure loses the cross-coupling that contains it.
+// gain as much in 209 blind cases none has a share from 0.757 to 0.820; with 0.9 a flexure lost the cross-coupling that contained it while this had the squares too.
 constexpr double contained_gain = 2.0, contained_share = 0.8;
 // What is to take a term's place must be better by a factor of e: else two that are alike would change places for ever.
 constexpr double least_improvement = 1.0;
