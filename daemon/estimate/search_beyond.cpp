@@ -17,12 +17,16 @@ namespace {
 using diagnosis::Diagnosis;
 using diagnosis::LawsInstead;
 
-// The 24 over the names and what may stand in their place.
+constexpr double far_likelier = 10.0;  // odds
+
+// The 24 over the names and what may stand in their place. Where that is far likelier and yet no explanation, neither is right: sigma
+// holds both.
 void average(Diagnosis& d, LawsInstead instead, const ParameterVector& value, const ParameterMatrix& covariance) {
   const double weight = instead.odds / (1.0 + instead.odds);
+  const double spread = instead.odds >= far_likelier ? weight * weight : weight * (1.0 - weight);
   const ParameterVector apart = value - d.value;
   d.value += weight * apart;
-  d.covariance += weight * (covariance - d.covariance) + weight * (1.0 - weight) * apart * apart.transpose();
+  d.covariance += weight * (covariance - d.covariance) + spread * apart * apart.transpose();
   d.sigma = d.covariance.diagonal().cwiseSqrt();
   d.instead = std::move(instead);
 }
@@ -66,7 +70,7 @@ void hold_both(Diagnosis& d, LawsInstead instead, const discovery::LawsForNames&
 std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::DiagnosedRecording> unit, Diagnosis& first,
                                                 const discovery::DiscoveryOptions& of_laws,
                                                 const discovery::Progress& progress) {
-  constexpr double least_odds = 0.01, far_likelier = 10.0;
+  constexpr double least_odds = 0.01;
   auto rivals = discovery::laws_for_names(unit, std::log(least_odds), of_laws, progress);
   if (!rivals) {
     return std::nullopt;
@@ -78,7 +82,8 @@ std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::Diagn
   if (likelier || (processes && kept)) {
     told = rivals->search.told();
   }
-  if (likelier && explains(&*told)) {
+  const bool beside = rivals->names.empty();  // all names stay, and laws are told with them
+  if (likelier && (beside || explains(&*told))) {
     first = std::move(rivals->without.front());
     first.unexplained = first.mismatch = true;
     return BeyondSearch{std::move(rivals->rest), std::move(*told)};

@@ -10,6 +10,8 @@
 namespace selfcal::discovery {
 namespace {
 
+constexpr double far_likelier = 10.0;
+
 // Each effect once, as the recording has it that shows it best: one unit has one physics.
 std::vector<diagnosis::ModelEffect> names_of(std::span<const DiagnosedRecording> unit) {
   std::vector<diagnosis::ModelEffect> all;
@@ -76,7 +78,8 @@ class NamesAgainstLaws {
     return all;
   }
 
-  std::optional<LawsForNames> search(const std::vector<bool>& out) const {
+  // `replaced`: the names in whose place laws were found at first, of which some are told again.
+  std::optional<LawsForNames> search(const std::vector<bool>& out, const std::vector<bool>& replaced = {}) const {
     std::vector<const diagnosis::Effect*> names;
     for (std::size_t k = 0; k < out.size(); ++k) {
       if (out[k]) {
@@ -98,13 +101,48 @@ class NamesAgainstLaws {
     LawSearch search(rest->recordings(), of_laws_, progress_);
     const Discovery& found = search.fitted();
     const bool laws = !found.fit.terms.empty(), jumps = !found.processes.empty();
-    if (laws == jumps || !may_replace(out, found) || of_laws_.stop.stop_requested()) {
+    if (laws == jumps || !may_replace(replaced.empty() ? out : replaced, found) || of_laws_.stop.stop_requested()) {
       return std::nullopt;
     }
     const double ahead = jumps ? of_jumps(out, found)
                                : held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size());
     const double log_odds = 0.5 * ahead;
     return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
+  }
+
+  // In whose place `found` has laws.
+  std::vector<bool> replaced(const LawsForNames& found) const {
+    std::vector<bool> out;
+    for (const diagnosis::Effect* name : held_.names()) {
+      out.push_back(std::find(found.names.begin(), found.names.end(), name) != found.names.end());
+    }
+    return out;
+  }
+
+  // Which of the names in whose place `found` has laws go all the same, where the others are told again and of the laws those beside them that
+  // are worth it; twice the logarithm of the odds against all the names. A law that is not worth it beside a name stood for a part of it.
+  std::optional<Choice> with_names_again(const LawsForNames& found) const {
+    const std::vector<LawTerm>& laws = found.search.fitted().fit.terms;
+    const std::vector<bool> out = replaced(found);
+    if (laws.empty()) {
+      return std::nullopt;
+    }
+    std::optional<Choice> best;
+    const auto look_at = [&](const std::vector<bool>& some) {
+      const double most = best_of(some, laws);
+      if (most > std::max(2.0 * found.log_odds, best ? best->most : 0.0)) {
+        best.emplace(Choice{some, most});
+      }
+    };
+    look_at(std::vector<bool>(out.size(), false));
+    for (std::size_t k = 0; k < out.size() && std::count(out.begin(), out.end(), true) > 1; ++k) {
+      if (out[k]) {
+        std::vector<bool> some = out;
+        some[k] = false;
+        look_at(some);
+      }
+    }
+    return best;
   }
 
   // The names in whose place `found` has laws, and those that stay and of which nothing is left when all is fitted together with the laws;
@@ -121,16 +159,40 @@ class NamesAgainstLaws {
     std::vector<bool> out;
     bool more = false;
     for (const diagnosis::Effect* name : held_.names()) {
-      const bool replaced = std::find(found.names.begin(), found.names.end(), name) != found.names.end();
       const bool empty = std::any_of(joint->effects.begin(), joint->effects.end(),
                                      [name](const FittedEffect& e) { return e.effect == name && e.nothing_left(); });
-      out.push_back(replaced || empty);
       more = more || empty;
+      out.push_back(empty);
+    }
+    const std::vector<bool> before = replaced(found);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      out[k] = out[k] || before[k];
     }
     return more ? std::optional(std::move(out)) : std::nullopt;
   }
 
  private:
+  // Twice the logarithm of the odds of some of these laws in the place of the names that are out: those that are worth it, the weakest of the
+  // others taken away one by one.
+  double best_of(const std::vector<bool>& out, std::vector<LawTerm> laws) const {
+    double best = -dearer(out, 0) - held_.by_names(out);  // no law
+    for (double with_all = held_.beyond(out, {laws}).front(); !laws.empty();) {
+      best = std::max(best, with_all - dearer(out, laws.size()));
+      std::vector<std::vector<LawTerm>> fewer;
+      for (std::size_t k = 0; k < laws.size() && laws.size() > 1; ++k) {
+        fewer.push_back(laws);
+        fewer.back().erase(fewer.back().begin() + static_cast<std::ptrdiff_t>(k));
+      }
+      if (fewer.empty()) {
+        break;
+      }
+      const std::vector<double> beyond = held_.beyond(out, fewer);
+      const auto kept = std::max_element(beyond.begin(), beyond.end());
+      with_all = *kept;
+      laws = fewer[static_cast<std::size_t>(kept - beyond.begin())];
+    }
+    return best;
+  }
   double most_of(const std::vector<bool>& out, double least) {
     const double more = dearer(out, 1);
     const auto allowed = [&](int axis) { return may_replace(out, axis); };
@@ -227,6 +289,14 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
     ++searches;
     auto found = against.search(choice.out);
     if (found && found->log_odds >= least_log_odds && (!best || found->log_odds > best->log_odds)) {
+      best.emplace(std::move(*found));
+    }
+  }
+  // What laws stand in the place of may be there beside some of them: a name that took up a law was right nevertheless.
+  if (const auto again =
+          best && best->log_odds >= std::log(far_likelier) ? against.with_names_again(*best) : std::nullopt) {
+    auto found = against.search(again->out, against.replaced(*best));
+    if (found && found->log_odds > best->log_odds) {
       best.emplace(std::move(*found));
     }
   }

@@ -15,7 +15,7 @@
 namespace selfcal::discovery {
 
 struct LawsForNames {
-  std::vector<const diagnosis::Effect*> names;  // in whose place
+  std::vector<const diagnosis::Effect*> names;  // in whose place; none: the laws stand beside all of them
   std::vector<diagnosis::Diagnosis> without;    // [recordings] the diagnoses without these names
   UnexplainedRest rest;                         // the recordings less the names that stay
   LawSearch search;                             // of that, fitted
@@ -29,7 +29,7 @@ bool names_stand_alone(const diagnosis::Diagnosis& diagnosis);
 // the place of some of these. The names that stay are fitted anew beside the laws. None where that is not so, where no law is the likelier one
 // by the logarithm of odds of `least_log_odds` (it may be below 0), or where a process is among the laws. Jumps at turns, without a law, are
 // likelier in the same way. A search is made only where a single function, or jumps, gain enough in a name's place, and for three choices of names at most, the most probable ones first; once more where
-// of a name that stays nothing is left beside the laws.
+// some of the names beside some of the laws are likelier than the laws alone, and where of a name that stays nothing is left beside the laws.
 std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit, double least_log_odds,
                                            const DiscoveryOptions& of_laws, const Progress& progress = {});
 
