@@ -231,6 +231,8 @@ int answer(const Request& request) {
       j["discovery"]["parameters"] = answer.parameters;
       j["discovery"]["parameter_sigma"] = answer.sigma;
     }
+    j["parameters"] = answer.parameters;
+    j["parameter_sigma"] = answer.sigma;
     j["seconds"] = elapsed();
     fmt::print("{}\n", j.dump());
     return 0;

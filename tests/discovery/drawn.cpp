@@ -165,13 +165,15 @@ sim::SimConfig draw_installation(Random& random) {
 
 // The effects of the catalogue as the blind trial draws them.
 Expected<Case> draw_effect_case(const Recipe& recipe, int number, std::uint64_t seed) {
-  const auto drawn = blind::draw_case({"single", {recipe.effect}, recipe.strength}, number, seed);
+  const auto drawn =
+      blind::draw_case({recipe.effects.size() == 1 ? "single" : "pair", recipe.effects, recipe.strength}, number, seed);
   if (!drawn) {
     return tl::unexpected(drawn.error());
   }
-  Case c{number, recipe.kind, recipe.strength, drawn->seed, drawn->config, drawn->schedule, {}};
+  Case c{number, recipe.kind, recipe.strength, drawn->seed, drawn->config, drawn->schedule, {}, {}};
   for (const blind::ConcealedEffect& effect : drawn->effects) {
     c.physics.effects.push_back(effect.physics);
+    c.effect_sigmas.push_back(effect.response.sigmas);
   }
   return c;
 }
@@ -219,7 +221,7 @@ Expected<ParameterVector> bound_of(const blind::Filtered& filtered, const std::v
 
 }  // namespace
 
-std::vector<Recipe> recipes(const Counts& counts) {
+std::vector<Recipe> recipes(const Counts& counts, std::uint64_t seed) {
   std::vector<Recipe> all;
   const auto add = [&all](const char* kind, double strength, int count) {
     for (int k = 0; k < count; ++k) {
@@ -242,21 +244,34 @@ std::vector<Recipe> recipes(const Counts& counts) {
   }
   for (int k = 0; k < counts.effects; ++k) {
     const auto n = static_cast<std::size_t>(k);
-    all.push_back({"effect", strengths[n / catalogue.size() % strengths.size()], catalogue[n % catalogue.size()]});
+    all.push_back({"effect", strengths[n / catalogue.size() % strengths.size()], {catalogue[n % catalogue.size()]}});
   }
   for (int k = 0; k < counts.beside; ++k) {
-    all.push_back({"beside", 30.0, catalogue[static_cast<std::size_t>(k) % catalogue.size()]});
+    all.push_back({"beside", 30.0, {catalogue[static_cast<std::size_t>(k) % catalogue.size()]}});
   }
   add("deep", 30.0, counts.deep);
+  constexpr std::uint64_t stream = 13;
+  Random random(seed, stream);
+  for (int k = 0; k < counts.mixed; ++k) {
+    const auto pick = [&] {
+      return static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(catalogue.size()) - 1e-9));
+    };
+    const std::size_t first = pick();
+    std::size_t second = pick();
+    while (second == first) {
+      second = pick();
+    }
+    all.push_back({"mixed", 30.0, {catalogue[first], catalogue[second]}});
+  }
   return all;
 }
 
 Expected<Case> draw_case(const Recipe& recipe, int number, std::uint64_t seed) {
   constexpr std::uint64_t streams_per_seed = 100000;
   Random random(seed, streams_per_seed + static_cast<std::uint64_t>(number));
-  if (!recipe.effect.empty()) {
+  if (!recipe.effects.empty()) {
     auto c = draw_effect_case(recipe, number, seed);
-    if (!c || c->kind != "beside") {
+    if (!c || c->kind == "effect") {
       return c;
     }
     const auto filtered = still_filter(*c);

@@ -1,8 +1,8 @@
 // Generator of the discovery trial. Links the virtual INS's truth, one pass of the filter for strengths, and no diagnosis.
 //
-//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP FILE   one JSON line a case, as far as missing
+//   selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP MIXED FILE   one JSON line a case, as far as missing
 //   selfcal_discovery_generate record KEY NUMBER FILE        the recording of a case
-//   selfcal_discovery_generate draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP NUMBER FILE   a case's recording; prints its line of
+//   selfcal_discovery_generate draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP MIXED NUMBER FILE   a case's recording; prints its line of
 //                                                            the key as "case", and for the program that asks what is left as "assumed"
 //   selfcal_discovery_generate again KEY NUMBER FILE K PLAN  the same unit on the same base for the K-th time, with other noise, on
 //                                                            another schedule: a file, or "random:SECONDS"
@@ -64,6 +64,11 @@ ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
   for (const sim::PhysicsEffect& effect : c.physics.effects) {
     j["effects"].push_back(effect.id);
   }
+  j["effect_sigmas"] = c.effect_sigmas;
+  j["effect_values"] = ordered_json::array();  // SI
+  for (const sim::PhysicsEffect& effect : c.physics.effects) {
+    j["effect_values"].push_back(std::vector<double>(effect.values.begin(), effect.values.end()));
+  }
   j["laws"] = ordered_json::array();
   for (const sim::Law& law : c.physics.laws) {
     const bool gyro = law.axis < 3;
@@ -75,9 +80,10 @@ ordered_json to_json(const Case& c, std::uint64_t trial_seed) {
   return j;
 }
 
-std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts) {
-  return discovery_trial::recipes(
-      {counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5), counts.at(6), counts.at(7)});
+std::vector<discovery_trial::Recipe> recipes_of(const ordered_json& counts, std::uint64_t seed) {
+  return discovery_trial::recipes({counts.at(0), counts.at(1), counts.at(2), counts.at(3), counts.at(4), counts.at(5),
+                                   counts.at(6), counts.at(7), counts.at(8)},
+                                  seed);
 }
 
 // What a key follows from: its seed and the number of cases of each kind.
@@ -86,7 +92,7 @@ struct Drawing {
   ordered_json counts = ordered_json::array();
 
   Expected<ordered_json> line(int number, Case* drawn = nullptr) const {
-    const auto recipes = recipes_of(counts);
+    const auto recipes = recipes_of(counts, seed);
     if (number < 0 || number >= static_cast<int>(recipes.size())) {
       return fail(ErrorKind::usage, fmt::format("case {}: there are {}", number, recipes.size()));
     }
@@ -103,14 +109,14 @@ struct Drawing {
   }
 };
 
-// SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP
+// SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP MIXED
 Expected<Drawing> drawing_in(std::span<char*> words) {
   const auto seed = to_number(words[0]);
   if (!seed) {
     return fail(ErrorKind::usage, fmt::format("{}: no seed", words[0]));
   }
   Drawing drawing{static_cast<std::uint64_t>(*seed), ordered_json::array()};
-  for (std::size_t k = 1; k < 9; ++k) {
+  for (std::size_t k = 1; k < 10; ++k) {
     const auto count = to_number(words[k]);
     if (!count) {
       return fail(ErrorKind::usage, fmt::format("{}: no count", words[k]));
@@ -127,20 +133,20 @@ int write_key(std::span<char*> arguments) {
   }
   int done = 0;
   {
-    std::ifstream file(arguments[9]);
+    std::ifstream file(arguments[10]);
     for (std::string line; std::getline(file, line);) {
       ++done;
     }
   }
-  std::ofstream file(arguments[9], std::ios::app);
-  for (int n = done; n < static_cast<int>(recipes_of(drawing->counts).size()); ++n) {
+  std::ofstream file(arguments[10], std::ios::app);
+  for (int n = done; n < static_cast<int>(recipes_of(drawing->counts, drawing->seed).size()); ++n) {
     const auto line = drawing->line(n);
     if (!line) {
       return complain(line.error());
     }
     file << line->dump() << '\n' << std::flush;
   }
-  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[9])});
+  return file ? 0 : complain({ErrorKind::bad_input, fmt::format("{}: cannot be written", arguments[10])});
 }
 
 // The case whose line of the key has this number.
@@ -149,7 +155,7 @@ Expected<Case> case_in(const std::string& key, int number) {
   for (std::string line; std::getline(file, line);) {
     const ordered_json j = ordered_json::parse(line);
     if (j.at("number") == number) {
-      const auto recipes = recipes_of(j.at("counts"));
+      const auto recipes = recipes_of(j.at("counts"), j.at("trial_seed"));
       return discovery_trial::draw_case(recipes.at(static_cast<std::size_t>(number)), number, j.at("trial_seed"));
     }
   }
@@ -167,9 +173,9 @@ int write_record(const Case& c, const std::string& path) {
 
 int draw(std::span<char*> arguments) {
   const auto drawing = drawing_in(arguments);
-  const auto number = to_number(arguments[9]);
+  const auto number = to_number(arguments[10]);
   if (!drawing || !number) {
-    return complain(drawing ? Error{ErrorKind::usage, fmt::format("{}: no case", arguments[9])} : drawing.error());
+    return complain(drawing ? Error{ErrorKind::usage, fmt::format("{}: no case", arguments[10])} : drawing.error());
   }
   Case drawn;
   const auto line = drawing->line(*number, &drawn);
@@ -177,7 +183,7 @@ int draw(std::span<char*> arguments) {
     return complain(line.error());
   }
   fmt::print("{}\n", ordered_json{{"case", *line}, {"assumed", *line}}.dump());
-  return write_record(drawn, arguments[10]);
+  return write_record(drawn, arguments[11]);
 }
 
 int print_possible(const Case& c, int count) {
@@ -197,12 +203,13 @@ int print_left(const Case& c, const std::string& laws) {
   if (!filtered) {
     return complain(filtered.error());
   }
-  sim::ConcealedPhysics both = c.physics;  // the sum of the true laws and the negative of those told
+  const sim::ConcealedPhysics concealed{{}, c.physics.laws};  // an effect beside them is not what they are to leave
+  sim::ConcealedPhysics both = concealed;                     // the sum of the true laws and the negative of those told
   for (sim::Law law : told->laws) {
     law.coefficient = -law.coefficient;
     both.laws.push_back(law);
   }
-  const auto with = filtered->response(c.physics), without = filtered->response(both);
+  const auto with = filtered->response(concealed), without = filtered->response(both);
   if (!with || !without) {
     return complain(with ? without.error() : with.error());
   }
@@ -237,10 +244,10 @@ int write_again(Case c, const std::string& path, int time, const std::string& pl
 
 int run(std::span<char*> arguments) {
   const std::string verb = arguments.size() > 1 ? arguments[1] : "";
-  if (verb == "key" && arguments.size() == 12) {
+  if (verb == "key" && arguments.size() == 13) {
     return write_key(arguments.subspan(2));
   }
-  if (verb == "draw" && arguments.size() == 13) {
+  if (verb == "draw" && arguments.size() == 14) {
     return draw(arguments.subspan(2));
   }
   const bool again = verb == "again" && arguments.size() == 7 && to_number(arguments[5]);
@@ -258,11 +265,12 @@ int run(std::span<char*> arguments) {
     }
     return verb == "record" ? write_record(*c, arguments[4]) : print_left(*c, arguments[4]);
   }
-  fmt::print(stderr,
-             "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP FILE | "
-             "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP NUMBER FILE | record KEY NUMBER FILE | "
-             "again KEY "
-             "NUMBER FILE K PLAN | possible KEY NUMBER COUNT | left KEY NUMBER LAWS.toml\n");
+  fmt::print(
+      stderr,
+      "usage: selfcal_discovery_generate key SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP MIXED FILE | "
+      "draw SEED LAWS PAIRS PROCESSES CLEAN FOREIGN EFFECTS BESIDE DEEP MIXED NUMBER FILE | record KEY NUMBER FILE | "
+      "again KEY "
+      "NUMBER FILE K PLAN | possible KEY NUMBER COUNT | left KEY NUMBER LAWS.toml\n");
   return 2;
 }
 

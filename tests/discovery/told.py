@@ -4,6 +4,8 @@ import re
 import subprocess
 
 AXES = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+WHOLE = ("effect", "beside", "mixed")   # kinds that are answered as `selfcal diagnose` does, the catalogue first
+NAMED = 6.0  # sigma: an effect that even its largest size shows with less is not asked for by name
 SEEN = 3.0   # sigma: a law that the other plan shows with less is not scored
 LEFT = 0.1   # of the misfit's power on the other plan, at most: what the requirement calls predicted
 
@@ -34,7 +36,7 @@ def form_of(expression):
 
 def answer_of(programs, way, case, recording, folder):
     """The answer to a case's recording, with what its laws leave elsewhere. Of a case the answering program knows nothing."""
-    whole = way == "diagnose" or (case["kind"] in ("effect", "beside") and way == "discover")   # the catalogue first
+    whole = way == "diagnose" or (case["kind"] in WHOLE and way == "discover")   # the catalogue first
     words = [] if whole else [f"--{way}"]
     if way == "form":
         if not case["laws"] or any(law["process"] for law in case["laws"]):
