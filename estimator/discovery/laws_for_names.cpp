@@ -1,6 +1,7 @@
 #include "estimator/discovery/laws_for_names.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -48,7 +49,8 @@ class NamesAgainstLaws {
     }
   }
 
-  // Each name alone, any two of a few, all together, and those that laws may replace one by one; most probable first.
+  // Each name alone, any two of a few, all together, and those that laws may replace one by one; of one recording none as well, where a law
+  // beside all of them is far likelier. Most probable first.
   std::vector<Choice> choices(double least) {
     constexpr std::size_t most_for_pairs = 4;
     const std::size_t n = models_.size();
@@ -57,6 +59,10 @@ class NamesAgainstLaws {
       const double most = most_of(out, least);
       all.push_back({std::move(out), most});
     };
+    if (unit_.size() == 1) {
+      add(std::vector<bool>(n, false));
+      all.front().most = all.front().most < 2.0 * std::log(far_likelier) ? -HUGE_VAL : all.front().most;
+    }
     for (std::size_t k = 0; k < n; ++k) {
       std::vector<bool> alone(n, false);
       alone[k] = true;
@@ -78,8 +84,7 @@ class NamesAgainstLaws {
     return all;
   }
 
-  // `replaced`: the names in whose place laws were found at first, of which some are told again.
-  std::optional<LawsForNames> search(const std::vector<bool>& out, const std::vector<bool>& replaced = {}) const {
+  std::optional<LawsForNames> search(const std::vector<bool>& out) const {
     std::vector<const diagnosis::Effect*> names;
     for (std::size_t k = 0; k < out.size(); ++k) {
       if (out[k]) {
@@ -101,7 +106,7 @@ class NamesAgainstLaws {
     LawSearch search(rest->recordings(), of_laws_, progress_);
     const Discovery& found = search.fitted();
     const bool laws = !found.fit.terms.empty(), jumps = !found.processes.empty();
-    if (laws == jumps || !may_replace(replaced.empty() ? out : replaced, found) || of_laws_.stop.stop_requested()) {
+    if (laws == jumps || (jumps && beside_all(out)) || !may_replace(out, found) || of_laws_.stop.stop_requested()) {
       return std::nullopt;
     }
     const double ahead = jumps ? of_jumps(out, found)
@@ -193,11 +198,12 @@ class NamesAgainstLaws {
     }
     return best;
   }
+  static bool beside_all(const std::vector<bool>& out) { return std::find(out.begin(), out.end(), true) == out.end(); }
   double most_of(const std::vector<bool>& out, double least) {
     const double more = dearer(out, 1);
     const auto allowed = [&](int axis) { return may_replace(out, axis); };
     const double of_a_law = held_.most_beyond(out, least + more, allowed) - more;
-    return std::max(of_a_law, held_.jumps_beyond(out, allowed) - dearer(out, 0));
+    return beside_all(out) ? of_a_law : std::max(of_a_law, held_.jumps_beyond(out, allowed) - dearer(out, 0));
   }
   // Twice the logarithm of the odds of the processes that were found.
   double of_jumps(const std::vector<bool>& out, const Discovery& found) const {
@@ -213,11 +219,12 @@ class NamesAgainstLaws {
              return process.kind == ProcessKind::jump_per_turn && may_replace(out, process.axis);
            });
   }
-  // Whether a law of this axis may stand in the place of these names.
+  // Whether a law of this axis may stand in the place of these names, or beside all of them.
   bool may_replace(const std::vector<bool>& out, int axis) const {
     const diagnosis::Triad own = axis < 3 ? diagnosis::Triad::gyro : diagnosis::Triad::accelerometer;
+    const bool beside = beside_all(out);
     for (std::size_t k = 0; other_triad_ && k < out.size(); ++k) {
-      if (out[k] && models_[k].effect->triad == own) {
+      if ((beside || out[k]) && models_[k].effect->triad == own) {
         return false;
       }
     }
@@ -288,14 +295,15 @@ std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> u
     }
     ++searches;
     auto found = against.search(choice.out);
-    if (found && found->log_odds >= least_log_odds && (!best || found->log_odds > best->log_odds)) {
+    const double least = found && found->names.empty() ? std::log(far_likelier) : least_log_odds;
+    if (found && found->log_odds >= least && (!best || found->log_odds > best->log_odds)) {
       best.emplace(std::move(*found));
     }
   }
   // What laws stand in the place of may be there beside some of them: a name that took up a law was right nevertheless.
   if (const auto again =
           best && best->log_odds >= std::log(far_likelier) ? against.with_names_again(*best) : std::nullopt) {
-    auto found = against.search(again->out, against.replaced(*best));
+    auto found = against.search(again->out);
     if (found && found->log_odds > best->log_odds) {
       best.emplace(std::move(*found));
     }

@@ -26,10 +26,12 @@ struct LawsForNames {
 bool names_stand_alone(const diagnosis::Diagnosis& diagnosis);
 
 // Recordings of one unit, all of them explained, some by names that stand alone: each by its own names, or all of them by the same laws in
-// the place of some of these. The names that stay are fitted anew beside the laws. None where that is not so, where no law is the likelier one
-// by the logarithm of odds of `least_log_odds` (it may be below 0), or where a process is among the laws. Jumps at turns, without a law, are
-// likelier in the same way. A search is made only where a single function, or jumps, gain enough in a name's place, and for three choices of names at most, the most probable ones first; once more where
-// some of the names beside some of the laws are likelier than the laws alone, and where of a name that stays nothing is left beside the laws.
+// the place of some of these; one recording also by laws beside all of them, where that is ten times likelier. The names that stay are fitted
+// anew beside the laws. None where that is not so, where no law is the likelier one by the logarithm of odds of `least_log_odds` (it may be
+// below 0), or where a process is among the laws. Jumps at turns, without a law, are likelier in the same way. A search is made only where a
+// single function, or jumps, gain enough in a name's place, and for three choices of names at most, the most probable ones first; once more
+// where some of the names beside some of the laws are likelier than the laws alone, and where of a name that stays nothing is left beside the
+// laws.
 std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit, double least_log_odds,
                                            const DiscoveryOptions& of_laws, const Progress& progress = {});
 

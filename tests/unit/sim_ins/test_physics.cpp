@@ -48,6 +48,8 @@ TEST(Physics, LiteralCases) {
   context.f_ib_b = -context.f_ib_b;
   EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_quadratic'\ny=20\n", context).df.y(), 20 * ug, exact);
   EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_cubic'\ny=20\n", context).df.y(), -20 * ug, exact);
+  EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_cross_squares'\nx_yy=20\n", context).df.x(), 20 * ug, exact);
+  EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_cross_squares'\nz_yy=20\nz_xx=5\n", context).df.z(), 20 * ug, exact);
   context.t = 3600.0;
   EXPECT_NEAR(deviation_of("[[effect]]\nid='accel_bias_ramp'\nx=20\n", context).df.x(), 20 * ug, exact);
   context.since_turn_s = 60.0;
