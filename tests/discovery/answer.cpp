@@ -26,6 +26,7 @@
 #include "daemon/estimate/calibrate_recording.hpp"
 #include "daemon/estimate/diagnosis_json.hpp"
 #include "daemon/estimate/unit_answer.hpp"
+#include "estimator/diagnosis/data/set_aside.hpp"
 #include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/diagnosis/search/locate.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
@@ -115,7 +116,9 @@ struct DiagnosisAnswer {
   std::vector<double> parameters, sigma;  // the 24 that are told
 };
 
-DiagnosisAnswer diagnosed(const ImuData& data, bool beyond) {
+DiagnosisAnswer diagnosed(const ImuData& recorded, bool beyond) {
+  const diagnosis::SetAside aside(recorded);  // what is faulty in a stretch is left out
+  const ImuData& data = aside.data();
   DiagnosisAnswer answer;
   std::optional<diagnosis::Diagnosis> diagnosis;
   if (beyond) {
