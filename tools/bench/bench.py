@@ -148,7 +148,7 @@ class Bench:
         self.stop()
 
     # --- the operator's program --------------------------------------------------------------------------------
-    def selfcal(self, *arguments, check=True, timeout=60, **more):
+    def selfcal(self, *arguments, check=True, timeout=180, **more):
         done = subprocess.run([str(BIN / "selfcal"), *map(str, arguments)], capture_output=True, text=True,
                               stdin=subprocess.DEVNULL, timeout=timeout, check=False, **more)
         if check and done.returncode != 0:
