@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/estimate/quantity_text.hpp"
+#include "estimator/discovery/explanation_cost.hpp"
 #include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
@@ -165,7 +166,6 @@ namespace {
 
 // Both walk and jump are fitted in the search; an instability is not, and is left alone.
 bool jumps_in_place_of_walks(const Discovery& found, const diagnosis::Diagnosis& d) {
-  constexpr double far_likelier = 10.0;
   double ahead = 0.0;
   for (const DiscoveredProcess& p : found.processes) {
     ahead += p.kind == discovery::ProcessKind::jump_per_turn ? p.ahead : -p.ahead;
@@ -181,7 +181,7 @@ bool jumps_in_place_of_walks(const Discovery& found, const diagnosis::Diagnosis&
   const bool others = std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) {
     return f.process && f.effect != "gyro_random_walk" && f.effect != "accel_random_walk";
   });
-  return !others && ahead >= std::log(far_likelier) && jumps(true) == walks("gyro_random_walk") &&
+  return !others && ahead >= std::log(discovery::far_likelier) && jumps(true) == walks("gyro_random_walk") &&
          jumps(false) == walks("accel_random_walk");
 }
 

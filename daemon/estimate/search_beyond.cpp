@@ -16,8 +16,7 @@ namespace {
 
 using diagnosis::Diagnosis;
 using diagnosis::LawsInstead;
-
-constexpr double far_likelier = 10.0;  // odds
+using discovery::far_likelier;
 
 // The 24 over the names and what may stand in their place. Where that is far likelier and yet no explanation, neither is right: sigma
 // holds both.

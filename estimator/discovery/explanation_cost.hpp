@@ -10,6 +10,9 @@
 
 namespace selfcal::discovery {
 
+// Odds from which an explanation takes another's place.
+constexpr double far_likelier = 10.0;
+
 // `rows`: of the recording that is explained.
 double cost_of_laws(std::size_t laws, double rows);
 double cost_of_a_name(double rows);

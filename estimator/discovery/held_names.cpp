@@ -151,28 +151,26 @@ double HeldNames::jumps_beyond(const std::vector<bool>& out, const std::function
 double HeldNames::most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed) {
   const Columns c = columns(out);
   look_at(c);
-  std::vector<std::vector<LawTerm>> alone;
+  std::vector<LawTerm> laws;
+  std::vector<std::vector<std::size_t>> alone;
   double over_pieces = 0.0;
   for (Candidate& candidate : Shortlist(sums_, dictionary_).best(*model_, shortlist_size)) {
     if (!allowed(candidate.term.axis)) {
       continue;
     }
     over_pieces = std::max(over_pieces, candidate.gain);
-    alone.push_back({std::move(candidate.term)});
+    alone.push_back({laws.size()});
+    laws.push_back(std::move(candidate.term));
   }
   if (alone.empty() || of_pieces * over_pieces - c.by_names < least) {
     return of_pieces * over_pieces - c.by_names;
   }
-  const std::vector<double> exact = beyond(out, alone);
+  const std::vector<double> exact = beyond(out, laws, alone);
   return *std::max_element(exact.begin(), exact.end());
 }
 
-std::vector<double> HeldNames::beyond(const std::vector<bool>& out,
-                                      const std::vector<std::vector<LawTerm>>& alternatives) const {
-  std::vector<LawTerm> laws;
-  for (const std::vector<LawTerm>& some : alternatives) {
-    laws.insert(laws.end(), some.begin(), some.end());
-  }
+std::vector<double> HeldNames::beyond(const std::vector<bool>& out, const std::vector<LawTerm>& laws,
+                                      const std::vector<std::vector<std::size_t>>& choices) const {
   const Columns c = columns(out);
   Eigen::Index n = 0, at = 0;
   Eigen::MatrixXd G;
@@ -198,14 +196,19 @@ std::vector<double> HeldNames::beyond(const std::vector<bool>& out,
     b.head(n) += sums.score.head(n) + cross * c.in.segment(at, m);
     at += m;
   }
+  std::vector<int> first_constant;  // [laws] columns: derivatives stand behind all laws
+  int columns = static_cast<int>(laws.size());
+  for (const LawTerm& term : laws) {
+    first_constant.push_back(columns);
+    columns += static_cast<int>(term.constants.size());
+  }
   std::vector<double> all;
-  int law = 0, constant = static_cast<int>(laws.size());  // columns: derivatives stand behind all laws
-  for (const std::vector<LawTerm>& some : alternatives) {
+  for (const std::vector<std::size_t>& choice : choices) {
     std::vector<int> with;
-    for (const LawTerm& term : some) {
-      with.push_back(law++);
-      for (std::size_t k = 0; k < term.constants.size(); ++k) {
-        with.push_back(constant++);
+    for (const std::size_t law : choice) {
+      with.push_back(static_cast<int>(law));
+      for (int k = 0; k < static_cast<int>(laws[law].constants.size()); ++k) {
+        with.push_back(first_constant[law] + k);
       }
     }
     for (const int k : c.stay) {

@@ -30,8 +30,9 @@ class HeldNames {
   // fitted anew: found over the pieces, and where it may be `least` or more exactly, its constants free.
   // Functions of axes for which `allowed` does not say so do not count.
   double most_beyond(const std::vector<bool>& out, double least, const std::function<bool(int)>& allowed);
-  // The same of laws, those of each alternative together.
-  std::vector<double> beyond(const std::vector<bool>& out, const std::vector<std::vector<LawTerm>>& alternatives) const;
+  // The same of each choice among these laws, those of a choice together.
+  std::vector<double> beyond(const std::vector<bool>& out, const std::vector<LawTerm>& laws,
+                             const std::vector<std::vector<std::size_t>>& choices) const;
   // The same of an offset that is drawn anew at each turn, on each axis that shows one and counts: twice the logarithm of what the likelihood
   // gains, sizes and axes paid for.
   double jumps_beyond(const std::vector<bool>& out, const std::function<bool(int)>& allowed);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -11,7 +12,11 @@
 namespace selfcal::discovery {
 namespace {
 
-constexpr double far_likelier = 10.0;
+std::vector<std::size_t> all_of(const std::vector<LawTerm>& laws) {
+  std::vector<std::size_t> all(laws.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
 
 // Each effect once, as the recording has it that shows it best: one unit has one physics.
 std::vector<diagnosis::ModelEffect> names_of(std::span<const DiagnosedRecording> unit) {
@@ -110,7 +115,8 @@ class NamesAgainstLaws {
       return std::nullopt;
     }
     const double ahead = jumps ? of_jumps(out, found)
-                               : held_.beyond(out, {found.fit.terms}).front() - dearer(out, found.fit.terms.size());
+                               : held_.beyond(out, found.fit.terms, {all_of(found.fit.terms)}).front() -
+                                     dearer(out, found.fit.terms.size());
     const double log_odds = 0.5 * ahead;
     return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
   }
@@ -177,24 +183,19 @@ class NamesAgainstLaws {
   }
 
  private:
-  // Twice the logarithm of the odds of some of these laws in the place of the names that are out: those that are worth it, the weakest of the
-  // others taken away one by one.
-  double best_of(const std::vector<bool>& out, std::vector<LawTerm> laws) const {
-    double best = -dearer(out, 0) - held_.by_names(out);  // no law
-    for (double with_all = held_.beyond(out, {laws}).front(); !laws.empty();) {
-      best = std::max(best, with_all - dearer(out, laws.size()));
-      std::vector<std::vector<LawTerm>> fewer;
-      for (std::size_t k = 0; k < laws.size() && laws.size() > 1; ++k) {
-        fewer.push_back(laws);
-        fewer.back().erase(fewer.back().begin() + static_cast<std::ptrdiff_t>(k));
+  // Twice the logarithm of the odds of those among these laws that are worth it in the place of the names that are out.
+  double best_of(const std::vector<bool>& out, const std::vector<LawTerm>& laws) const {
+    std::vector<std::vector<std::size_t>> choices(1);  // all: without each law, and with it
+    for (std::size_t law = 0; law < laws.size(); ++law) {
+      for (std::size_t k = 0, n = choices.size(); k < n; ++k) {
+        choices.push_back(choices[k]);
+        choices.back().push_back(law);
       }
-      if (fewer.empty()) {
-        break;
-      }
-      const std::vector<double> beyond = held_.beyond(out, fewer);
-      const auto kept = std::max_element(beyond.begin(), beyond.end());
-      with_all = *kept;
-      laws = fewer[static_cast<std::size_t>(kept - beyond.begin())];
+    }
+    const std::vector<double> beyond = held_.beyond(out, laws, choices);
+    double best = -HUGE_VAL;
+    for (std::size_t k = 0; k < choices.size(); ++k) {
+      best = std::max(best, beyond[k] - dearer(out, choices[k].size()));
     }
     return best;
   }
