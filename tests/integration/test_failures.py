@@ -18,7 +18,7 @@ class Failures(case.OnBench):
         return run
 
     def assert_failed(self, unit, run, status, *words):
-        document = unit.wait_for_end(run, timeout=60)
+        document = unit.wait_for_end(run, timeout=240)
         self.assertEqual(document["exit_status"], status, document)
         self.assert_one_line(document["reason"], *words)
 
@@ -49,7 +49,7 @@ class Failures(case.OnBench):
         link(unit.interface, "down")
         time.sleep(5)
         link(unit.interface, "up")
-        document = unit.wait_for_end(run, timeout=120)
+        document = unit.wait_for_end(run, timeout=240)
         self.assertIn(document["state"], ("completed", "refused"), document)
         self.assertTrue([e for e in document["events"] if "link" in e["text"].lower()], document["events"])
 

@@ -11,13 +11,13 @@ program = "key"
 seed_bytes = 6
 key_bytes = 4
 level = 5
-limit_s = 2.0"""
+limit_s = 6.0"""  # Python takes a second to begin, several beside other tests
 
 # What the program is, and what the run must say.
 FAILURES = (
-    ("for ever silent, deaf to signals", "trap '' TERM INT HUP\nwhile :; do :; done", "no key within 2 s"),
+    ("for ever silent, deaf to signals", "trap '' TERM INT HUP\nwhile :; do :; done", "no key within 6 s"),
     ("for ever loud", "while :; do echo 00; done", "writes more than the 8 digits of a key"),
-    ("with its words on the wrong stream", "while :; do echo 00 >&2; done", "no key within 2 s"),
+    ("with its words on the wrong stream", "while :; do echo 00 >&2; done", "no key within 6 s"),
     ("that begins another process", "/bin/true; /bin/true\nexit 7", "ended with status 2: .*[Cc]annot fork"),
     ("that fails", "echo unknown unit >&2\nexit 3", "ended with status 3: unknown unit"),
     ("without a word", "exit 0", "wrote nothing"),
@@ -76,7 +76,7 @@ class KeyProgram(profile_case.UnderProfile):
         self.assertLess(time.monotonic() - begin, 1.5 + 5 * usual_s, "the service does not answer while the program runs")
         ended = unit.wait_for_end(run)
         self.assertEqual(ended["state"], "failed", ended)
-        self.assertLess(time.monotonic() - begin, 15)
+        self.assertLess(time.monotonic() - begin, 40)
         return ended["reason"]
 
     def fails(self, unit, cause):

@@ -87,11 +87,11 @@ class Restarts(case.OnBench):
         unit.selfcal("abort", unit.name, "--reason", "test")
         unit.kill_daemon()
         unit.start_daemon()
-        document = unit.wait_for_end(run, timeout=60)
+        document = unit.wait_for_end(run, timeout=240)
         self.assertEqual(document["state"], "aborted", document)
         self.assert_old_coefficients(unit)
         after = unit.start_run("--schedule", unit.short, "--force", "test", "--dry-run")
-        self.assertEqual(unit.wait_for_end(after, timeout=60)["state"], "completed")
+        self.assertEqual(unit.wait_for_end(after, timeout=240)["state"], "completed")
 
 
 if __name__ == "__main__":

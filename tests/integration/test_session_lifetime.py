@@ -69,7 +69,7 @@ class SessionLifetime(case.OnBench):
         print(f"{how}: last state frame with a session or Unlocked=1 at {last - ended:+.2f} s of the end", flush=True)
 
     def assert_ended(self, unit, log, run, state, how):
-        document = unit.wait_for_end(run, timeout=120)
+        document = unit.wait_for_end(run, timeout=240)
         ended = time.time()
         self.assertEqual(document["state"], state, document["reason"])
         self.assert_locked(unit, log, ended, how=how)
@@ -111,7 +111,7 @@ class SessionLifetime(case.OnBench):
         self.rotating(unit)
         subprocess.run(["ip", "link", "set", unit.interface, "down"], check=True)
         cut = time.time()  # the command takes its time on a busy machine; nothing is heard after it
-        document = unit.wait_for_end(run, timeout=60)
+        document = unit.wait_for_end(run, timeout=240)
         self.assertEqual(document["state"], "failed", document)
         subprocess.run(["ip", "link", "set", unit.interface, "up"], check=True)
         again = BusLog(self, unit)
@@ -137,7 +137,7 @@ class SessionLifetime(case.OnBench):
         killed = time.time()
         self.assert_locked(unit, log, killed, within=S3 + SOON, how="service killed")
         unit.start_daemon()  # takes up its run, with a session of its own, and ends it
-        document = unit.wait_for_end(run, timeout=120)
+        document = unit.wait_for_end(run, timeout=240)
         self.assertIn(document["state"], ("completed", "refused"), document)
         self.assert_locked(unit, log, time.time(), how="killed and restarted")
         unit.kill_daemon()
