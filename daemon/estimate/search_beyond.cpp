@@ -114,8 +114,9 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
   }
   discovery::LawSearch search(rest->recordings(), of_laws, progress);
   if (unit.size() == 1) {
-    if (auto both = discovery::names_beside_laws(unit.front().data, first, rest->recordings().front(), search.fitted(),
-                                                 of_catalogue, of_laws, progress)) {
+    auto both = discovery::names_beside_laws(unit.front().data, first, rest->recordings().front(), search.fitted(),
+                                             of_catalogue, of_laws, progress);
+    if (both && (first.unexplained || (both->laws.processes.empty() && explains(&both->laws)))) {
       // Beside the names that stand now a law may be one more.
       if (auto more = discovery::names_beside_laws(unit.front().data, both->diagnosis, both->rest.recordings().front(),
                                                    both->laws, of_catalogue, of_laws, progress)) {

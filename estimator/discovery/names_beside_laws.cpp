@@ -48,6 +48,10 @@ struct Laws {
   }
 };
 
+bool has_process(const Diagnosis& d) {
+  return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
+}
+
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
   // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
   return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
@@ -58,6 +62,20 @@ double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
 constexpr double least_share_of_laws = 0.3;
 // Of one law, that an effect makes of it in whose words it may be: constants of effects are tried at a few values.
 constexpr double nearly_all_of_a_law = 0.95;
+
+constexpr std::size_t many_laws = 4;
+
+std::size_t strongest_of(const LawFit& fit) {
+  std::size_t strongest = 0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < fit.terms.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    const double square = fit.coefficient(row) * fit.coefficient(row) / fit.covariance(row, row);
+    strongest = square > most ? k : strongest;
+    most = std::max(most, square);
+  }
+  return strongest;
+}
 
 class Together {
  public:
@@ -102,7 +120,8 @@ class Together {
     const diagnosis::CorrectedRecording rest =
         without_laws(scene.motion, scene.table, scene.input, laws.terms, laws.coefficient);
     diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(rest.data(), of_catalogue_, progress_);
-    if (!outcome.diagnosis || outcome.diagnosis->unexplained || outcome.diagnosis->model.empty()) {
+    if (!outcome.diagnosis || outcome.diagnosis->unexplained || outcome.diagnosis->model.empty() ||
+        (has_process(diagnosis_) && has_process(*outcome.diagnosis))) {
       return std::nullopt;
     }
     return std::move(outcome.diagnosis);
@@ -122,6 +141,11 @@ class Together {
     named.open_beside_named = of_rest.open_beside_named;
     named.rejected.clear();
     named.rejected_model.clear();
+    if (has_process(diagnosis_)) {  // the laws stand in its place
+      std::copy_if(diagnosis_.findings.begin(), diagnosis_.findings.end(), std::back_inserter(named.rejected),
+                   [](const diagnosis::Finding& f) { return f.process; });
+      named.unexplained = named.mismatch = true;
+    }
     named.rejected_by_remains_alone = false;
     named.verdict = diagnosis::DiagnosisVerdict::named;
     const DiagnosedRecording recording{data_, named};
@@ -165,7 +189,7 @@ class Guesses {
  public:
   // `names`: some are named already, beside these laws.
   Guesses(const Together& together, const UnitRecording& recording, const std::vector<ModelEffect>& rejected,
-          const Laws& alone, bool processes, bool names, const std::stop_token& stop)
+          const Laws& alone, std::size_t strongest_law, bool processes, bool names, const std::stop_token& stop)
       : together_(together),
         recording_(recording),
         rejected_(rejected),
@@ -196,12 +220,26 @@ class Guesses {
       all_.emplace_back([this] { return where([](std::size_t k) { return k == 0; }); });
       all_.emplace_back([this] { return where([](std::size_t k) { return k == 1; }); });
     }
+    if (laws >= many_laws) {
+      add_for_many(strongest_law);
+    }
   }
   Guesses(const Guesses&) = delete;
   Guesses& operator=(const Guesses&) = delete;
   const std::vector<std::function<std::optional<Laws>()>>& all() const { return all_; }
 
  private:
+  // So many laws are rarely all there are: one of them may be a law and the others a description, or those of one axis an effect.
+  void add_for_many(std::size_t strongest_law) {
+    all_.emplace_back([this, strongest_law] { return where([&](std::size_t k) { return k == strongest_law; }); });
+    for (int axis = 0; axis < 6; ++axis) {
+      const auto there =
+          std::count_if(alone_.terms.begin(), alone_.terms.end(), [&](const LawTerm& l) { return l.axis == axis; });
+      if (there > 1) {
+        all_.emplace_back([this, axis] { return where([&](std::size_t k) { return alone_.terms[k].axis != axis; }); });
+      }
+    }
+  }
   const CatalogueReach& reach() {
     if (!reach_) {
       reach_.emplace(recording_, alone_.terms, alone_.coefficient, stop_);
@@ -273,7 +311,9 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
                                                  const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                  const DiscoveryOptions& of_laws, const Progress& progress) {
-  if (!d.unexplained || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
+  // A process that is named stands where the search has one too.
+  const bool may_be_both = d.unexplained || (has_process(d) && alone.processes.empty());
+  if (!may_be_both || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
     return std::nullopt;
   }
   const Together together(data, d, of_catalogue, of_laws, progress);
@@ -283,8 +323,8 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   const double least = cost_of(alone, d.model);
   const Laws laws_alone = Laws::fitted(alone.fit);
   std::vector<std::string> tried;
-  const Guesses guesses(together, searched, rejected, laws_alone, !alone.processes.empty(), !d.model.empty(),
-                        of_laws.stop);
+  const Guesses guesses(together, searched, rejected, laws_alone, strongest_of(alone.fit), !alone.processes.empty(),
+                        !d.model.empty(), of_laws.stop);
   for (const auto& guess : guesses.all()) {
     const std::optional<Laws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
@@ -313,8 +353,7 @@ std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const
                                                       const UnitRecording& searched, const Discovery& beside,
                                                       const DiscoveryOptions& of_laws, const Progress& progress) {
   const Laws found = Laws::fitted(beside.fit);
-  const bool walks = std::any_of(d.findings.begin(), d.findings.end(), [](const auto& f) { return f.process; });
-  if (!(d.unexplained || walks) || d.model.empty() || found.terms.empty()) {
+  if (!(d.unexplained || has_process(d)) || d.model.empty() || found.terms.empty()) {
     return std::nullopt;
   }
   CatalogueReach reach(searched, found.terms, found.coefficient, of_laws.stop);
