@@ -19,12 +19,14 @@ struct StateLayout {
   int observation_count = 0;
   int bias_count = 0;
   int extra_count = 0;
+  int turn_count = 0;  // three for each turn that the gyros did not see, where a pass has them as constants
 
   int observation() const { return navigation_count; }
   int biases() const { return navigation_count + observation_count; }
   int dynamic_count() const { return biases() + bias_count; }
   int parameters() const { return dynamic_count(); }
-  int constant_count() const { return sensor_parameter_count + extra_count; }
+  int turns() const { return parameters() + sensor_parameter_count + extra_count; }
+  int constant_count() const { return sensor_parameter_count + extra_count + turn_count; }
   int count() const { return dynamic_count() + constant_count(); }
 };
 

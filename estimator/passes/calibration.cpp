@@ -75,6 +75,7 @@ class Calibration {
       }
     }
     input_.data = &data_;
+    input_.turns_are_constants = !options.carried_covariance;
     input_.interval_s = interval_s;
     input_.prior.parameter_sigma = 2.0 * plausible_limit();
     input_.noise.gyro_arw = options.noise.gyro_arw.value_or(noise_.gyro.white_asd);

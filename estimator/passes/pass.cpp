@@ -54,13 +54,14 @@ WhiteNoise along_n(const AxisDensities& axes, const Matrix3& C_first, const Matr
 // wanders no less than if the gyros had held it.
 class CoastNoise {
  public:
-  CoastNoise(const PassInput& input, const DynamicModel& model) : prior_(input.prior), L_(model.L), q_(model.q) {
+  CoastNoise(const PassInput& input, const DynamicModel& model)
+      : prior_(input.prior), constants_(input.turns_are_constants), L_(model.L), q_(model.q) {
     L_.topLeftCorner<9, 9>().setIdentity();
     attitude_ = input.noise.gyro_arw * input.noise.gyro_arw;
   }
   MatrixX& L() { return L_; }
   const VectorX& q(const Interval& interval) {
-    const double opened = interval.turned >= 0 ? prior_.attitude * prior_.attitude : 0.0;
+    const double opened = interval.turned >= 0 && !constants_ ? prior_.attitude * prior_.attitude : 0.0;
     q_.segment<3>(StateLayout::position).setConstant(prior_.position * prior_.position);
     q_.segment<3>(StateLayout::velocity).setConstant(prior_.velocity * prior_.velocity);
     q_.segment<3>(StateLayout::attitude).setConstant(attitude_ * interval.length_s + opened);
@@ -69,49 +70,61 @@ class CoastNoise {
 
  private:
   const PriorModel& prior_;
+  bool constants_;
   MatrixX L_;
   VectorX q_;
   double attitude_;
 };
 
-// What a pass finds of the turns that the gyros did not see: the attitude before one, and behind it until the IMU turns again.
+// The turns that the gyros did not see. Where they are constants of the state, each opens the attitude by a rotation in n of its own.
 class UnseenTurns {
  public:
-  UnseenTurns(const ImuData& data, double sign) : sign_(sign) {
-    for (const Coast& coast : data.coasts) {
-      turns_.push_back(coast.turn);
-    }
-  }
-  void before(const Matrix3& C_nb, const VectorX& mean) { before_ = corrected(C_nb, mean); }
-  void behind(const Interval& interval, const Matrix3& C_nb, const VectorX& mean) {
-    if (interval.turned >= 0) {
-      open_ = interval.turned;
-      begun_ = before_;
-      first_ = C_nb;
-      turned_ = 0.0;
-    } else if (open_ >= 0) {
-      turned_ += interval.angle_b.norm();
-      if (turned_ > still) {
-        open_ = -1;
+  UnseenTurns(const PassInput& input, const StateLayout& layout)
+      : input_(input), first_(layout.turns()), at_(input.data->coasts.size(), -1), C_nb_(input.data->coasts.size()) {
+    int at = 0;
+    for (std::size_t k = 0; k < at_.size() && layout.turn_count > 0; ++k) {
+      if (input.data->coasts[k].turned) {
+        at_[k] = at;
+        at += 3;
       }
     }
-    if (open_ >= 0) {
-      const Matrix3 R = begun_.transpose() * corrected(first_, mean);
-      turns_[static_cast<std::size_t>(open_)] = sign_ > 0.0 ? R : Matrix3(R.transpose());
+  }
+  static int count(const PassInput& input) {
+    const auto& coasts = input.data->coasts;
+    const auto turned = std::count_if(coasts.begin(), coasts.end(), [](const Coast& c) { return c.turned; });
+    return input.turns_are_constants ? 3 * static_cast<int>(turned) : 0;
+  }
+  // `C_nb`: before the interval, in the direction of the pass.
+  void open(const Interval& interval, const Matrix3& C_nb, Eigen::Ref<MatrixX> of_constants) {
+    of_constants.setZero();
+    if (interval.turned < 0) {
+      return;
+    }
+    const auto k = static_cast<std::size_t>(interval.turned);
+    C_nb_[k] = C_nb;
+    if (at_[k] >= 0) {
+      of_constants.block<3, 3>(StateLayout::attitude, at_[k]).setIdentity();
     }
   }
-  std::vector<Matrix3> take() { return std::move(turns_); }
+  std::vector<Matrix3> known(const VectorX& mean) const {
+    std::vector<Matrix3> turns;
+    for (std::size_t k = 0; k < at_.size(); ++k) {
+      const Matrix3& turn = input_.data->coasts[k].turn;
+      turns.push_back(turn);
+      if (at_[k] >= 0) {
+        const Matrix3 opened = C_nb_[k].transpose() *
+                               matrix_from_rotation_vector(input_.sign * mean.segment<3>(first_ + at_[k])) * C_nb_[k];
+        turns.back() = input_.sign > 0.0 ? Matrix3(opened * turn) : Matrix3(turn * opened);
+      }
+    }
+    return turns;
+  }
 
  private:
-  static constexpr double still = 0.1;  // rad: the Earth turns the IMU by as much in 23 min
-  static Matrix3 corrected(const Matrix3& C_nb, const VectorX& mean) {
-    return matrix_from_rotation_vector(mean.segment<3>(StateLayout::attitude)) * C_nb;
-  }
-  double sign_;
-  std::vector<Matrix3> turns_;
-  Matrix3 before_ = Matrix3::Identity(), begun_ = before_, first_ = before_;
-  int open_ = -1;
-  double turned_ = 0.0;
+  const PassInput& input_;
+  int first_;
+  std::vector<int> at_;        // [coasts] among the constants of turns; -1: none
+  std::vector<Matrix3> C_nb_;  // [coasts] where it opens
 };
 
 double factor_at(const std::vector<Disturbance>& all, double time_s) {
@@ -135,7 +148,8 @@ VectorX prior_sigma(const PassInput& input, const StateLayout& layout) {
   for (const BiasNoise& bias : input.noise.biases) {
     sigma(at++) = bias.sigma;
   }
-  sigma.tail(layout.constant_count()) = input.prior.parameter_sigma;
+  sigma.segment(layout.parameters(), layout.turns() - layout.parameters()) = input.prior.parameter_sigma;
+  sigma.tail(layout.turn_count).setConstant(input.prior.attitude);
   return sigma;
 }
 
@@ -145,7 +159,7 @@ UdFilter make_filter(const PassInput& input, const StateLayout& layout) {
     mean.segment<sensor_parameter_count>(layout.parameters()) = -input.parameters;
   }
   if (input.extra_prior_mean.size() > 0) {
-    mean.tail(layout.extra_count) = input.extra_prior_mean;
+    mean.segment(layout.turns() - layout.extra_count, layout.extra_count) = input.extra_prior_mean;
   }
   UdFilter filter(mean, prior_sigma(input, layout), layout.constant_count());
   if (input.prior.carried) {
@@ -177,6 +191,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   out.layout.observation_count = input.noise.observation.state_count();
   out.layout.bias_count = static_cast<int>(input.noise.biases.size());
   out.layout.extra_count = input.extra != nullptr ? input.extra->count() : 0;
+  out.layout.turn_count = UnseenTurns::count(input);
   const StateLayout& layout = out.layout;
   UdFilter filter = make_filter(input, layout);
   IntervalNavigator navigator(*input.data, input.parameters, input.C_nb, input.sign, input.interval_s, input.extra,
@@ -186,7 +201,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       input.noise.observation, layout, input.interval_s,
       process_noise(navigator.site(), input.noise.gyro_arw, input.noise.accel_vrw, input.interval_s, input.sign));
   CoastNoise coast_noise(input, model);
-  UnseenTurns turns(*input.data, input.sign);
+  UnseenTurns turns(input, layout);
   const double noise_variance = input.noise.observation.sigma * input.noise.observation.sigma / input.interval_s;
   const int d = layout.dynamic_count();
   const double intervals = static_cast<double>(input.data->size()) / input.data->sample_rate_hz / input.interval_s;
@@ -210,7 +225,6 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   for (const VectorX& h : model.h) {  // where the pass begins the position is known as well
     filter.update(h, 0.0, noise_variance);
   }
-  turns.before(navigator.C_nb(), filter.mean());
   std::size_t replayed = 0;
   Matrix3 C_nb = navigator.C_nb(), C_before = C_nb;
   const auto next = [&] {
@@ -233,7 +247,8 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       return out;
     }
     model.drive.head<9>() = interval.drive;
-    Gamma.topRows<9>() = interval.Gamma;
+    Gamma.topLeftCorner(9, interval.Gamma.cols()) = interval.Gamma;
+    turns.open(interval, C_before, Gamma.rightCols(layout.turn_count));
     if (input.noise.axes) {
       WhiteNoise white = along_n(*input.noise.axes, C_before, C_nb);
       const double shaking = input.noise.shaking(0.5 * (interval.start_s + interval.end_s));
@@ -259,8 +274,6 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
       for (const VectorX& h : model.h) {  // as where the pass begins
         filter.update(h, 0.0, noise_variance);
       }
-      turns.behind(interval, C_nb, filter.mean());
-      turns.before(C_nb, filter.mean());
       continue;
     }
     if (std::abs(interval.length_s - input.interval_s) > 0.1 * input.interval_s) {
@@ -285,8 +298,6 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
                                    std::log(2.0 * std::numbers::pi * innovation.variance));
     }
     epoch.position = filter.mean().segment<3>(StateLayout::position);
-    turns.behind(interval, C_nb, filter.mean());
-    turns.before(C_nb, filter.mean());
     out.epochs.push_back(epoch);
     if (index % history_step == 0) {
       record_history();
@@ -294,7 +305,7 @@ PassOutput run_pass(const PassInput& input, const PassProgress& progress, const 
   }
   record_history();
   out.nis_mean = out.epochs.empty() ? 0.0 : nis / (3.0 * static_cast<double>(out.epochs.size()));
-  out.turns = turns.take();
+  out.turns = turns.known(filter.mean());
   out.mean = filter.mean();
   out.covariance = filter.covariance();
   out.C_nb = matrix_from_rotation_vector(out.mean.segment<3>(StateLayout::attitude)) * C_nb;

@@ -71,7 +71,10 @@ struct PassInput {
   ExtraSignatures* extra = nullptr;
   ForceSource force = ForceSource::accelerometers;
   const Navigated* navigated =
-      nullptr;        // of this data, linearisation, direction and interval, without `extra`; else navigated here
+      nullptr;  // of this data, linearisation, direction and interval, without `extra`; else navigated here
+  // What the gyros did not see of turns are constants of the state, known at the end by all of the pass, not noise by which the
+  // attitude opens. Who iterates needs it: the second order of a heading that one dwell tells to 2 mrad is 4 ug. Without `carried`.
+  bool turns_are_constants = false;
   bool held = false;  // who iterates keeps the linearisation: along what the data leave open it would walk away
 };
 
@@ -93,7 +96,8 @@ struct PassOutput {
   double log_likelihood = 0.0;
   std::vector<double> history_s;
   std::vector<ParameterVector> history_value, history_sigma;
-  std::vector<Matrix3> turns;  // of the data's coasts: as known after the pass
+  std::vector<Matrix3>
+      turns;  // of the data's coasts, as known after the pass; as they were, but for `turns_are_constants`
   bool stopped = false;
 };
 

@@ -95,6 +95,10 @@ void clip(Recording& r) {
     w = std::clamp(w, -0.6 * largest, 0.6 * largest);
   }
 }
+// Ten minutes of arc in one sample of a turn.
+void spike_in_turn(Recording& r) {
+  r.delta_theta_rad[static_cast<std::size_t>((turn_s + 0.5 * rotation_s) * rate_hz)][2] += 3e-3;
+}
 // 2 mm at 3 Hz in the axis of the accelerometer, smooth at both ends: the base moves and comes back.
 void shake(Recording& r) {
   const double w = 6.0 * std::numbers::pi;
@@ -179,8 +183,36 @@ INSTANTIATE_TEST_SUITE_P(One, SetAsideFault,
                                          Case{"lost", lose, "lost_samples", 3.0}, Case{"gap", cut, "lost_samples", 5.0},
                                          Case{"spike", spike, "spike", 1.0}, Case{"burst", burst, "disturbed", 3.0},
                                          Case{"clipped_turn", clip, "saturation", 0.0},
+                                         Case{"spike_in_turn", spike_in_turn, "spike", 0.0},
                                          Case{"shaken", shake, "disturbed", 7.0}),
                          [](const testing::TestParamInfo<Case>& c) { return std::string(c.param.name); });
+
+// Every turn of one axis at the end of its range: six turns that the gyros did not see, and what they are is known from all of the recording.
+// By the dwell beside it alone a heading is known to 2 mrad, whose square is 20 sigma of an accelerometer.
+TEST(SetAsideWhole, EveryTurnOfAnAxis) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Recording recording = clean();
+    double largest = 0.0;
+    for (const auto& sample : recording.delta_theta_rad) {
+      largest = std::max(largest, std::abs(sample[axis]));
+    }
+    for (auto& sample : recording.delta_theta_rad) {
+      sample[axis] = std::clamp(sample[axis], -0.9 * largest, 0.9 * largest);
+    }
+    const SetAside aside(test::view_of(recording));
+    ASSERT_EQ(aside.refused(), "");
+    EXPECT_GE(aside.left_out().size(), 4U);
+    const CalibrationOutcome outcome = calibrate(aside.data(), {});
+    ASSERT_TRUE(outcome.result) << outcome.failure.message;
+    const ParameterVector z =
+        (outcome.result->value - test::truth_of(config(), seed)).cwiseQuotient(outcome.result->sigma);
+    EXPECT_LT(z.cwiseAbs().maxCoeff(), 4.0) << axis << ": " << z.transpose();
+    EXPECT_NEAR(outcome.result->consistency.nis_mean, 1.0, 0.1) << axis;
+    const DiagnosisOutcome named = diagnose(aside.data(), {});
+    ASSERT_TRUE(named.diagnosis) << named.failure;
+    EXPECT_FALSE(named.diagnosis->mismatch) << axis;
+  }
+}
 
 TEST(SetAsideWhole, NothingOfACleanRecording) {
   const ImuData data = test::view_of(clean());
