@@ -366,11 +366,40 @@ void latitude_by_gyros(const ImuData& data, const std::vector<Segment>& segments
 
 // ---- scale
 
+// What each accelerometer makes of gravity, by the dwells: sum of a_i f_i^2 = g^2, shares 1 / sqrt(a_i). None where they are few or
+// alike, or where no three factors make it.
+std::optional<Vector3> share_of_gravity(const std::vector<Vector3>& forces, double gravity) {
+  constexpr std::size_t enough = 6;
+  constexpr double told_apart = 0.05, made = 0.02;
+  Matrix3 normal = Matrix3::Zero();
+  Vector3 right = Vector3::Zero();
+  for (const Vector3& f : forces) {
+    const Vector3 squares = f.cwiseAbs2() / (gravity * gravity);
+    normal += squares * squares.transpose();
+    right += squares;
+  }
+  const Vector3 scale = normal.diagonal().cwiseSqrt();
+  if (forces.size() < enough || scale.minCoeff() <= 0.0) {
+    return std::nullopt;
+  }
+  const Matrix3 alike = scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
+  const Vector3 a = normal.ldlt().solve(right);
+  if (Eigen::SelfAdjointEigenSolver<Matrix3>(alike).eigenvalues()(0) < told_apart || a.minCoeff() <= 0.0) {
+    return std::nullopt;
+  }
+  for (const Vector3& f : forces) {
+    if (std::abs(std::sqrt(a.dot(f.cwiseAbs2())) / gravity - 1.0) > made) {
+      return std::nullopt;
+    }
+  }
+  return Vector3(a.cwiseSqrt().cwiseInverse());
+}
+
 // Mean size of the specific force in dwells against normal gravity; sensors are within 5000 ppm.
 void gravity_size(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
   const double expected = earth::normal_gravity(data.site.latitude, data.site.height);
   double sum = 0.0;
-  int dwells = 0;
+  std::vector<Vector3> forces;
   for (const Segment& s : segments) {
     if (s.rotation || s.last <= s.first) {
       continue;
@@ -379,15 +408,17 @@ void gravity_size(const ImuData& data, const std::vector<Segment>& segments, std
     for (std::size_t i = s.first; i < s.last; ++i) {
       velocity += Eigen::Map<const Vector3>(data.delta_v[i].data());
     }
-    sum += velocity.norm() * data.sample_rate_hz / static_cast<double>(s.last - s.first);
-    ++dwells;
+    forces.emplace_back(velocity * data.sample_rate_hz / static_cast<double>(s.last - s.first));
+    sum += forces.back().norm();
   }
   constexpr double plausible = 0.015;
-  if (dwells > 0 && std::abs(sum / dwells / expected - 1.0) > plausible) {
-    faults.push_back(
-        {"wrong_scale",
-         number("specific force at rest is %.5f m/s^2, gravity there is %.5f m/s^2", sum / dwells, expected), 0,
-         data.size()});
+  const double mean = forces.empty() ? expected : sum / static_cast<double>(forces.size());
+  if (std::abs(mean / expected - 1.0) > plausible) {
+    std::string words = number("specific force at rest is %.5f m/s^2, gravity there is %.5f m/s^2", mean, expected);
+    if (const auto share = share_of_gravity(forces, expected)) {
+      words += number("; accelerometers x, y, z make %.3f, %.3f, %.3f of it", (*share)(0), (*share)(1), (*share)(2));
+    }
+    faults.push_back({"wrong_scale", std::move(words), 0, data.size()});
   }
 }
 

@@ -249,8 +249,14 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
     const double count = usual_step(1, data.size(), value);
     const double rest_s = gyro ? usual_rest_s(data, segments, count, value) : 0.0;
     DataFault fault{"frozen_axis", {}, 0, 0};
-    for (const Segment& s : segments) {
-      find_stuck(data, s, gyro, count, rest_s, value, fault);
+    if (gyro) {
+      for (const Segment& s : segments) {
+        find_stuck(data, s, gyro, count, rest_s, value, fault);
+      }
+    } else {  // whether the IMU turns or stands
+      Segment all;
+      all.last = data.size();
+      find_stuck(data, all, gyro, count, rest_s, value, fault);
     }
     if (fault.count > 0) {
       fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +

@@ -81,19 +81,19 @@ double step_in_dwells(const ImuData& data, const std::vector<Segment>& segments,
 }
 
 // How far each sample in the dwells stands from what its neighbours make of it (fourth differences: a turn's smooth
-// beginning has none to speak of), in sigma; the samples in time's order.
+// beginning has none to speak of), in sigma, signed; the samples in time's order.
 struct Departures {
   std::vector<std::size_t> sample;
   std::array<std::vector<double>, axes> sigmas;
 };
 
-Departures departures(const ImuData& data, const std::vector<Segment>& segments) {
+Departures departures(const ImuData& data, const std::vector<Segment>& segments, bool turns) {
   // A dwell's edge may hold part of a turn, and by the gyros alone all of its beginning.
   const bool gimbal = !data.gimbal_outer.empty() && !data.gimbal_inner.empty();
-  const auto margin = static_cast<std::size_t>((gimbal ? 0.5 : 3.0) * data.sample_rate_hz);
+  const auto margin = static_cast<std::size_t>((turns ? 0.0 : gimbal ? 0.5 : 3.0) * data.sample_rate_hz);
   Departures d;
   for (const Segment& s : segments) {
-    for (std::size_t i = s.first + 2 + margin; !s.rotation && i + 2 + margin < s.last; ++i) {
+    for (std::size_t i = s.first + 2 + margin; s.rotation == turns && i + 2 + margin < s.last; ++i) {
       d.sample.push_back(i);
     }
   }
@@ -103,9 +103,10 @@ Departures departures(const ImuData& data, const std::vector<Segment>& segments)
     for (const std::size_t i : d.sample) {
       const auto value = [&](std::size_t k) { return value_at(data, k, axis); };
       const double around = (4.0 * (value(i - 1) + value(i + 1)) - value(i - 2) - value(i + 2)) / 6.0;
-      off.push_back(std::abs(value(i) - around));
+      off.push_back(value(i) - around);
     }
-    std::vector<double> sorted = off;
+    std::vector<double> sorted(off.size());
+    std::transform(off.begin(), off.end(), sorted.begin(), [](double o) { return std::abs(o); });
     const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
     std::nth_element(sorted.begin(), at, sorted.end());
     // The 90 % point of normal noise. Where that is below the quantum single counts stand beyond any multiple of it.
@@ -117,8 +118,6 @@ Departures departures(const ImuData& data, const std::vector<Segment>& segments)
   return d;
 }
 
-constexpr double spike_sigmas = 12.0;
-
 // The largest within 0.25 s, but for the sample and the two on either side, which stand out with it by up to two thirds.
 double largest_nearby(const Departures& d, std::size_t axis, std::size_t k, std::size_t reach) {
   const std::vector<double>& off = d.sigmas[axis];
@@ -126,7 +125,7 @@ double largest_nearby(const Departures& d, std::size_t axis, std::size_t k, std:
   for (std::size_t j = k - std::min(k, reach); j < std::min(off.size(), k + reach + 1); ++j) {
     const bool own = j + 2 >= k && j <= k + 2;
     const bool same_dwell = d.sample[std::max(j, k)] - d.sample[std::min(j, k)] == std::max(j, k) - std::min(j, k);
-    largest = !own && same_dwell ? std::max(largest, off[j]) : largest;
+    largest = !own && same_dwell ? std::max(largest, std::abs(off[j])) : largest;
   }
   return largest;
 }
@@ -134,14 +133,14 @@ double largest_nearby(const Departures& d, std::size_t axis, std::size_t k, std:
 bool is_motion(const Departures& d, std::size_t axis, std::size_t k, double rate_hz) {
   constexpr double rings_s = 0.25, rings = 0.25, seen = 4.0;
   const auto reach = static_cast<std::size_t>(std::max(5.0, std::round(rings_s * rate_hz)));
-  if (largest_nearby(d, axis, k, reach) > std::max(seen, rings * d.sigmas[axis][k])) {
+  if (largest_nearby(d, axis, k, reach) > std::max(seen, rings * std::abs(d.sigmas[axis][k]))) {
     return true;
   }
   const std::size_t other = axis < 3 ? 3 : 0;
   double both = 0.0;
   for (std::size_t a = other; a < other + 3; ++a) {
     for (std::size_t j = k - std::min<std::size_t>(k, 2); j < std::min(d.sample.size(), k + 3); ++j) {
-      both = std::max(both, d.sigmas[a][j]);
+      both = std::max(both, std::abs(d.sigmas[a][j]));
     }
   }
   return both > 2.0 * seen;
@@ -149,24 +148,50 @@ bool is_motion(const Departures& d, std::size_t axis, std::size_t k, double rate
 
 }  // namespace
 
-void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
-  const Departures d = departures(data, segments);
+namespace {
+
+// One sample by itself leaves two thirds of it with the other sign in both neighbours. Where a turn begins to speed up, or is clipped, a half
+// is left: in turns the two are told apart.
+bool stands_out(const std::vector<double>& off, std::size_t k, bool turns) {
+  constexpr double in_turns = 30.0, in_dwells = 12.0, noise = 3.0, share = 0.1;
+  const double size = std::abs(off[k]);
+  const bool largest =
+      size >= std::max({std::abs(off[k - 2]), std::abs(off[k - 1]), std::abs(off[k + 1]), std::abs(off[k + 2])});
+  if (!turns || size <= in_turns) {
+    return !turns && size > in_dwells && largest;
+  }
+  const double left = std::max(std::abs(off[k - 1] + off[k] / 1.5), std::abs(off[k + 1] + off[k] / 1.5));
+  return left <= std::max(noise, share * size);
+}
+
+// In dwells, or in turns.
+void spikes_in(const ImuData& data, const std::vector<Segment>& segments, bool turns, std::vector<DataFault>& faults) {
+  const Departures d = departures(data, segments, turns);
   for (std::size_t axis = 0; axis < axes; ++axis) {
     const std::vector<double>& off = d.sigmas[axis];
     DataFault spike{"spike", {}, 0, 0};
     for (std::size_t k = 2; k + 2 < off.size(); ++k) {
-      const bool largest_around = off[k] >= std::max({off[k - 2], off[k - 1], off[k + 1], off[k + 2]});
-      if (off[k] > spike_sigmas && largest_around && !is_motion(d, axis, k, data.sample_rate_hz)) {
+      if (stands_out(off, k, turns) && !is_motion(d, axis, k, data.sample_rate_hz)) {
         spike.first_sample = spike.count++ == 0 ? d.sample[k] : spike.first_sample;
         spike.stretches.push_back({d.sample[k] - 2, d.sample[k] + 3, axis < 3});
       }
     }
     if (spike.count > 0) {
-      spike.words =
-          name_of(axis) + ": " + std::to_string(spike.count) +
-          " samples in dwells stand more than 12 sigma from their neighbours, and no motion shows around them";
+      spike.words = name_of(axis) + ": " + std::to_string(spike.count) + " samples in " +
+                    (turns ? "turns stand more than 30" : "dwells stand more than 12") +
+                    " sigma from their neighbours, and no motion shows around them";
       faults.push_back(spike);
     }
+  }
+}
+
+}  // namespace
+
+void find_spikes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  spikes_in(data, segments, false, faults);
+  // What turns an IMU by hand or on wheels is not smooth; what a turn was that a spike spoils only the read-outs say.
+  if (!data.gimbal_outer.empty() && !data.gimbal_inner.empty()) {
+    spikes_in(data, segments, true, faults);
   }
 }
 
