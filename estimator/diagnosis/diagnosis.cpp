@@ -301,6 +301,7 @@ DiagnosisOutcome Diagnoser::run() {
     return {std::move(d_), {}};
   }
   if (turned(data_)) {
+    d_.read_out_delay = read_out_delay(data_, find_segments(data_));
     name();
   } else {
     judge_noise_alone();

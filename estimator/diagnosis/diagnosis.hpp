@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/data/faults.hpp"
+#include "estimator/diagnosis/data/read_out_delay.hpp"
 #include "estimator/diagnosis/effects/effect.hpp"
 #include "estimator/diagnosis/noise/base_tilt.hpp"
 #include "estimator/diagnosis/noise/noise_check.hpp"
@@ -115,6 +116,7 @@ struct Diagnosis {
   // No rotation: a bias that changes and a base that moves look alike, and the 24 are open. Only the noise was judged.
   bool nothing_turned = false;
   std::optional<BaseTilt> base_tilt;  // then
+  std::optional<ReadOutDelay> read_out_delay;
   std::vector<DataFault> faults;
   std::vector<Finding> findings;   // best first
   std::vector<Finding> rejected;   // fitted best, but what remains says no

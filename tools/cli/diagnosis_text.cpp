@@ -233,6 +233,12 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
   if (!d.calibration.left_out.empty()) {
     text += left_out_text(d.calibration) + "\n";
   }
+  if (d.read_out_delay) {
+    text +=
+        fmt::format("read-outs of the gimbal: {:.3g} +- {:.1g} s {} than the gyros; nothing is estimated from them\n\n",
+                    std::abs(d.read_out_delay->delay_s), d.read_out_delay->sigma_s,
+                    d.read_out_delay->delay_s > 0.0 ? "later" : "earlier");
+  }
   text += disturbed_text(d, detail);
   text += adequacy_text(d);
   text += findings_text("left out of the model", d.findings);
