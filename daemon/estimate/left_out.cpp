@@ -16,6 +16,9 @@ constexpr double worth_telling = 1.02;
 double seconds_of(const CalibrationResult& result) {
   double sum = 0.0, end = -HUGE_VAL;
   for (const LeftOut& l : result.left_out) {
+    if (!l.sensors) {
+      continue;
+    }
     sum += std::max(0.0, l.end_s - std::max(l.start_s, end));
     end = std::max(end, l.end_s);
   }
@@ -47,7 +50,11 @@ std::string left_out_text(const CalibrationResult& result) {
   if (result.left_out.empty()) {
     return {};
   }
-  std::string text = fmt::format("left out, {:.1f} s in {} stretches:\n", seconds_of(result), result.left_out.size());
+  const bool none_of_sensors =
+      std::all_of(result.left_out.begin(), result.left_out.end(), [](const LeftOut& l) { return !l.sensors; });
+  std::string text = none_of_sensors ? fmt::format("mended in {} stretches:\n", result.left_out.size())
+                                     : fmt::format("left out, {:.1f} s of the sensors in {} stretches:\n",
+                                                   seconds_of(result), result.left_out.size());
   for (std::size_t i = 0; i < std::min(most_told, result.left_out.size()); ++i) {
     const LeftOut& l = result.left_out[i];
     text += fmt::format("  {:.2f} to {:.2f} s  {}: {}{}\n", l.start_s, l.end_s, l.fault, l.words,
@@ -56,7 +63,7 @@ std::string left_out_text(const CalibrationResult& result) {
   if (result.left_out.size() > most_told) {
     text += fmt::format("  and {} more\n", result.left_out.size() - most_told);
   }
-  return text + cost_text(result);
+  return none_of_sensors ? text : text + cost_text(result);
 }
 
 nlohmann::ordered_json left_out_json(const CalibrationResult& result) {

@@ -70,7 +70,8 @@ struct LeftOut {
   double start_s = 0.0, end_s = 0.0;
   std::string fault;  // id of the fault of the data, or "disturbed"
   std::string words;
-  bool turn = false;  // a turn that the gyros did not see: how far it went comes from what lies on both sides
+  bool turn = false;    // a turn that the gyros did not see: how far it went comes from what lies on both sides
+  bool sensors = true;  // else a read-out or the temperature has other values there, and no sensor was left out
 };
 
 enum class Verdict { consistent, inconsistent, not_converged };

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimator/diagnosis/data/axes.hpp"
+#include "estimator/diagnosis/data/side_channels.hpp"
 #include "estimator/diagnosis/data/spikes.hpp"
 #include "estimator/diagnosis/data/usual_step.hpp"
 #include "estimator/models/segments.hpp"
@@ -271,6 +272,12 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
 std::vector<DataFault> find_data_faults(const ImuData& data) {
   std::vector<DataFault> faults;
   ImuData sensors = data;
+  const MendedSideChannels mended = mend_side_channels(data);
+  if (!mended.faults.empty()) {
+    sensors.gimbal_outer = mended.outer;
+    sensors.gimbal_inner = mended.inner;
+    faults = mended.faults;
+  }
   if (read_outs_in_degrees(data)) {
     sensors.gimbal_outer = sensors.gimbal_inner = {};
   }

@@ -15,7 +15,7 @@ struct FaultyStretch {
 };
 
 struct DataFault {
-  // lost_samples, time_base, frozen_axis, spike, saturation, wrong_axes, wrong_sign, wrong_scale, wrong_site
+  // lost_samples, time_base, frozen_axis, spike, saturation, read_out, temperature, wrong_axes, wrong_sign, wrong_scale, wrong_read_out, wrong_site
   std::string id;
   std::string words;  // what is wrong, by what it shows, and what mends it
   std::size_t first_sample = 0;

@@ -130,10 +130,13 @@ std::string objection_to(const Coast& c, const ImuData& data, const std::optiona
 }  // namespace
 
 SetAside::SetAside(const ImuData& data) : data_(data) {
-  const std::vector<DataFault> faults = find_data_faults(data);
+  mend_beside(data);
+  const std::vector<DataFault> faults = find_data_faults(data_);
   const auto whole = std::find_if(faults.begin(), faults.end(), [](const DataFault& f) { return f.stretches.empty(); });
   if (whole != faults.end()) {
     refused_ = whole->words + ": a fault of the whole recording";
+    data_ = data;
+    left_out_.clear();
     return;
   }
   leave_out(faults, {});
@@ -153,6 +156,23 @@ SetAside::SetAside(const ImuData& data) : data_(data) {
     data_ = data;
     left_out_.clear();
   }
+}
+
+void SetAside::mend_beside(const ImuData& data) {
+  beside_ = mend_side_channels(data);
+  if (beside_.faults.empty()) {
+    return;
+  }
+  data_.gimbal_outer = beside_.outer;
+  data_.gimbal_inner = beside_.inner;
+  data_.temperature = beside_.temperature;
+  for (const DataFault& fault : beside_.faults) {
+    for (const FaultyStretch& s : fault.stretches) {
+      left_out_.push_back({begin_of(s.first), data_.time_s[s.last - 1], fault.id, fault.words, false, false});
+    }
+  }
+  std::sort(left_out_.begin(), left_out_.end(),
+            [](const LeftOut& a, const LeftOut& b) { return a.start_s < b.start_s; });
 }
 
 // `segments`: of the recording. In a turn all of it is lost with the gyros.
@@ -175,8 +195,7 @@ void SetAside::add(FaultyStretch s, const std::vector<Segment>& segments, const 
   });
   coasts_.push_back({s.first, s.last, s.gyros, turned, Matrix3::Identity()});
   if (!told) {
-    const double start_s = s.first > 0 ? data_.time_s[s.first - 1] : data_.time_s[0] - 1.0 / data_.sample_rate_hz;
-    left_out_.push_back({start_s, data_.time_s[s.last - 1], id, words, turned});
+    left_out_.push_back({begin_of(s.first), data_.time_s[s.last - 1], id, words, turned});
   }
 }
 

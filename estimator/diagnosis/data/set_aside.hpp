@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/data/faults.hpp"
+#include "estimator/diagnosis/data/side_channels.hpp"
 #include "estimator/models/segments.hpp"
 #include "estimator/passes/calibration.hpp"
 
@@ -28,14 +29,19 @@ class SetAside {
  private:
   void add(FaultyStretch stretch, const std::vector<Segment>& segments, const std::string& id,
            const std::string& words);
+  void mend_beside(const ImuData& data);
   void leave_out(const std::vector<DataFault>& faults, const std::vector<FaultyStretch>& disturbed);
   void mend();
 
+  double begin_of(std::size_t sample) const {
+    return sample > 0 ? data_.time_s[sample - 1] : data_.time_s[0] - 1.0 / data_.sample_rate_hz;
+  }
   std::size_t samples(double seconds) const {
     return static_cast<std::size_t>(std::round(seconds * data_.sample_rate_hz));
   }
 
   ImuData data_;
+  MendedSideChannels beside_;
   std::vector<std::array<double, 3>> delta_theta_, delta_v_;
   std::vector<Coast> coasts_;
   std::vector<LeftOut> left_out_;
