@@ -94,7 +94,7 @@ class UnderProfile(case.OnBench):
     def bench_of(self, profile, speed=SPEED, interface="vcan0", sim=None, **ins):
         site = SITE if profile in ("memory.toml", "frames.toml", "moves.toml") else {}
         return self.bench(speed=speed, interface=interface, sim=sim or {}, sim_options=["--profile", PROFILES / profile],
-                          ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | PATIENCE | site | ins)
+                          ins={"dwell_s": DWELL_S, "profile": str(PROFILES / profile)} | site | ins)
 
     def assert_same(self, run, own, what):
         """To a tenth of sigma: the same sensor data through other bytes. What differs is the gimbal's read-out, rounded to
@@ -106,7 +106,7 @@ class UnderProfile(case.OnBench):
 
     def bench_with(self, server, profile, own, *more, start=True, speed=SPEED):
         """A bench on which a server of somebody else's is the INS, with the data of the virtual one."""
-        unit = self.bench_of(profile, speed)
+        unit = self.bench_of(profile, speed, **PATIENCE)
         recording = unit.folder / "direct.h5"
         unit.selfcal("simulate", "--config", unit.folder / "sim.toml", "--schedule", "horizontal", "--dwell", DWELL_S,
                      "--seed", unit.seed, "-o", recording)
