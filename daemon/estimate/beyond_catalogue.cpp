@@ -9,6 +9,7 @@
 
 #include "daemon/estimate/quantity_text.hpp"
 #include "estimator/discovery/explanation_cost.hpp"
+#include "estimator/discovery/named_effects.hpp"
 #include "protocol/law_file/law_file.hpp"
 
 namespace selfcal {
@@ -158,10 +159,6 @@ bool confirmed(const Discovery* found) {
          found->processes.empty() && leaves_noise(*found);
 }
 
-bool may_be_a_law(const diagnosis::Diagnosis& d) {
-  return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
-}
-
 namespace {
 
 // Both walk and jump are fitted in the search; an instability is not, and is left alone.
@@ -189,7 +186,7 @@ bool jumps_in_place_of_walks(const Discovery& found, const diagnosis::Diagnosis&
 
 bool replaces_process(const Discovery& found, const diagnosis::Diagnosis& d) {
   const bool alone = found.laws.empty() != found.processes.empty();  // equations, or processes
-  return may_be_a_law(d) && alone && found.described.empty() && explains(&found) &&
+  return discovery::names_process(d) && alone && found.described.empty() && explains(&found) &&
          (found.processes.empty() || jumps_in_place_of_walks(found, d));
 }
 

@@ -22,8 +22,6 @@ std::string left_words(const discovery::Discovery& found);
 // stand behind a set that is written.
 bool confirmed(const discovery::Discovery* found);
 
-// A random walk or an instability follows any slow curve: what the catalogue names by one may be a law that no catalogue holds.
-bool may_be_a_law(const diagnosis::Diagnosis& diagnosis);
 // Whether equations alone were found that explain what such a walk or instability had been named for, or jumps at the turns that are ten times
 // as likely as the walk of the same sensors.
 bool replaces_process(const discovery::Discovery& found, const diagnosis::Diagnosis& diagnosis);

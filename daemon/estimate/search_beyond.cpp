@@ -104,7 +104,7 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
   if (auto laws = laws_in_their_place(unit, first, of_laws, progress)) {
     return laws;
   }
-  const bool due = unit.size() > 1 || first.unexplained || may_be_a_law(first);
+  const bool due = unit.size() > 1 || first.unexplained || discovery::names_process(first);
   if (when == Search::where_due && !due) {
     return std::nullopt;
   }

@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/noise/process_check.hpp"
 #include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
+#include "estimator/geometry/angles.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -173,7 +174,7 @@ void Comparer::compare_parameters(const SearchResult& found) {
 
 double Comparer::attitude_difference() const {
   const std::vector<Segment> first = find_segments(recording_.data()), second = find_segments(simulation_.data());
-  const auto apart = [](double a, double b) { return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi)); };
+  const auto apart = [](double a, double b) { return std::abs(within_half_a_turn(a - b)); };
   const Eigen::AngleAxisd start(recording_.calibration.C_nb_start.transpose() * simulation_.calibration.C_nb_start);
   double largest = std::abs(start.angle());
   for (std::size_t k = 0; k < first.size(); ++k) {

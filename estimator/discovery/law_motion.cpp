@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "estimator/geometry/angles.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::discovery {
@@ -42,8 +42,8 @@ LawMotion::LawMotion(const diagnosis::RecordingContext& context)
       double outer = 0.0, inner = 0.0;
       const std::size_t first = index_at(data, turn.start_s), last = index_at(data, turn.end_s);
       for (std::size_t i = first + 1; i <= last; ++i) {
-        outer += std::remainder(data.gimbal_outer[i] - data.gimbal_outer[i - 1], 2.0 * std::numbers::pi);
-        inner += std::remainder(data.gimbal_inner[i] - data.gimbal_inner[i - 1], 2.0 * std::numbers::pi);
+        outer += within_half_a_turn(data.gimbal_outer[i] - data.gimbal_outer[i - 1]);
+        inner += within_half_a_turn(data.gimbal_inner[i] - data.gimbal_inner[i - 1]);
       }
       sense.outer = std::abs(outer) < least_turn ? sense.outer : (outer > 0.0 ? 1.0 : -1.0);
       sense.inner = std::abs(inner) < least_turn ? sense.inner : (inner > 0.0 ? 1.0 : -1.0);

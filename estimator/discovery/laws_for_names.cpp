@@ -268,9 +268,8 @@ class NamesAgainstLaws {
 bool names_stand_alone(const diagnosis::Diagnosis& d) {
   const bool of_sensor = std::any_of(d.model.begin(), d.model.end(),
                                      [](const diagnosis::ModelEffect& m) { return m.effect->sensor != nullptr; });
-  const bool process =
-      std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
-  return d.verdict == diagnosis::DiagnosisVerdict::named && d.faults.empty() && of_sensor && !process && !d.unexplained;
+  return d.verdict == diagnosis::DiagnosisVerdict::named && d.faults.empty() && of_sensor && !names_process(d) &&
+         !d.unexplained;
 }
 
 std::optional<LawsForNames> laws_for_names(std::span<const DiagnosedRecording> unit, double least_log_odds,

@@ -66,6 +66,10 @@ std::vector<const diagnosis::Effect*> to_be_taken_out(std::span<const DiagnosedR
 
 }  // namespace
 
+bool names_process(const diagnosis::Diagnosis& d) {
+  return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
+}
+
 double square_of(const diagnosis::ModelEffect& m) { return m.size.dot(m.covariance.ldlt().solve(m.size)); }
 
 tl::expected<UnexplainedRest, std::string> UnexplainedRest::of(std::span<const DiagnosedRecording> unit,

@@ -17,6 +17,8 @@ namespace selfcal::discovery {
 
 // How much an effect is seen: its sizes' square in sigmas.
 double square_of(const diagnosis::ModelEffect& effect);
+// Whether a random walk or an instability of a bias is named. It follows any slow curve, and may be a law that no catalogue holds.
+bool names_process(const diagnosis::Diagnosis& diagnosis);
 
 // A recording and what the catalogue says of it. Both must outlive it.
 struct DiagnosedRecording {

@@ -48,10 +48,6 @@ struct Laws {
   }
 };
 
-bool has_process(const Diagnosis& d) {
-  return std::any_of(d.findings.begin(), d.findings.end(), [](const diagnosis::Finding& f) { return f.process; });
-}
-
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
   // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
   return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
@@ -121,7 +117,7 @@ class Together {
         without_laws(scene.motion, scene.table, scene.input, laws.terms, laws.coefficient);
     diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(rest.data(), of_catalogue_, progress_);
     if (!outcome.diagnosis || outcome.diagnosis->unexplained || outcome.diagnosis->model.empty() ||
-        (has_process(diagnosis_) && has_process(*outcome.diagnosis))) {
+        (names_process(diagnosis_) && names_process(*outcome.diagnosis))) {
       return std::nullopt;
     }
     return std::move(outcome.diagnosis);
@@ -141,7 +137,7 @@ class Together {
     named.open_beside_named = of_rest.open_beside_named;
     named.rejected.clear();
     named.rejected_model.clear();
-    if (has_process(diagnosis_)) {  // the laws stand in its place
+    if (names_process(diagnosis_)) {  // the laws stand in its place
       std::copy_if(diagnosis_.findings.begin(), diagnosis_.findings.end(), std::back_inserter(named.rejected),
                    [](const diagnosis::Finding& f) { return f.process; });
       named.unexplained = named.mismatch = true;
@@ -312,7 +308,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                  const DiscoveryOptions& of_laws, const Progress& progress) {
   // A process that is named stands where the search has one too.
-  const bool may_be_both = d.unexplained || (has_process(d) && alone.processes.empty());
+  const bool may_be_both = d.unexplained || (names_process(d) && alone.processes.empty());
   if (!may_be_both || (alone.fit.terms.size() < 2 && alone.processes.empty())) {
     return std::nullopt;
   }
@@ -353,7 +349,7 @@ std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const
                                                       const UnitRecording& searched, const Discovery& beside,
                                                       const DiscoveryOptions& of_laws, const Progress& progress) {
   const Laws found = Laws::fitted(beside.fit);
-  if (!(d.unexplained || has_process(d)) || d.model.empty() || found.terms.empty()) {
+  if (!(d.unexplained || names_process(d)) || d.model.empty() || found.terms.empty()) {
     return std::nullopt;
   }
   CatalogueReach reach(searched, found.terms, found.coefficient, of_laws.stop);

@@ -244,20 +244,15 @@ void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, 
 }
 
 void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
+  const std::vector<Segment> whole = {{.last = data.size()}};  // of accelerometers, whether the IMU turns or stands
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const bool gyro = axis < 3;
     const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
     const double count = usual_step(1, data.size(), value);
     const double rest_s = gyro ? usual_rest_s(data, segments, count, value) : 0.0;
     DataFault fault{"frozen_axis", {}, 0, 0};
-    if (gyro) {
-      for (const Segment& s : segments) {
-        find_stuck(data, s, gyro, count, rest_s, value, fault);
-      }
-    } else {  // whether the IMU turns or stands
-      Segment all;
-      all.last = data.size();
-      find_stuck(data, all, gyro, count, rest_s, value, fault);
+    for (const Segment& s : gyro ? segments : whole) {
+      find_stuck(data, s, gyro, count, rest_s, value, fault);
     }
     if (fault.count > 0) {
       fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
+#include "estimator/geometry/angles.hpp"
 #include "estimator/geometry/rotation.hpp"
 
 namespace selfcal::diagnosis {
@@ -18,14 +18,12 @@ struct Speeds {
   std::vector<double> read_outs, gyros;
 };
 
-double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
-
 Speeds speeds(const ImuData& data, std::size_t first, std::size_t block, std::size_t blocks) {
   Speeds s;
   for (std::size_t k = 0; k < blocks; ++k) {
     const std::size_t from = first + k * block, to = from + block;
-    s.read_outs.push_back(std::hypot(wrapped(data.gimbal_outer[to - 1] - data.gimbal_outer[from - 1]),
-                                     wrapped(data.gimbal_inner[to - 1] - data.gimbal_inner[from - 1])));
+    s.read_outs.push_back(std::hypot(within_half_a_turn(data.gimbal_outer[to - 1] - data.gimbal_outer[from - 1]),
+                                     within_half_a_turn(data.gimbal_inner[to - 1] - data.gimbal_inner[from - 1])));
     Vector3 turn = Vector3::Zero();
     for (std::size_t i = from; i < to; ++i) {
       turn += Eigen::Map<const Vector3>(data.delta_theta[i].data());
@@ -35,7 +33,7 @@ Speeds speeds(const ImuData& data, std::size_t first, std::size_t block, std::si
   return s;
 }
 
-// Mean square of what they differ by where the read-outs come `lag` blocks later, and at lag and direction alike the square of the gyros'.
+// Sum of the squares of what they differ by where the read-outs come `lag` blocks later.
 double apart(const Speeds& s, int lag, std::size_t most) {
   double sum = 0.0;
   for (std::size_t k = most; k + most < s.gyros.size(); ++k) {

@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "estimator/diagnosis/data/axes.hpp"
+#include "estimator/geometry/angles.hpp"
 #include "estimator/geometry/rotation.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
-
-double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
 struct Stretch {
   std::size_t first = 0, last = 0;
@@ -42,7 +40,7 @@ std::vector<Stretch> glitches(const ImuData& data, std::span<const double> angle
   const auto longest = static_cast<std::size_t>(std::max(1.0, longest_s * data.sample_rate_hz));
   const auto jumps = [&](std::size_t from, std::size_t to) {
     const double could = more * fastest[from] * static_cast<double>(to - from) + least;
-    return std::abs(wrapped(angles[to] - angles[from])) > could;
+    return std::abs(within_half_a_turn(angles[to] - angles[from])) > could;
   };
   std::vector<Stretch> found;
   for (std::size_t i = 1; i < angles.size(); ++i) {
@@ -61,7 +59,7 @@ std::vector<Stretch> glitches(const ImuData& data, std::span<const double> angle
 }
 
 void bridge(std::vector<double>& angles, const Stretch& s) {
-  const double from = angles[s.first - 1], turn = wrapped(angles[s.last] - from);
+  const double from = angles[s.first - 1], turn = within_half_a_turn(angles[s.last] - from);
   for (std::size_t i = s.first; i < s.last; ++i) {
     angles[i] = from + turn * static_cast<double>(i + 1 - s.first) / static_cast<double>(s.last + 1 - s.first);
   }
@@ -87,7 +85,7 @@ std::vector<Stretch> holds(const ImuData& data, const std::vector<double>& angle
       for (std::size_t k = i; k < i + block; ++k) {
         turn += Eigen::Map<const Vector3>(data.delta_theta[k].data());
       }
-      const double shown = std::abs(wrapped(other[i + block - 1] - other[i]));
+      const double shown = std::abs(within_half_a_turn(other[i + block - 1] - other[i]));
       const bool turns = turn.norm() > least_rate * block_s && shown < by_other * turn.norm();
       turned += turns ? turn.norm() : 0.0;
     }
@@ -99,14 +97,6 @@ std::vector<Stretch> holds(const ImuData& data, const std::vector<double>& angle
   return found;
 }
 
-struct Angles {
-  double outer = 0.0, inner = 0.0;
-};
-
-Angles angles_of(const Matrix3& C_vb) {
-  return {std::atan2(-C_vb(0, 1), C_vb(1, 1)), std::atan2(-C_vb(2, 0), C_vb(2, 2))};
-}
-
 // `held` through a stretch by the gyros; what they are off by at its end (the Earth's rate, the IMU's axes) goes over the stretch.
 void turn_on(const ImuData& data, std::vector<double>& outer, std::vector<double>& inner, bool of_outer,
              const Stretch& s) {
@@ -115,10 +105,10 @@ void turn_on(const ImuData& data, std::vector<double>& outer, std::vector<double
   double before = held[s.first - 1];
   for (std::size_t i = s.first; i <= s.last; ++i) {
     C_vb = C_vb * matrix_from_rotation_vector(Eigen::Map<const Vector3>(data.delta_theta[i].data()));
-    const Angles now = angles_of(C_vb);
-    const double angle = before + wrapped((of_outer ? now.outer : now.inner) - before);
+    const GimbalAngles now = gimbal_angles(C_vb);
+    const double angle = before + within_half_a_turn((of_outer ? now.outer : now.inner) - before);
     if (i == s.last) {
-      const double off = wrapped(held[i] - angle);
+      const double off = within_half_a_turn(held[i] - angle);
       for (std::size_t k = s.first; k < i; ++k) {
         held[k] += off * static_cast<double>(k + 1 - s.first) / static_cast<double>(i + 1 - s.first);
       }

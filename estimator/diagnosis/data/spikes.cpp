@@ -155,13 +155,14 @@ namespace {
 bool stands_out(const std::vector<double>& off, std::size_t k, bool turns) {
   constexpr double in_turns = 30.0, in_dwells = 12.0, noise = 3.0, share = 0.1;
   const double size = std::abs(off[k]);
-  const bool largest =
-      size >= std::max({std::abs(off[k - 2]), std::abs(off[k - 1]), std::abs(off[k + 1]), std::abs(off[k + 2])});
-  if (!turns || size <= in_turns) {
-    return !turns && size > in_dwells && largest;
+  if (size <= (turns ? in_turns : in_dwells)) {
+    return false;
   }
-  const double left = std::max(std::abs(off[k - 1] + off[k] / 1.5), std::abs(off[k + 1] + off[k] / 1.5));
-  return left <= std::max(noise, share * size);
+  if (turns) {
+    const double left = std::max(std::abs(off[k - 1] + off[k] / 1.5), std::abs(off[k + 1] + off[k] / 1.5));
+    return left <= std::max(noise, share * size);
+  }
+  return size >= std::max({std::abs(off[k - 2]), std::abs(off[k - 1]), std::abs(off[k + 1]), std::abs(off[k + 2])});
 }
 
 // In dwells, or in turns.

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <span>
 #include <utility>
 
+#include "estimator/geometry/angles.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -59,7 +59,7 @@ Vector3 sum_over(std::span<const std::array<double, 3>> increments, std::size_t 
 double angle_in_the_middle(std::span<const double> angle, const SensorBlock& block) {
   const std::size_t ends = block.first + block.last;
   const double before = angle[ends > 1 ? (ends - 2) / 2 : 0], after = angle[(ends - 1) / 2];
-  return before + 0.5 * std::remainder(after - before, 2.0 * std::numbers::pi);
+  return before + 0.5 * within_half_a_turn(after - before);
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ double RecordingContext::travelled(std::size_t first, std::size_t last) const {
     return mean_rate(first, last).norm() * static_cast<double>(last - first) / data_.sample_rate_hz;
   }
   const auto by = [&](std::span<const double> angle) {  // read-outs are those of the ends of samples
-    return std::abs(std::remainder(angle[last - 1] - angle[first - 1], 2.0 * std::numbers::pi));
+    return std::abs(within_half_a_turn(angle[last - 1] - angle[first - 1]));
   };
   return by(data_.gimbal_outer) + by(data_.gimbal_inner);
 }
