@@ -39,7 +39,8 @@ std::vector<Stretch> glitches(const ImuData& data, std::span<const double> angle
   constexpr double longest_s = 0.5, more = 2.0, least = 1.0 * units::degree;
   const auto longest = static_cast<std::size_t>(std::max(1.0, longest_s * data.sample_rate_hz));
   const auto jumps = [&](std::size_t from, std::size_t to) {
-    const double could = more * fastest[from] * static_cast<double>(to - from) + least;
+    const double samples = (data.time_s[to] - data.time_s[from]) * data.sample_rate_hz;  // rows may be lost
+    const double could = more * fastest[from] * samples + least;
     return std::abs(within_half_a_turn(angles[to] - angles[from])) > could;
   };
   std::vector<Stretch> found;

@@ -81,6 +81,19 @@ TEST(SideChannels, LateReadOutsAreNoFault) {
   EXPECT_TRUE(mend(r).faults.empty());
 }
 
+// Behind rows that are lost in a turn an angle is another one, and no sample has jumped.
+TEST(SideChannels, LostRowsAreNoJump) {
+  Recording r = sound();
+  const auto first = static_cast<std::ptrdiff_t>(at(dwell_s + 0.4 * turn_s)), last = first + 17;
+  r.time_s.erase(r.time_s.begin() + first, r.time_s.begin() + last);
+  r.delta_theta_rad.erase(r.delta_theta_rad.begin() + first, r.delta_theta_rad.begin() + last);
+  r.delta_v_mps.erase(r.delta_v_mps.begin() + first, r.delta_v_mps.begin() + last);
+  for (auto* angles : {&r.gimbal_outer_rad, &r.gimbal_inner_rad}) {
+    angles->erase(angles->begin() + first, angles->begin() + last);
+  }
+  EXPECT_TRUE(mend(r).faults.empty());
+}
+
 TEST(SideChannels, ACircleBeginsAnew) {
   Recording r = sound();
   for (double& angle : r.gimbal_outer_rad) {
