@@ -17,6 +17,7 @@ constexpr int lowest_bin = DwellPeriodogram::lowest_bin,
 constexpr double margin_s = 1.0;                        // left out at both ends of a dwell
 constexpr int enough_pieces = 10;                       // of an axis
 constexpr int rounds = 40, rounds_before_lines = 10;
+constexpr double least_used = 0.1;  // of the values
 // Taper sin^4: neighbouring bins share noise, and a sum over bins scatters by mean(w^4)/mean(w^2)^2 of independent ones:
 // mean(sin^16) = 6435/32768, mean(sin^8) = 35/128.
 constexpr double taper_spread = 6435.0 / 32768.0 / (35.0 / 128.0 * 35.0 / 128.0);
@@ -67,11 +68,20 @@ std::vector<AxisDwell> axis_dwells(std::span<const std::array<double, 3>> increm
 // Least squares of density = white + angle * shape + quantum's, each value weighted by its model: it scatters by that.
 class WhittleFit {
  public:
-  WhittleFit(const std::vector<AxisDwell>& dwells, double rate_hz, double quantum, double piece_s, double first_asd)
-      : dwells_(dwells), rate_hz_(rate_hz), quantum_(quantum), piece_s_(piece_s), white_(first_asd * first_asd) {
+  WhittleFit(const std::vector<AxisDwell>& dwells, double rate_hz, double quantum, double piece_s, double first_asd,
+             double most_hidden)
+      : dwells_(dwells),
+        rate_hz_(rate_hz),
+        quantum_(quantum),
+        piece_s_(piece_s),
+        most_hidden_(most_hidden),
+        white_(first_asd * first_asd) {
     for (int b = 0; b < bin_count; ++b) {
       const double sine = std::sin(pi * frequency(b) / rate_hz_);
       shape_(b) = 4.0 * sine * sine * rate_hz_;
+    }
+    if (std::isfinite(most_hidden_)) {
+      white_ = low_quartile();
     }
   }
 
@@ -84,12 +94,26 @@ class WhittleFit {
         break;
       }
     }
+    if (used_ < least_used * static_cast<double>(dwells_.size() * bin_count)) {
+      return {};
+    }
     const double asd = std::sqrt(white_);
     const double variance = taper_spread * normal_.inverse()(0, 0);
     return {asd, 0.5 * std::sqrt(variance) / asd, std::sqrt(angle_ + quantum_ * quantum_ / 12.0)};
   }
 
  private:
+  // Of all densities: a first guess where many bins hold lines of the quantum.
+  double low_quartile() const {
+    std::vector<double> all;
+    for (const AxisDwell& dwell : dwells_) {
+      all.insert(all.end(), dwell.density.begin(), dwell.density.end());
+    }
+    const auto quarter = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 4);
+    std::nth_element(all.begin(), quarter, all.end());
+    return *quarter;
+  }
+
   double frequency(int b) const { return (b + lowest_bin) / piece_s_; }
 
   // Where a bin of an axis is twice the model in the mean of the dwells: a line that stays; chance does it once in 1e5.
@@ -105,7 +129,9 @@ class WhittleFit {
     }
   }
 
+  // One round; `used_` counts its values.
   void step(bool without_lines) {
+    used_ = 0.0;
     const double asd = std::sqrt(white_);
     std::vector<Bins> hidden(dwells_.size()), models(dwells_.size());
     for (std::size_t d = 0; d < dwells_.size(); ++d) {
@@ -125,9 +151,13 @@ class WhittleFit {
       const double most = 1.0 + 8.0 / std::sqrt(dwell.pieces);
       for (int b = 0; b < bin_count; ++b) {
         const double model = models[d](b);
+        if (hidden[d](b) > most_hidden_ * (model - hidden[d](b))) {
+          continue;
+        }
         if (without_lines && (line_(b, dwell.axis) || dwell.density(b) > most * model)) {
           continue;
         }
+        used_ += 1.0;
         const Eigen::Vector2d row(1.0 / model, shape_(b) / model);
         normal_ += dwell.pieces * row * row.transpose();
         right += dwell.pieces * row * (dwell.density(b) - hidden[d](b)) / model;
@@ -139,8 +169,9 @@ class WhittleFit {
   }
 
   const std::vector<AxisDwell>& dwells_;
-  double rate_hz_, quantum_, piece_s_;
+  double rate_hz_, quantum_, piece_s_, most_hidden_;
   double white_, angle_ = 0.0;
+  double used_ = 0.0;
   Bins shape_;
   Eigen::Array<bool, bin_count, 3> line_ = Eigen::Array<bool, bin_count, 3>::Constant(false);
   Eigen::Matrix2d normal_;
@@ -177,8 +208,8 @@ double quantum_density(double frequency_hz, double mean_rate, double quantum, do
 }
 
 QuantisedRate fit_quantised_rate(std::span<const std::array<double, 3>> increments, double rate_hz,
-                                 const std::vector<Segment>& segments, double quantum, double piece_s,
-                                 double first_asd) {
+                                 const std::vector<Segment>& segments, double quantum, double piece_s, double first_asd,
+                                 double most_hidden) {
   const auto length = static_cast<std::size_t>(std::lround(piece_s * rate_hz));
   const std::vector<AxisDwell> dwells = axis_dwells(increments, rate_hz, segments, length);
   int pieces = 0;
@@ -188,7 +219,7 @@ QuantisedRate fit_quantised_rate(std::span<const std::array<double, 3>> incremen
   if (pieces < 3 * enough_pieces) {
     return {};
   }
-  return WhittleFit(dwells, rate_hz, quantum, static_cast<double>(length) / rate_hz, first_asd).run();
+  return WhittleFit(dwells, rate_hz, quantum, static_cast<double>(length) / rate_hz, first_asd, most_hidden).run();
 }
 
 }  // namespace selfcal

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "estimator/models/dwell_periodogram.hpp"
@@ -128,18 +129,25 @@ std::vector<std::array<double, 3>> first_of(Increments increments, std::span<con
   return first;
 }
 
-// The quantum: increments that are whole multiples of a step larger than their own rounding.
+// The quantum: increments that are whole multiples of a step larger than their own rounding, and so what they differ by from one to the next.
 double find_quantum(const std::vector<std::array<double, 3>>& increments) {
-  double smallest = 0.0;
+  double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
   for (const std::array<double, 3>& increment : increments) {
     for (const double x : increment) {
-      const double size = std::abs(x);
-      if (size > 0.0 && (smallest == 0.0 || size < smallest)) {
-        smallest = size;
-      }
+      largest = std::max(largest, std::abs(x));
     }
   }
-  if (smallest == 0.0) {
+  const double rounding = 1e-9 * largest;
+  std::array<double, 3> before{};
+  for (const std::array<double, 3>& increment : increments) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const double size : {std::abs(increment[axis]), std::abs(increment[axis] - before[axis])}) {
+        smallest = size > rounding ? std::min(smallest, size) : smallest;
+      }
+    }
+    before = increment;
+  }
+  if (!std::isfinite(smallest)) {
     return 0.0;
   }
   // The smallest step seen may be several quanta.
@@ -153,11 +161,14 @@ double find_quantum(const std::vector<std::array<double, 3>>& increments) {
       });
     };
     if (std::all_of(increments.begin(), increments.end(), whole)) {
-      return step;
+      return largest / std::round(largest / step);  // a difference has lost digits
     }
   }
   return 0.0;
 }
+
+// Of the second variance: what the quantum's remainders at both ends of either second make of it.
+double of_quantum(double quantum) { return 0.25 * quantum * quantum; }
 
 // Half the mean square of differences of successive 1 s sums inside dwells.
 double second_variance(const ImuData& data, const std::vector<Segment>& segments) {
@@ -225,13 +236,26 @@ SensorNoise estimate_sensor_noise(const ImuData& data, const std::vector<Segment
               least_white_still, noise.accel);
   // Five times the noise and more is motion: chance gives sqrt(1 +- 0.1) at most.
   const double expected = noise.accel.white_asd * noise.accel.white_asd;
-  noise.base_moves = second_variance(data, segments) > 25.0 * expected;
+  noise.base_moves = second_variance(data, segments) > 25.0 * (expected + of_quantum(accel_quantum));
   const double group_s = noise.base_moves ? fast_group_s : slow_group(segments);
   Spectrum gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, group_s);
   if (gyro.pieces < enough_pieces && !noise.base_moves) {
     gyro = mean_spectrum(data.delta_theta, data.sample_rate_hz, segments, fast_group_s);
   }
   fit_density(gyro, std::nullopt, noise.base_moves ? least_white_moving : least_white_still, noise.gyro);
+  const bool turned = std::any_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; });
+  if (turned && !noise.base_moves && accel_quantum > 0.0) {
+    // A coarse quantum hides the white noise in the band above, and is found for it. Below, where it hides less, all else is louder: what
+    // is found there counts where it is less, beyond chance. Where nothing turned there is but one set of the quantum's lines, and the
+    // noise is that of the drift (passes/noise_fit.hpp).
+    constexpr double less = 0.85, most_hidden = 3.0;
+    const QuantisedRate behind = fit_quantised_rate(data.delta_v, data.sample_rate_hz, segments, accel_quantum,
+                                                    piece_length * group_s, noise.accel.white_asd, most_hidden);
+    if (behind.white_asd > 0.0 && behind.white_asd < less * noise.accel.white_asd) {
+      noise.accel.white_asd = behind.white_asd;
+      noise.accel.increment_sigma = behind.increment_sigma;
+    }
+  }
   if (!noise.base_moves && noise.gyro.quantum > 0.0) {
     const QuantisedRate behind = fit_quantised_rate(data.delta_theta, data.sample_rate_hz, segments, noise.gyro.quantum,
                                                     piece_length * group_s, noise.gyro.white_asd);
