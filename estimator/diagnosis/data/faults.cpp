@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "estimator/diagnosis/data/axes.hpp"
@@ -174,13 +175,30 @@ void time_base(const ImuData& data, std::vector<DataFault>& faults) {
   }
 }
 
+// One axis: its samples, their sums up to each, and its usual step.
+struct AxisSamples {
+  bool gyro = false;
+  std::vector<double> value;
+  std::vector<double> sum;  // of the samples before
+  double count = 0.0;
+};
+
+AxisSamples axis_samples(const ImuData& data, std::size_t axis) {
+  AxisSamples a{.gyro = axis < 3, .value = {}, .sum = {0.0}};
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    a.value.push_back(a.gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]);
+    a.sum.push_back(a.sum.back() + a.value.back());
+  }
+  a.count = usual_step(1, data.size(), [&](std::size_t i) { return a.value[i]; });
+  return a;
+}
+
 // Samples [first, last) cut where the value changes.
-template <typename Value>
-std::vector<std::pair<std::size_t, std::size_t>> runs_of_one_value(std::size_t first, std::size_t last,
-                                                                   const Value& value) {
+std::vector<std::pair<std::size_t, std::size_t>> runs_of_one_value(const AxisSamples& a, std::size_t first,
+                                                                   std::size_t last) {
   std::vector<std::pair<std::size_t, std::size_t>> runs;
   for (std::size_t start = first, i = first + 1; start < last; ++i) {
-    if (i >= last || value(i) != value(start)) {
+    if (i >= last || a.value[i] != a.value[start]) {
       runs.emplace_back(start, i);
       start = i;
     }
@@ -189,17 +207,16 @@ std::vector<std::pair<std::size_t, std::size_t>> runs_of_one_value(std::size_t f
 }
 
 // How long a gyro gives zero in a dwell and counts again in the same, the third longest time: the longest may be those in which it is stuck.
-template <typename Value>
-double usual_rest_s(const ImuData& data, const std::vector<Segment>& segments, double count, const Value& value) {
+double usual_rest_s(const ImuData& data, const std::vector<Segment>& segments, const AxisSamples& a) {
   constexpr std::size_t third = 2;
   std::vector<std::size_t> rests;
   for (const Segment& s : segments) {
     if (s.rotation) {
       continue;
     }
-    const auto runs = runs_of_one_value(s.first, s.last, value);
+    const auto runs = runs_of_one_value(a, s.first, s.last);
     for (std::size_t k = 1; k + 1 < runs.size(); ++k) {
-      if (std::abs(value(runs[k].first)) < 0.5 * count) {
+      if (std::abs(a.value[runs[k].first]) < 0.5 * a.count) {
         rests.push_back(runs[k].second - runs[k].first);
       }
     }
@@ -211,51 +228,77 @@ double usual_rest_s(const ImuData& data, const std::vector<Segment>& segments, d
   return static_cast<double>(rests[third]) / data.sample_rate_hz;
 }
 
-// An axis that gives one value for long. Gyros of coarse quantum rest at a count for seconds where they hardly turn; if the
-// rest of the dwell turns them by more than a few counts in that time, they were stuck. Where they hardly turn in all of it, as upright ones
-// at the equator, they may rest for a few times what they have rested elsewhere. Accelerometers never rest.
-// Adds the stretches of a segment in which an axis gives one value for longer than it can. `count`: its usual step; `rest_s`: of
-// usual_rest_s().
-template <typename Value>
-void find_stuck(const ImuData& data, const Segment& s, bool gyro, double count, double rest_s, const Value& value,
-                DataFault& fault) {
-  constexpr double least_gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, most_of_dwell = 0.7, few = 4.0;
-  const auto margin = static_cast<std::size_t>(data.sample_rate_hz);  // a dwell's edge may hold part of a turn
-  const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
-  double sum = 0.0;
-  for (std::size_t i = first; i < last; ++i) {
-    sum += value(i);
+// A dwell's edge may hold part of a turn.
+std::vector<Segment> without_edges(std::vector<Segment> segments, double rate_hz) {
+  const auto margin = static_cast<std::size_t>(rate_hz);
+  for (Segment& s : segments) {
+    if (!s.rotation && s.last - s.first > 2 * margin) {
+      s.first += margin;
+      s.last -= margin;
+    }
   }
-  const auto n = static_cast<double>(last - first);
-  for (const auto& [start, end] : runs_of_one_value(first, last, value)) {
-    const auto length = static_cast<double>(end - start);
-    const double length_s = length / data.sample_rate_hz;
-    const double turned = (sum - length * value(start)) / (n - length) * length - length * value(start);
-    const bool left_behind =
-        gyro && !s.rotation && length < most_of_dwell * n && length_s > least_s && std::abs(turned) > counts * count;
-    const bool zero = std::abs(value(start)) < 0.5 * count;
-    const double gyro_s = zero ? std::max(least_gyro_s, few * rest_s) : least_gyro_s;
-    if (left_behind || length_s > (gyro ? gyro_s : accel_s)) {
+  return segments;
+}
+
+// What the other samples of a segment in which a run of one value lies would have made of its length, less what it made; of several segments
+// the least. Infinite where they are too few to tell.
+double departure(const AxisSamples& a, const std::vector<Segment>& segments, std::size_t start, std::size_t end) {
+  constexpr double most_of_segment = 0.7;
+  const double length = static_cast<double>(end - start), made = a.sum[end] - a.sum[start];
+  const auto sum = [&](std::size_t first, std::size_t last) { return first < last ? a.sum[last] - a.sum[first] : 0.0; };
+  double least = std::numeric_limits<double>::infinity();
+  for (const Segment& s : segments) {
+    if (s.first < end && s.last > start) {
+      const double whole = static_cast<double>(s.last - s.first);
+      const double others = whole - static_cast<double>(std::min(end, s.last) - std::max(start, s.first));
+      if (others > (1.0 - most_of_segment) * whole) {
+        least = std::min(least, std::abs((sum(s.first, start) + sum(end, s.last)) / others * length - made));
+      }
+    }
+  }
+  return least;
+}
+
+// An axis that gives one value for long. Of a coarse quantum it rests at a count for seconds where it hardly moves (gyros), or where what it
+// measures is nearly a whole count a sample; the rest of the dwell tells the same then. If the rest of the dwell moves it by more than a few
+// counts in that time, it was stuck. Where a gyro hardly turns in all of a dwell, as an upright one at the equator, it may rest for a few
+// times what it has rested elsewhere.
+// Adds the stretches of a segment in which an axis gives one value for longer than it can. `rest_s`: of usual_rest_s().
+void find_stuck(const AxisSamples& a, double rate_hz, const std::vector<Segment>& segments, const Segment& s,
+                double rest_s, DataFault& fault) {
+  constexpr double least_gyro_s = 30.0, least_s = 1.0, accel_s = 2.0, counts = 8.0, few = 4.0;
+  const auto margin = static_cast<std::size_t>(rate_hz);  // a dwell's edge may hold part of a turn
+  const std::size_t first = s.first + margin, last = std::max(first, s.last - std::min(s.last, margin));
+  for (const auto& [start, end] : runs_of_one_value(a, first, last)) {
+    const double length_s = static_cast<double>(end - start) / rate_hz;
+    if (length_s <= least_s) {
+      continue;
+    }
+    const double departs = departure(a, segments, start, end);
+    const bool same = departs <= counts * a.count;
+    const bool left_behind = a.gyro && !s.rotation && std::isfinite(departs) && !same;
+    const bool zero = std::abs(a.value[start]) < 0.5 * a.count;
+    const double longest_s = !a.gyro ? accel_s : zero ? std::max(least_gyro_s, few * rest_s) : least_gyro_s;
+    if (left_behind || (length_s > longest_s && !same)) {
       fault.first_sample = fault.count == 0 ? start : fault.first_sample;
       fault.count += end - start;
-      fault.stretches.push_back({start, end, gyro});
+      fault.stretches.push_back({start, end, a.gyro});
     }
   }
 }
 
 void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std::vector<DataFault>& faults) {
   const std::vector<Segment> whole = {{.last = data.size()}};  // of accelerometers, whether the IMU turns or stands
+  const std::vector<Segment> inner = without_edges(segments, data.sample_rate_hz);
   for (std::size_t axis = 0; axis < 6; ++axis) {
-    const bool gyro = axis < 3;
-    const auto value = [&](std::size_t i) { return gyro ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3]; };
-    const double count = usual_step(1, data.size(), value);
-    const double rest_s = gyro ? usual_rest_s(data, segments, count, value) : 0.0;
+    const AxisSamples a = axis_samples(data, axis);
+    const double rest_s = a.gyro ? usual_rest_s(data, segments, a) : 0.0;
     DataFault fault{"frozen_axis", {}, 0, 0};
-    for (const Segment& s : gyro ? segments : whole) {
-      find_stuck(data, s, gyro, count, rest_s, value, fault);
+    for (const Segment& s : a.gyro ? segments : whole) {
+      find_stuck(a, data.sample_rate_hz, inner, s, rest_s, fault);
     }
     if (fault.count > 0) {
-      fault.words = std::string(gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +
+      fault.words = std::string(a.gyro ? "gyro " : "accelerometer ") + "xyz"[axis % 3] +
                     number(" gives one value for %.1f s", static_cast<double>(fault.count) / data.sample_rate_hz);
       faults.push_back(fault);
     }

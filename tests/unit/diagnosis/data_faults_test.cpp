@@ -126,5 +126,35 @@ TEST(DataFaults, AQuietGyroRestsAtACountAndItsCountsAreNoSpikes) {
   EXPECT_EQ(spike.front().id, "spike");
 }
 
+// Specific force of very nearly one count a sample: one value for seconds on end, again and again.
+TEST(DataFaults, AnAccelerometerRestsAtACount) {
+  Samples samples = quiet_and_coarse();
+  constexpr double rate_hz = 100.0, quantum = 5e-4;
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  double velocity = 0.0, counted = 0.0;
+  std::size_t longest = 0, run = 0;
+  for (auto& v : samples.velocity) {
+    velocity += 1.002 * quantum + 1e-5 / std::sqrt(rate_hz) * normal(random);
+    const double count = std::floor(velocity / quantum);
+    v[2] = (count - counted) * quantum;
+    run = count - counted == 1.0 ? run + 1 : 0;
+    longest = std::max(longest, run);
+    counted = count;
+  }
+  ASSERT_GT(longest, 300U);  // 3 s
+  const std::vector<DataFault> sound = samples.faults(0.0);
+  EXPECT_TRUE(sound.empty()) << sound.front().words;
+  // Stuck at another count than the rest of the dwell tells.
+  Samples stuck = samples;
+  for (std::size_t i = 40000; i < 41000; ++i) {
+    stuck.velocity[i][2] = 2.0 * quantum;
+  }
+  const std::vector<DataFault> told = stuck.faults(0.0);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told.front().id, "frozen_axis");
+  EXPECT_EQ(told.front().count, 1000U);
+}
+
 }  // namespace
 }  // namespace selfcal::diagnosis
