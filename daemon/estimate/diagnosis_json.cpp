@@ -187,6 +187,9 @@ ordered_json diagnosis_json(const diagnosis::Diagnosis& diagnosis, double false_
                       {"correlation", d.base_tilt->correlation},
                       {"apart_arcmin", 60.0 * d.base_tilt->apart / units::degree}};
   }
+  if (d.attitude_wanders > 0.0) {
+    j["attitude_wanders_mrad"] = 1e3 * d.attitude_wanders;
+  }
   if (d.read_out_delay) {
     j["read_out_delay"] = {{"delay_s", d.read_out_delay->delay_s}, {"sigma_s", d.read_out_delay->sigma_s}};
   }

@@ -117,6 +117,9 @@ struct Diagnosis {
   bool nothing_turned = false;
   std::optional<BaseTilt> base_tilt;  // then
   std::optional<ReadOutDelay> read_out_delay;
+  // By how much the gyros' noise turns the attitude in all of the recording (rad, 1 sigma), where that is so much that effects were not looked
+  // for in what the model explains; 0: they were. Along such an attitude what an effect makes holds the noise itself.
+  double attitude_wanders = 0.0;
   std::vector<DataFault> faults;
   std::vector<Finding> findings;   // best first
   std::vector<Finding> rejected;   // fitted best, but what remains says no

@@ -233,6 +233,11 @@ std::string diagnosis_text(const Diagnosis& of_catalogue, const Subject& subject
   if (!d.calibration.left_out.empty()) {
     text += left_out_text(d.calibration) + "\n";
   }
+  if (d.attitude_wanders > 0.0) {
+    text += fmt::format(
+        "the gyros' noise turns the attitude by {} mrad in this recording: weak effects are not looked for\n",
+        number_text(1e3 * d.attitude_wanders));
+  }
   if (d.read_out_delay) {
     text +=
         fmt::format("read-outs of the gimbal: {:.3g} +- {:.1g} s {} than the gyros; nothing is estimated from them\n\n",

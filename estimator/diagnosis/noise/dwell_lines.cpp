@@ -3,9 +3,13 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
+
+#include "estimator/diagnosis/noise/quantum_beat.hpp"
+#include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -13,6 +17,7 @@ namespace {
 constexpr double lowest_hz = 0.1, highest_hz = 2.0;
 constexpr double least_dwell_s = 30.0;
 constexpr double log_false_lines = -4.6;  // one false line in a hundred recordings
+constexpr double half_as_strong = 0.5;    // a beat that makes so much of a line is what it is
 constexpr Eigen::Index neighbours = 12;   // bins to either side whose median is the background
 
 struct Line {
@@ -140,6 +145,37 @@ Eigen::MatrixX3d force_of_tilt(const ImuData& data, const Segment& s) {
   return tilt;
 }
 
+// What the sensors' quanta make of their rates in a dwell. The tilt that is taken out of the force holds the gyros' too.
+class Beats {
+ public:
+  Beats(const ImuData& data, const Segment& s, const Quanta& quanta) {
+    const std::size_t half = (s.last - s.first) / 2;
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      const auto mean = [&](std::size_t first) {
+        double sum = 0.0;
+        for (std::size_t i = first; i < first + half; ++i) {
+          sum += axis < 3 ? data.delta_theta[i][axis] : data.delta_v[i][axis - 3];
+        }
+        return sum * data.sample_rate_hz / static_cast<double>(half);
+      };
+      const double before = mean(s.first), after = mean(s.first + half);
+      axes_[axis] = {0.5 * (before + after), 0.5 * std::abs(after - before), axis < 3 ? quanta.angle : quanta.velocity,
+                     data.sample_rate_hz};
+    }
+  }
+  bool hold(int axis, double frequency_hz, double amplitude, double width_hz) const {
+    bool any = beat_of_quantum(axes_[static_cast<std::size_t>(axis)], frequency_hz, amplitude, width_hz);
+    const double rate_of_tilt = 2.0 * std::numbers::pi * frequency_hz * amplitude / units::standard_gravity;
+    for (std::size_t gyro = 0; gyro < 3 && axis >= 3; ++gyro) {
+      any = any || beat_of_quantum(axes_[gyro], frequency_hz, rate_of_tilt, width_hz);
+    }
+    return any;
+  }
+
+ private:
+  std::array<CountedRate, 6> axes_;
+};
+
 void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, double resolution_hz) {
   const auto same = std::find_if(all.begin(), all.end(), [&](const VibrationLine& l) {
     return l.axis == line.axis && std::abs(l.frequency_hz - line.frequency_hz) < resolution_hz;
@@ -154,7 +190,8 @@ void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, 
 }  // namespace
 
 std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::vector<Segment>& segments,
-                                                AngleVelocity& delta_theta, AngleVelocity& delta_v) {
+                                                const Quanta& quanta, AngleVelocity& delta_theta,
+                                                AngleVelocity& delta_v) {
   std::vector<VibrationLine> all;
   const double fs = data.sample_rate_hz;
   for (const Segment& s : segments) {
@@ -163,6 +200,7 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
       continue;
     }
     const Eigen::MatrixX3d tilt = force_of_tilt(data, s);
+    const Beats beats(data, s, quanta);
     const double searched = 6.0 * static_cast<double>(segments.size()) * highest_hz * length;
     for (int axis = 0; axis < 6; ++axis) {
       AngleVelocity& increments = axis < 3 ? delta_theta : delta_v;
@@ -186,7 +224,8 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
       }
       for (std::size_t l = 0; l < lines.size(); ++l) {
         const double amplitude = size.segment<2>(static_cast<Eigen::Index>(2 * l)).norm();
-        keep_strongest(all, {axis, lines[l].frequency_hz, amplitude, lines[l].log_p}, 2.0 / length);
+        const bool beat = beats.hold(axis, lines[l].frequency_hz, half_as_strong * amplitude, 2.0 / length);
+        keep_strongest(all, {axis, lines[l].frequency_hz, amplitude, lines[l].log_p, beat}, 2.0 / length);
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
+#include "estimator/diagnosis/noise/quantum_beat.hpp"
 #include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::diagnosis {
@@ -70,6 +71,7 @@ using Spectrum = Eigen::ArrayXd;
 struct DwellSpectra {
   std::vector<Spectrum> dwells;  // mean of each
   std::vector<int> pieces;
+  std::vector<double> mean_rate, wanders;  // rad/s or m/s^2: of pieces, and how far they go from it
 };
 
 DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis, Eigen::Index piece) {
@@ -87,13 +89,15 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
   for (const Segment& s : segments) {
     Spectrum sum = Spectrum::Zero(piece / 2);
     const int count = pieces_of(s, piece, data.sample_rate_hz);
+    std::vector<double> rates;
     for (int k = 0; k < count; ++k) {
       const std::size_t first = s.first + margin + static_cast<std::size_t>(k * piece);
       for (Eigen::Index i = 0; i < piece; ++i) {
         const std::size_t at = first + static_cast<std::size_t>(i);
         x(i) = (axis < 3 ? data.delta_theta[at][axis] : data.delta_v[at][axis - 3]) / dt;
       }
-      x.array() -= x.mean();
+      rates.push_back(x.mean());
+      x.array() -= rates.back();
       x = x.cwiseProduct(window);
       fft.fwd(transform, x);
       sum += transform.head(piece / 2).array().abs2() * scale;
@@ -101,6 +105,9 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
     if (count > 0) {
       result.dwells.emplace_back(sum / count);
       result.pieces.push_back(count);
+      const auto [least, most] = std::minmax_element(rates.begin(), rates.end());
+      result.mean_rate.push_back(0.5 * (*least + *most));
+      result.wanders.push_back(0.5 * (*most - *least));
     }
   }
   return result;
@@ -143,34 +150,57 @@ AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
   return noise;
 }
 
-void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<VibrationLine>& lines) {
+// A sinusoid of amplitude a gives a^2 T/6 at the middle of Hann's bin (gain 2/3 of a T/4).
+double amplitude_of(double density, double piece_s) { return std::sqrt(6.0 * density / piece_s); }
+
+// Of a bin its density in each dwell where the beat of the quantum, half as strong or more, is not.
+std::vector<double> without_beats(const DwellSpectra& s, Eigen::Index bin, double quantum, double rate_hz) {
+  constexpr double half = 0.5, bins_wide = 2.0;
+  const double piece_s = static_cast<double>(2 * s.dwells.front().size()) / rate_hz;
+  std::vector<double> values;
+  for (std::size_t d = 0; d < s.dwells.size(); ++d) {
+    const double density = s.dwells[d](bin);
+    if (!beat_of_quantum({s.mean_rate[d], s.wanders[d], quantum, rate_hz}, static_cast<double>(bin) / piece_s,
+                         half * amplitude_of(density, piece_s), bins_wide / piece_s)) {
+      values.push_back(density);
+    }
+  }
+  return values;
+}
+
+void find_lines(const DwellSpectra& s, int axis, double rate_hz, double quantum, std::vector<VibrationLine>& lines) {
   const std::size_t dwells = s.dwells.size();
   const auto bins = s.dwells.front().size();
   const auto piece = static_cast<double>(2 * bins);
   const auto first = static_cast<Eigen::Index>(std::ceil(2.0 * lowest_hz * piece / rate_hz));
-  Spectrum middle(bins);
-  std::vector<double> values(dwells);
+  Spectrum middle = Spectrum::Zero(bins);  // median over the dwells
+  std::vector<std::size_t> told(static_cast<std::size_t>(bins));
   for (Eigen::Index b = 0; b < bins; ++b) {
-    for (std::size_t d = 0; d < dwells; ++d) {
-      values[d] = s.dwells[d](b);
+    std::vector<double> values = without_beats(s, b, quantum, rate_hz);
+    told[static_cast<std::size_t>(b)] = values.size();
+    if (2 * values.size() >= dwells) {
+      const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), at, values.end());
+      middle(b) = *at;
     }
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(dwells / 2), values.end());
-    middle(b) = values[dwells / 2];
   }
   // Spread of the median: 1.25 sigma/sqrt(dwells), sigma = 1/sqrt(pieces) of the mean; its tail taken as normal, and
   // so the limit below as 9 of them. The background is the median of the neighbourhood.
-  const double spread = 1.25 / std::sqrt(static_cast<double>(dwells) * s.pieces.front());
   constexpr Eigen::Index half = 20;
   for (Eigen::Index b = std::max(first, half); b + half < bins; ++b) {
+    if (!(middle(b) > 0.0)) {
+      continue;  // no dwell tells
+    }
     std::vector<double> around(middle.data() + b - half, middle.data() + b + half + 1);
-    std::nth_element(around.begin(), around.begin() + half, around.end());
-    const double background = around[half];
+    std::erase(around, 0.0);
+    std::nth_element(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2), around.end());
+    const double background = around[around.size() / 2];
+    const double spread = 1.25 / std::sqrt(static_cast<double>(told[static_cast<std::size_t>(b)]) * s.pieces.front());
     const double excess = middle(b) / background - 1.0;
     const bool peak = middle(b) >= middle(b - 1) && middle(b) > middle(b + 1);
     if (peak && excess > 9.0 * spread && excess > 0.8) {
       const double z = excess / spread;
-      // A sinusoid of amplitude a gives a^2 T/6 at the middle of Hann's bin (gain 2/3 of a T/4).
-      const double amplitude = std::sqrt(6.0 * (middle(b) - background) * rate_hz / piece);
+      const double amplitude = amplitude_of(middle(b) - background, piece / rate_hz);
       lines.push_back({axis, static_cast<double>(b) * rate_hz / piece, amplitude,
                        log_corrected(log_chi_squared_tail(z * z / 2.0, 1.0), 6.0 * static_cast<double>(bins))});
     }
@@ -179,7 +209,7 @@ void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<Vib
 
 }  // namespace
 
-NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& all) {
+NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& all, const Quanta& quanta) {
   const std::vector<Segment> segments = cut_where_few(all, data.sample_rate_hz);
   NoiseCheck check;
   const Eigen::Index length = piece_length(data.sample_rate_hz, segments);
@@ -195,7 +225,7 @@ NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& all) {
       return check;
     }
     check.axes[axis] = fit_noise(mean / check.pieces, check.pieces, 1.0 / data.sample_rate_hz);
-    find_lines(s, static_cast<int>(axis), data.sample_rate_hz, check.lines);
+    find_lines(s, static_cast<int>(axis), data.sample_rate_hz, axis < 3 ? quanta.angle : quanta.velocity, check.lines);
   }
   return check;
 }

@@ -29,6 +29,7 @@ struct VibrationLine {
   double frequency_hz = 0.0;
   double amplitude = 0.0;  // rad/s or m/s^2
   double log_p = 0.0;      // corrected for frequencies and axes
+  bool beat = false;       // of the quantum with the rate of the dwell in which it is strongest
 };
 
 constexpr int enough_noise_pieces = 20;
@@ -40,8 +41,8 @@ struct NoiseCheck {
 };
 
 // Periodograms of pieces of the dwells (Hann), shorter where the dwells are. White rate plus white angle are fitted where
-// lines are not; a line must stand out in the median over the dwells, so that the beat of a coarse quantum with a steady
-// rate, which moves with the attitude, is none.
-NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments);
+// lines are not; a line must stand out in the median over the dwells. The beat of a coarse quantum with a steady rate moves with the
+// attitude: where that of `quanta` would be as strong, a dwell tells nothing of lines, and where half of them tell nothing there is none.
+NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& segments, const Quanta& quanta = {});
 
 }  // namespace selfcal::diagnosis

@@ -106,7 +106,7 @@ std::vector<Finding> noise_findings(const CalibrationResult& calibration, const 
   for (const VibrationLine& line : noise.lines) {
     // The beat of the gyro's quantum with a steady rate makes lines of an angle of up to quantum/pi.
     const double beat = line.axis < 3 ? 2.0 * line.frequency_hz * calibration.gyro_quantum : 0.0;
-    if (line.log_p < log_threshold && line.amplitude > beat) {
+    if (line.log_p < log_threshold && !line.beat && line.amplitude > beat) {
       all.push_back(line_of(line));
     }
   }

@@ -62,7 +62,7 @@ const double amplitude_sigma =
 TEST(DwellLines, StrongLineIsFoundAndTakenOut) {
   const double amplitude = 50.0 * amplitude_sigma;
   Dwell dwell(amplitude);
-  const auto lines = subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity);
+  const auto lines = subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity);
   ASSERT_EQ(lines.size(), 1U);
   EXPECT_EQ(lines.front().axis, 5);
   // Between two bins of 1/60 Hz the peak is found to a tenth of one: the amplitude loses (pi/10)^2/6 = 1.6 %.
@@ -79,7 +79,7 @@ TEST(DwellLines, BiasStays) {
   for (const auto& v : dwell.velocity) {
     before += v[2] / length_s;
   }
-  subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity);
+  subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity);
   for (const auto& v : dwell.velocity) {
     after += v[2] / length_s;
   }
@@ -91,7 +91,7 @@ TEST(DwellLines, BiasStays) {
 TEST(DwellLines, WhatEndsWithinTheDwellIsNoLine) {
   Dwell dwell(150.0 * amplitude_sigma, length_s / 3.0);
   const AngleVelocity before = dwell.velocity;
-  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity).empty());
+  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity).empty());
   EXPECT_EQ(dwell.velocity, before);
 }
 
@@ -110,14 +110,14 @@ TEST(DwellLines, BaseThatTiltsToAndFroIsNoLine) {
   dwell.data.delta_theta = dwell.theta;
   dwell.data.delta_v = dwell.velocity;
   const AngleVelocity before = dwell.velocity;
-  subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity);
+  subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity);
   EXPECT_EQ(dwell.velocity, before);
 }
 
 TEST(DwellLines, NoiseAloneIsLeftAlone) {
   Dwell dwell(0.0);
   const AngleVelocity before = dwell.velocity;
-  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, dwell.theta, dwell.velocity).empty());
+  EXPECT_TRUE(subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity).empty());
   EXPECT_EQ(dwell.velocity, before);
 }
 

@@ -1,0 +1,25 @@
+#include "estimator/diagnosis/noise/quantum_beat.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace selfcal::diagnosis {
+
+bool beat_of_quantum(const CountedRate& counted, double frequency_hz, double amplitude, double width_hz) {
+  if (!(counted.quantum > 0.0) || !(amplitude > 0.0)) {
+    return false;
+  }
+  const double fs = counted.sample_rate_hz;
+  const double cycles_hz = std::abs(counted.mean_rate) / counted.quantum;
+  // Increments over the interval: of a sine of an angle the difference between its ends.
+  const double first = 2.0 * fs * counted.quantum / std::numbers::pi * std::sin(std::numbers::pi * frequency_hz / fs);
+  for (int k = 1; first >= amplitude * k; ++k) {
+    const double folded = std::abs(std::remainder(k * cycles_hz, fs));
+    if (std::abs(folded - frequency_hz) < width_hz + k * counted.wanders / counted.quantum) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace selfcal::diagnosis
