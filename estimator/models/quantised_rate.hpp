@@ -20,7 +20,8 @@ struct QuantisedRate {
 // Whittle's fit of white rate and white angle to the dwells below 1 Hz, beside the spectrum that the quantum has at each
 // dwell's rate. `increments` in rad are multiples of `quantum` rad whose remainders are carried on; `piece_s` is the length of a
 // piece of a dwell, `first_asd` > 0 a first guess within a factor of some hundreds. Harmonics of a fast rate (gravity's in counts) lie where the
-// dwell's mean tells them to less than a bin: bins in which the quantum has more than `most_hidden` of the rest are left out.
+// dwell's mean tells them to less than a bin: bins in which the quantum has more than `most_hidden` of the rest are left out, and
+// the first guess is the lower quartile of all bins.
 QuantisedRate fit_quantised_rate(std::span<const std::array<double, 3>> increments, double rate_hz,
                                  const std::vector<Segment>& segments, double quantum, double piece_s, double first_asd,
                                  double most_hidden = std::numeric_limits<double>::infinity());

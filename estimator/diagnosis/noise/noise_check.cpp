@@ -71,10 +71,11 @@ using Spectrum = Eigen::ArrayXd;
 struct DwellSpectra {
   std::vector<Spectrum> dwells;  // mean of each
   std::vector<int> pieces;
-  std::vector<double> mean_rate, wanders;  // rad/s or m/s^2: of pieces, and how far they go from it
+  std::vector<CountedRate> counted;  // from piece to piece
 };
 
-DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis, Eigen::Index piece) {
+DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, std::size_t axis, Eigen::Index piece,
+                     const Quanta& quanta) {
   DwellSpectra result;
   const double dt = 1.0 / data.sample_rate_hz;
   Eigen::VectorXd window(piece);
@@ -106,8 +107,8 @@ DwellSpectra spectra(const ImuData& data, const std::vector<Segment>& segments, 
       result.dwells.emplace_back(sum / count);
       result.pieces.push_back(count);
       const auto [least, most] = std::minmax_element(rates.begin(), rates.end());
-      result.mean_rate.push_back(0.5 * (*least + *most));
-      result.wanders.push_back(0.5 * (*most - *least));
+      result.counted.push_back({0.5 * (*least + *most), 0.5 * (*most - *least),
+                                axis < 3 ? quanta.angle : quanta.velocity, data.sample_rate_hz});
     }
   }
   return result;
@@ -154,21 +155,20 @@ AxisNoise fit_noise(const Spectrum& density, int pieces, double dt) {
 double amplitude_of(double density, double piece_s) { return std::sqrt(6.0 * density / piece_s); }
 
 // Of a bin its density in each dwell where the beat of the quantum, half as strong or more, is not.
-std::vector<double> without_beats(const DwellSpectra& s, Eigen::Index bin, double quantum, double rate_hz) {
+std::vector<double> without_beats(const DwellSpectra& s, Eigen::Index bin, double piece_s) {
   constexpr double half = 0.5, bins_wide = 2.0;
-  const double piece_s = static_cast<double>(2 * s.dwells.front().size()) / rate_hz;
   std::vector<double> values;
   for (std::size_t d = 0; d < s.dwells.size(); ++d) {
     const double density = s.dwells[d](bin);
-    if (!beat_of_quantum({s.mean_rate[d], s.wanders[d], quantum, rate_hz}, static_cast<double>(bin) / piece_s,
-                         half * amplitude_of(density, piece_s), bins_wide / piece_s)) {
+    if (!beat_of_quantum(s.counted[d], static_cast<double>(bin) / piece_s, half * amplitude_of(density, piece_s),
+                         bins_wide / piece_s)) {
       values.push_back(density);
     }
   }
   return values;
 }
 
-void find_lines(const DwellSpectra& s, int axis, double rate_hz, double quantum, std::vector<VibrationLine>& lines) {
+void find_lines(const DwellSpectra& s, int axis, double rate_hz, std::vector<VibrationLine>& lines) {
   const std::size_t dwells = s.dwells.size();
   const auto bins = s.dwells.front().size();
   const auto piece = static_cast<double>(2 * bins);
@@ -176,7 +176,7 @@ void find_lines(const DwellSpectra& s, int axis, double rate_hz, double quantum,
   Spectrum middle = Spectrum::Zero(bins);  // median over the dwells
   std::vector<std::size_t> told(static_cast<std::size_t>(bins));
   for (Eigen::Index b = 0; b < bins; ++b) {
-    std::vector<double> values = without_beats(s, b, quantum, rate_hz);
+    std::vector<double> values = without_beats(s, b, piece / rate_hz);
     told[static_cast<std::size_t>(b)] = values.size();
     if (2 * values.size() >= dwells) {
       const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -214,7 +214,7 @@ NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& all, con
   NoiseCheck check;
   const Eigen::Index length = piece_length(data.sample_rate_hz, segments);
   for (std::size_t axis = 0; axis < 6; ++axis) {
-    const DwellSpectra s = spectra(data, segments, axis, length);
+    const DwellSpectra s = spectra(data, segments, axis, length, quanta);
     Spectrum mean = Spectrum::Zero(length / 2);
     check.pieces = 0;
     for (std::size_t d = 0; d < s.dwells.size(); ++d) {
@@ -225,7 +225,7 @@ NoiseCheck check_noise(const ImuData& data, const std::vector<Segment>& all, con
       return check;
     }
     check.axes[axis] = fit_noise(mean / check.pieces, check.pieces, 1.0 / data.sample_rate_hz);
-    find_lines(s, static_cast<int>(axis), data.sample_rate_hz, axis < 3 ? quanta.angle : quanta.velocity, check.lines);
+    find_lines(s, static_cast<int>(axis), data.sample_rate_hz, check.lines);
   }
   return check;
 }
