@@ -10,6 +10,7 @@
 #include "estimator/discovery/class_average.hpp"
 #include "estimator/discovery/constant_spread.hpp"
 #include "estimator/discovery/departure.hpp"
+#include "estimator/discovery/explanation_cost.hpp"
 #include "estimator/discovery/known_form.hpp"
 #include "estimator/discovery/lack_of_fit.hpp"
 #include "estimator/discovery/law_class.hpp"
@@ -187,7 +188,16 @@ class LawSearch::Search {
 
   // Logarithm of the posterior probability, but for a constant.
   double log_posterior() const {
-    return -0.5 * residual_.model().square() - cost_of_processes() - cost_of_laws(state_);
+    return -0.5 * residual_.model().square() - cost_of_processes() - cost_of_laws(state_) - cost_of_sizes();
+  }
+
+  // Of each law's coefficient, which the rows show, and each process' size, which the dwells do.
+  double cost_of_sizes() const { return 0.5 * (sizes_of_laws() + sizes_of_processes(state_.processes.size())); }
+  double sizes_of_laws() const {
+    return cost_of_a_size(residual_.sums().sums.rows) * static_cast<double>(state_.terms.size());
+  }
+  double sizes_of_processes(std::size_t processes) const {
+    return cost_of_a_size(residual_.sums().dwells()) * static_cast<double>(processes);
   }
 
   double cost_of_processes() const {
@@ -205,7 +215,8 @@ class LawSearch::Search {
   // Whether the process costs more than all laws do, were the rest as they leave it: then no way that begins with it is the likelier
   // one, nor one with odds that are worth a word.
   bool laws_are_likelier(const ProcessFit& alone) const {
-    const double saved = cost_of_laws(state_) - std::log(options_.least_odds);
+    const double saved =
+        cost_of_laws(state_) + 0.5 * (sizes_of_laws() - sizes_of_processes(1)) - std::log(options_.least_odds);
     return !state_.terms.empty() &&
            alone.half_log_determinant + std::log(process_count) - 0.5 * absorbed(residual_.model(), alone) > saved;
   }

@@ -16,7 +16,7 @@ constexpr double far_likelier = 10.0;
 // `rows`: of the recording that is explained.
 double cost_of_laws(std::size_t laws, double rows);
 double cost_of_a_name(double rows);
-// Of a process' size, which so many draws show. What its freedom costs is in its likelihood.
+// Of a size that so many draws show: of a process, whose freedom costs in its likelihood, or of a law's coefficient alone.
 double cost_of_a_size(double draws);
 // Of a name's coefficients those count that the recording shows.
 double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double rows);

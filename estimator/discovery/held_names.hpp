@@ -24,7 +24,7 @@ class HeldNames {
   // Of sensors, in the order of `less.effects()`.
   const std::vector<const diagnosis::Effect*>& names() const { return names_; }
   double rows() const { return sums_.sums.rows; }
-  double dwells() const { return sums_.pieces.back().dwell + 1.0; }
+  double dwells() const { return sums_.dwells(); }
 
   // By how much more than the names for which `out` says so do, the best function makes the square fall in their place, all other names
   // fitted anew: found over the pieces, and where it may be `least` or more exactly, its constants free.

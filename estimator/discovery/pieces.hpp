@@ -38,6 +38,7 @@ struct PieceSums : NodeTable {
   std::vector<int> piece_of;  // [nodes]
   Eigen::VectorXd piece_dt;   // [pieces] s
 
+  double dwells() const { return pieces.back().dwell + 1.0; }  // of all recordings
   // Mean over each piece of a function given on the nodes, [pieces].
   Eigen::VectorXd means(const Eigen::Ref<const Eigen::ArrayXd>& on_nodes) const;
   // Those columns of one axis.
