@@ -143,6 +143,7 @@ ColumnSums project_out(const ColumnSums& sums, int first, int count, RowSink* ro
   left.score = sums.score(stay) - cross.transpose() * value;
   left.square = sums.square - score.dot(value);
   left.rows = sums.rows;
+  left.log_determinant = sums.log_determinant;
   left.shift = sums.shift(Eigen::all, stay) - shift * taken;
   left.pass = sums.pass;
   const int parameters = sums.pass.layout.parameters();
@@ -176,6 +177,7 @@ ColumnSums run_columns(const PassInput& input, const PassTrace& trace, ColumnSou
     carrier.propagate();
     for (int k = 0; k < observed; ++k, ++update) {
       carrier.update(trace.h[static_cast<std::size_t>(update->axis)], update->innovation, update->gain);
+      sums.log_determinant += std::log(update->innovation.variance);
     }
   }
   carrier.finish();

@@ -38,7 +38,8 @@ struct ColumnSums {
   Eigen::VectorXd score;        // [n]
   double square = 0.0;          // of the residual
   double rows = 0.0;
-  Eigen::MatrixXd shift;  // [24 x n] truth minus estimate of the 24 per unit of a column
+  double log_determinant = 0.0;  // of the innovations' covariance
+  Eigen::MatrixXd shift;         // [24 x n] truth minus estimate of the 24 per unit of a column
   PassOutput pass;
 };
 

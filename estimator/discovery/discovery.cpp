@@ -54,6 +54,7 @@ class LawSearch::Search {
     const ColumnSums& sums = residual_.sums().sums;
     result_.misfit_before = sums.square - sums.rows;
     result_.rows = sums.rows;
+    result_.log_determinant = sums.log_determinant;
     result_.functions_tried = residual_.dictionary().functions.size() * axis_count;
     for (const UnitRecording& recording : recordings) {
       empty_.fit.recordings.push_back(without_any_law(recording.calibration));

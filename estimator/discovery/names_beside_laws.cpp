@@ -48,10 +48,13 @@ struct Laws {
   }
 };
 
+double cost_in_words(const Discovery& found, const std::vector<ModelEffect>& names) {
+  return cost_of_laws(found.fit.terms.size(), found.rows) + found.cost_of_processes + cost_of_names(names, found.rows);
+}
+
+// Each explanation has the noise that its own recording shows: what is left out widens it.
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
-  // Each explanation has the noise that its own recording shows. What leaves less than that explains as well as another that does.
-  return std::max(0.0, found.misfit_after) + cost_of_laws(found.fit.terms.size(), found.rows) +
-         found.cost_of_processes + cost_of_names(names, found.rows);
+  return found.rows + found.misfit_after + found.log_determinant + cost_in_words(found, names);
 }
 
 // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
@@ -72,6 +75,13 @@ std::size_t strongest_of(const LawFit& fit) {
   }
   return strongest;
 }
+
+// What the catalogue says of a recording less some laws. Laws that were not fitted beside the names leave a part of themselves, for which the
+// names may have been rejected.
+struct Names {
+  Diagnosis of_rest;
+  bool rejected = false;
+};
 
 class Together {
  public:
@@ -109,18 +119,29 @@ class Together {
     return laws;
   }
 
-  // What the catalogue says of the recording less these laws.
-  std::optional<Diagnosis> without(const Laws& laws) const {
+  // What the catalogue says of the recording less these laws; none where it names nothing, not even what it rejects for nothing but what that
+  // leaves.
+  std::optional<Names> without(const Laws& laws) const {
     Scene scene({data_, diagnosis_.calibration});
     scene.table = collect_nodes(scene.motion, scene.input);
     const diagnosis::CorrectedRecording rest =
         without_laws(scene.motion, scene.table, scene.input, laws.terms, laws.coefficient);
     diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(rest.data(), of_catalogue_, progress_);
-    if (!outcome.diagnosis || outcome.diagnosis->unexplained || outcome.diagnosis->model.empty() ||
-        (names_process(diagnosis_) && names_process(*outcome.diagnosis))) {
+    if (!outcome.diagnosis) {
       return std::nullopt;
     }
-    return std::move(outcome.diagnosis);
+    Diagnosis& d = *outcome.diagnosis;
+    const bool rejected = d.rejected_by_remains_alone;
+    if (rejected) {
+      std::move(d.rejected.begin(), d.rejected.end(), std::back_inserter(d.findings));
+      std::move(d.rejected_model.begin(), d.rejected_model.end(), std::back_inserter(d.model));
+    } else if (d.unexplained) {
+      return std::nullopt;
+    }
+    if (d.model.empty() || (names_process(diagnosis_) && names_process(d))) {
+      return std::nullopt;
+    }
+    return Names{std::move(d), rejected};
   }
 
   // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them: no more of them than
@@ -161,6 +182,27 @@ class Together {
       return std::nullopt;
     }
     return NamesBesideLaws{std::move(named), std::move(*rest), std::move(laws)};
+  }
+
+  // A guess that was another than the laws found beside the names has bent these: less what was found, the catalogue may have others that say
+  // less.
+  std::optional<NamesBesideLaws> named_anew(const NamesBesideLaws& both, const std::string& forms_of_guess) const {
+    const Laws laws = Laws::fitted(both.laws.fit);
+    if (laws.terms.empty() || !both.laws.processes.empty() || laws.forms() == forms_of_guess) {
+      return std::nullopt;
+    }
+    const std::optional<Names> names = without(laws);
+    if (!names) {
+      return std::nullopt;
+    }
+    const auto is_other = [&](const ModelEffect& name) {
+      const std::vector<ModelEffect>& before = both.diagnosis.model;
+      return std::none_of(before.begin(), before.end(), [&](const ModelEffect& m) { return m.effect == name.effect; });
+    };
+    const std::vector<ModelEffect>& now = names->of_rest.model;
+    return std::any_of(now.begin(), now.end(), is_other)
+               ? answer(names->of_rest, laws.terms.size(), cost_of(both.laws, both.diagnosis.model))
+               : std::nullopt;
   }
 
  private:
@@ -316,13 +358,21 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   std::vector<ModelEffect> rejected;
   std::copy_if(d.rejected_model.begin(), d.rejected_model.end(), std::back_inserter(rejected),
                [](const ModelEffect& m) { return m.effect->sensor != nullptr; });
-  const double least = cost_of(alone, d.model);
+  const double least = std::max(0.0, alone.misfit_after) + cost_in_words(alone, d.model);
+  const double most_cost = cost_of(alone, d.model);
   const Laws laws_alone = Laws::fitted(alone.fit);
   std::vector<std::string> tried;
   const Guesses guesses(together, searched, rejected, laws_alone, strongest_of(alone.fit), !alone.processes.empty(),
                         !d.model.empty(), of_laws.stop);
+  // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
+  const auto answered = [&](const Laws& laws, const Diagnosis& of_rest) {
+    auto both = together.answer(of_rest, laws.terms.size(), most_cost);
+    auto mended = both ? together.named_anew(*both, laws.forms()) : std::nullopt;
+    return mended ? std::move(mended) : std::move(both);
+  };
+  std::vector<std::pair<Laws, Diagnosis>> rejected_names;  // asked where no guess has names that stand
   for (const auto& guess : guesses.all()) {
-    const std::optional<Laws> laws = guess();
+    std::optional<Laws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
       continue;
     }
@@ -332,13 +382,19 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
       continue;
     }
     tried.push_back(laws->forms());
-    const std::optional<Diagnosis> of_rest = together.without(*laws);
+    std::optional<Names> names = together.without(*laws);
     // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further.
-    if (!of_rest || cost + cost_of_names(of_rest->model, alone.rows) >= least) {
+    if (!names || cost + cost_of_names(names->of_rest.model, alone.rows) >= least) {
       continue;
     }
-    // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
-    if (auto both = together.answer(*of_rest, laws->terms.size(), least)) {
+    if (names->rejected) {
+      rejected_names.emplace_back(std::move(*laws), std::move(names->of_rest));
+    } else if (auto both = answered(*laws, names->of_rest)) {
+      return both;
+    }
+  }
+  for (const auto& [laws, of_rest] : rejected_names) {
+    if (auto both = of_laws.stop.stop_requested() ? std::nullopt : answered(laws, of_rest)) {
       return both;
     }
   }

@@ -244,6 +244,7 @@ PieceSums one_behind_the_other(const std::vector<PieceSums>& recordings) {
     all.sums.score.segment(columns, n) = one.sums.score;
     all.sums.square += one.sums.square;
     all.sums.rows += one.sums.rows;
+    all.sums.log_determinant += one.sums.log_determinant;
     all.channels.middleRows(nodes, one.channels.rows()) = one.channels;
     all.piece_dt.segment(pieces, one.piece_dt.size()) = one.piece_dt;
     all.nodes.insert(all.nodes.end(), one.nodes.begin(), one.nodes.end());
