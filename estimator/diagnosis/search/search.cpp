@@ -9,6 +9,7 @@
 #include "estimator/diagnosis/regression/multiplicity.hpp"
 #include "estimator/diagnosis/search/averaging.hpp"
 #include "estimator/diagnosis/search/bias_noise.hpp"
+#include "estimator/diagnosis/search/squares.hpp"
 #include "estimator/diagnosis/search/steps.hpp"
 #include "estimator/statistics/whiteness.hpp"
 
@@ -227,6 +228,26 @@ ParameterMatrix positive_part(const ParameterMatrix& matrix) {
   return root * root.transpose();
 }
 
+// Where squares of other axes are named: that they may be the square of the own one.
+void add_squares(const Stage& stage, const Hypothesis& reported, SearchResult& result) {
+  constexpr double of_the_class = 0.01;
+  for (std::size_t i = 0; i < reported.terms.size(); ++i) {
+    const Term& term = reported.terms[i];
+    if (!squares_of_others(*term.effect)) {
+      continue;
+    }
+    const SquaresAverage average = average_squares(
+        term, stage.model.rows().shift(Eigen::all, columns_of(stage.model.terms()[i])), stage.model.evidence().rows);
+    result.value += average.shift;
+    result.covariance += average.covariance;
+    const auto named = std::find_if(result.named.begin(), result.named.end(),
+                                    [&](const NamedTerm& n) { return n.effect == term.effect; });
+    if (average.own_square > of_the_class && named != result.named.end()) {
+      named->equivalent.push_back(&square_of_own());
+    }
+  }
+}
+
 // The 24 with the terms as reported, and as a mean over all explanations with its covariance.
 void report_parameters(const Stage& stage, const Hypothesis& reported, const Averages& averages, SearchResult& result) {
   const Eigen::MatrixXd& shift = stage.model.rows().shift;
@@ -249,6 +270,7 @@ void report_parameters(const Stage& stage, const Hypothesis& reported, const Ave
     result.value += S * forms.mean;
     result.covariance += S * forms.covariance * S.transpose();
   }
+  add_squares(stage, reported, result);
   const Eigen::MatrixXd S = shift(Eigen::all, columns);
   const ParameterMatrix as_named =
       stage.model.covariance() + S * stage.model.evidence().fit(columns).covariance * S.transpose();
