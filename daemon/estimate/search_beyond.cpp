@@ -82,7 +82,7 @@ std::optional<BeyondSearch> laws_in_their_place(std::span<const discovery::Diagn
     told = rivals->search.told();
   }
   const bool beside = rivals->names.empty();  // all names stay, and laws are told with them
-  if (likelier && (beside || explains(&*told))) {
+  if (likelier && !rivals->own_form && (beside || explains(&*told))) {
     first = std::move(rivals->without.front());
     first.unexplained = first.mismatch = true;
     return BeyondSearch{std::move(rivals->rest), std::move(*told)};

@@ -45,7 +45,7 @@ class NamesAgainstLaws {
   NamesAgainstLaws(std::span<const DiagnosedRecording> unit, const UnexplainedRest& less,
                    const DiscoveryOptions& of_laws, const Progress& progress)
       : unit_(unit), of_laws_(of_laws), progress_(progress), held_(less, of_laws.stop, progress) {
-    other_triad_ =
+    remainder_ =
         std::any_of(unit.begin(), unit.end(), [](const DiagnosedRecording& r) { return r.diagnosis.remainder; });
     const std::vector<diagnosis::ModelEffect> all = names_of(unit);
     for (const diagnosis::Effect* name : held_.names()) {
@@ -118,7 +118,9 @@ class NamesAgainstLaws {
                                : held_.beyond(out, found.fit.terms, {all_of(found.fit.terms)}).front() -
                                      dearer(out, found.fit.terms.size());
     const double log_odds = 0.5 * ahead;
-    return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds};
+    const bool own_form = std::any_of(found.fit.terms.begin(), found.fit.terms.end(),
+                                      [&](const LawTerm& law) { return of_a_remainder(out, law.axis); });
+    return LawsForNames{std::move(names), std::move(without), std::move(*rest), std::move(search), log_odds, own_form};
   }
 
   // In whose place `found` has laws.
@@ -220,16 +222,20 @@ class NamesAgainstLaws {
              return process.kind == ProcessKind::jump_per_turn && may_replace(out, process.axis);
            });
   }
-  // Whether a law of this axis may stand in the place of these names, or beside all of them.
+  // Whether a law of this axis may stand in the place of these names, or beside all of them. Beside a name with a remainder one of its own triad
+  // is that remainder.
   bool may_replace(const std::vector<bool>& out, int axis) const {
+    return !beside_all(out) || !of_a_remainder(std::vector<bool>(out.size(), true), axis);
+  }
+  // Whether it may be the true form of one of these names, which leaves a remainder.
+  bool of_a_remainder(const std::vector<bool>& out, int axis) const {
     const diagnosis::Triad own = axis < 3 ? diagnosis::Triad::gyro : diagnosis::Triad::accelerometer;
-    const bool beside = beside_all(out);
-    for (std::size_t k = 0; other_triad_ && k < out.size(); ++k) {
-      if ((beside || out[k]) && models_[k].effect->triad == own) {
-        return false;
+    for (std::size_t k = 0; remainder_ && k < out.size(); ++k) {
+      if (out[k] && models_[k].effect->triad == own) {
+        return true;
       }
     }
-    return true;
+    return false;
   }
   // Of choices of one name those that a law most probably replaces: a law each.
   std::optional<Choice> replaced_one_by_one(const std::vector<Choice>& all) const {
@@ -259,7 +265,7 @@ class NamesAgainstLaws {
   const DiscoveryOptions& of_laws_;
   const Progress& progress_;
   HeldNames held_;
-  bool other_triad_ = false;                    // of laws, for there is a remainder
+  bool remainder_ = false;                      // a name leaves one
   std::vector<diagnosis::ModelEffect> models_;  // [names]
 };
 

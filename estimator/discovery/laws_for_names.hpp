@@ -1,8 +1,9 @@
 // Laws in the place of names that leave nothing. Of a law that no catalogue holds an effect may make so much that the rest is lost in noise:
 // g-sensitivity takes up a law of the gimbal's angles, two names may take up one creep, and a second name a law beside a true effect. The
 // search is asked what it says of the recording with one of the names in it, with all of them, and with those that laws replace one by one.
-// A remainder is of a name whose form differs a little, and no law of the same sensors takes its place; one of the other triad may: a gyro
-// that follows rate and force moves the direction of gravity as products of two accelerometers do, all but a tenth. Offsets that are drawn anew
+// A remainder is of a name whose form differs a little. A law of the same sensors in its place may be that form (`own_form`): it is told, and the
+// 24 are held to both. One of the other triad is other physics: a gyro that follows rate and force moves the direction of gravity as products
+// of two accelerometers do, all but a tenth. Offsets that are drawn anew
 // at each turn may stand in a name's place as well: a weak name follows some of a few of them.
 #pragma once
 
@@ -20,6 +21,8 @@ struct LawsForNames {
   UnexplainedRest rest;                         // the recordings less the names that stay
   LawSearch search;                             // of that, fitted
   double log_odds = 0.0;  // of what it found against these names, each with its costs (explanation_cost.hpp)
+  // A law is of the triad of a name that leaves a remainder: it may be that name's own form, and is no other physics for its odds alone.
+  bool own_form = false;
 };
 
 // Whether names of sensors are all that the diagnosis says, a remainder aside: nothing else is left, and no process stands beside them.
