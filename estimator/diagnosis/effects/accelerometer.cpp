@@ -117,4 +117,7 @@ std::vector<Effect> accelerometer_effects() {
   return all;
 }
 
+bool has_squares_of_others(const Effect& effect) { return effect.sensor == cross_squares; }
+bool has_square_of_own(const Effect& effect) { return effect.sensor == quadratic; }
+
 }  // namespace selfcal::diagnosis

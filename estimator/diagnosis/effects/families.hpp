@@ -18,4 +18,8 @@ std::vector<Effect> after_turn_effects();
 Effect accel_warm_up();
 Effect gyro_warm_up();
 
+// What an accelerometer errs with by the squares of the other axes, two an accelerometer, and by that of its own.
+bool has_squares_of_others(const Effect& effect);
+bool has_square_of_own(const Effect& effect);
+
 }  // namespace selfcal::diagnosis

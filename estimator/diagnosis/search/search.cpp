@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
+#include "estimator/diagnosis/effects/families.hpp"
 #include "estimator/diagnosis/regression/multiplicity.hpp"
 #include "estimator/diagnosis/search/averaging.hpp"
 #include "estimator/diagnosis/search/bias_noise.hpp"
@@ -233,7 +234,7 @@ void add_squares(const Stage& stage, const Hypothesis& reported, SearchResult& r
   constexpr double of_the_class = 0.01;
   for (std::size_t i = 0; i < reported.terms.size(); ++i) {
     const Term& term = reported.terms[i];
-    if (!squares_of_others(*term.effect)) {
+    if (!has_squares_of_others(*term.effect)) {
       continue;
     }
     const SquaresAverage average = average_squares(
@@ -243,7 +244,7 @@ void add_squares(const Stage& stage, const Hypothesis& reported, SearchResult& r
     const auto named = std::find_if(result.named.begin(), result.named.end(),
                                     [&](const NamedTerm& n) { return n.effect == term.effect; });
     if (average.own_square > of_the_class && named != result.named.end()) {
-      named->equivalent.push_back(&square_of_own());
+      named->equivalent.push_back(&*std::find_if(catalogue().begin(), catalogue().end(), has_square_of_own));
     }
   }
 }

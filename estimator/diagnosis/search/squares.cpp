@@ -1,12 +1,10 @@
 #include "estimator/diagnosis/search/squares.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/search/bias_noise.hpp"
 
 namespace selfcal::diagnosis {
@@ -50,13 +48,6 @@ std::vector<Squares> explanations(const Eigen::Vector2d& x, const Eigen::Matrix2
 }
 
 }  // namespace
-
-bool squares_of_others(const Effect& effect) { return effect.id == "accel_cross_squares"; }
-
-const Effect& square_of_own() {
-  return *std::find_if(catalogue().begin(), catalogue().end(),
-                       [](const Effect& effect) { return effect.id == "accel_quadratic"; });
-}
 
 SquaresAverage average_squares(const Term& squares, const Eigen::MatrixXd& shift, double rows) {
   constexpr double log_prior_of_a_name = -1.0;

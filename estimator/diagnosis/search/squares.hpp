@@ -18,10 +18,6 @@ struct SquaresAverage {
   double own_square = 0.0;  // probability that some accelerometer errs with the square of its own force
 };
 
-// The effect with the squares of the other axes, two an accelerometer, and the one with the square of its own.
-bool squares_of_others(const Effect& effect);
-const Effect& square_of_own();
-
 // `squares`: of the effect with those of the other axes. `shift`: [24 x 6] of the 24 per typical size of each. `rows`: of
 // the evidence.
 SquaresAverage average_squares(const Term& squares, const Eigen::MatrixXd& shift, double rows);
