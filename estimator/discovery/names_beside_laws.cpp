@@ -144,6 +144,19 @@ class Together {
     return Names{std::move(d), rejected};
   }
 
+  // Beside names that the catalogue rejected: no more laws than `most_laws`, and no process.
+  std::optional<NamesBesideLaws> beside_rejected(const std::vector<ModelEffect>& names, std::size_t most_laws,
+                                                 double most_cost) const {
+    Diagnosis named = diagnosis_;
+    named.model = names;
+    std::erase_if(named.rejected, [&](const diagnosis::Finding& f) {
+      return std::none_of(names.begin(), names.end(), [&](const ModelEffect& m) { return m.effect == f.source; });
+    });
+    std::move(named.rejected.begin(), named.rejected.end(), std::back_inserter(named.findings));
+    auto both = answer(named, most_laws, most_cost);
+    return both && both->laws.processes.empty() ? std::move(both) : std::nullopt;
+  }
+
   // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them: no more of them than
   // `most_laws`, names and laws cheaper than `most_cost`.
   std::optional<NamesBesideLaws> answer(const Diagnosis& of_rest, std::size_t most_laws, double most_cost) const {
@@ -396,6 +409,20 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   for (const auto& [laws, of_rest] : rejected_names) {
     if (auto both = of_laws.stop.stop_requested() ? std::nullopt : answered(laws, of_rest)) {
       return both;
+    }
+  }
+  // A process may stand for all of what is there.
+  if (d.model.empty() && !alone.processes.empty() && !rejected.empty()) {
+    std::vector<std::vector<ModelEffect>> choices = {rejected};
+    if (rejected.size() > 1) {
+      choices.push_back({*strongest(rejected)});
+    }
+    for (const std::vector<ModelEffect>& names : choices) {
+      constexpr std::size_t most_laws = 2;
+      auto both = of_laws.stop.stop_requested() ? std::nullopt : together.beside_rejected(names, most_laws, most_cost);
+      if (both) {
+        return both;
+      }
     }
   }
   return std::nullopt;
