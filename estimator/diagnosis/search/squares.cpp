@@ -52,7 +52,7 @@ std::vector<Squares> explanations(const Eigen::Vector2d& x, const Eigen::Matrix2
 SquaresAverage average_squares(const Term& squares, const Eigen::MatrixXd& shift, double rows) {
   constexpr double log_prior_of_a_name = -1.0;
   std::array<std::vector<Squares>, accelerometers> of_axis;
-  for (int axis = 0; axis < accelerometers; ++axis) {
+  for (Eigen::Index axis = 0; axis < accelerometers; ++axis) {
     of_axis[static_cast<std::size_t>(axis)] =
         explanations(squares.amplitude.segment<2>(2 * axis), squares.covariance.block<2, 2>(2 * axis, 2 * axis));
   }
@@ -65,14 +65,14 @@ SquaresAverage average_squares(const Term& squares, const Eigen::MatrixXd& shift
         double log_weight = 0.0;
         bool own = false, others = false;
         ParameterVector moved = ParameterVector::Zero();
-        int axis = 0;
+        Eigen::Index axis = 0;
         for (const Squares* s : {&x, &y, &z}) {
           log_weight -= s->half_square + 0.5 * std::log(rows) * s->coefficients;
           own = own || s->own != 0.0;
           others = others || s->others;
           moved += shift.middleCols(2 * axis, 2) * (s->fitted - squares.amplitude.segment<2>(2 * axis));
           const EffectParameter& unit = squares.effect->parameters[static_cast<std::size_t>(2 * axis)];
-          moved(bias_of(accelerometers + axis)) -= s->own * unit.typical * unit.si_per_unit;
+          moved(bias_of(accelerometers + static_cast<int>(axis))) -= s->own * unit.typical * unit.si_per_unit;
           ++axis;
         }
         const double weight = std::exp(log_weight + log_prior_of_a_name * ((own ? 1.0 : 0.0) + (others ? 1.0 : 0.0)));
