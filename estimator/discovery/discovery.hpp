@@ -115,8 +115,7 @@ struct Discovery {
   std::optional<OtherExplanation> instead;         // of odds of DiscoveryOptions::least_odds or better
   double misfit_before = 0.0, misfit_after = 0.0;  // squares of the residuals beyond their number
   double rows = 0.0;
-  double log_determinant =
-      0.0;  // of the innovations' covariance: what leaves the same square in less noise is the likelier
+  double log_determinant = 0.0;     // of the innovations' covariance
   double cost_of_processes = 0.0;   // twice minus the logarithm of their probability, with what their freedom costs
   double log_p_remaining = 0.0;     // of the best function that was not taken, corrected for all that was tried
   std::string refused;              // the best function that did not predict what was left out; empty: none

@@ -67,4 +67,12 @@ diagnosis::Diagnosis without_names(diagnosis::Diagnosis d, std::span<const diagn
   });
 }
 
+diagnosis::Diagnosis with_rejected_names(diagnosis::Diagnosis d) {
+  d.findings.insert(d.findings.begin(), d.rejected.begin(), d.rejected.end());
+  d.rejected.clear();
+  d.model.insert(d.model.end(), d.rejected_model.begin(), d.rejected_model.end());
+  d.rejected_model.clear();
+  return d;
+}
+
 }  // namespace selfcal::discovery

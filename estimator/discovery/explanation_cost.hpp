@@ -25,5 +25,7 @@ double cost_of_names(const std::vector<diagnosis::ModelEffect>& names, double ro
 diagnosis::Diagnosis without_names(diagnosis::Diagnosis diagnosis);
 // The same where these effects are not named.
 diagnosis::Diagnosis without_names(diagnosis::Diagnosis diagnosis, std::span<const diagnosis::Effect* const> names);
+// The diagnosis as it is where all that was rejected is named, before what else it finds.
+diagnosis::Diagnosis with_rejected_names(diagnosis::Diagnosis diagnosis);
 
 }  // namespace selfcal::discovery

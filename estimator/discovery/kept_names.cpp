@@ -6,6 +6,7 @@
 
 #include "estimator/discovery/column_shares.hpp"
 #include "estimator/discovery/effect_columns.hpp"
+#include "estimator/discovery/explanation_cost.hpp"
 #include "estimator/discovery/scene.hpp"
 
 namespace selfcal::discovery {
@@ -110,10 +111,7 @@ void keep_rejected_names(diagnosis::Diagnosis& d, const Discovery& found) {
   remainder.share = std::min(1.0, remainder.sigma * remainder.sigma / std::max(1.0, found.misfit_before));
   remainder.forms = {{d.rejected_model.front().effect->id, "its form departs from the equation", remainder.share}};
   remainder.places = found.left->places;
-  d.findings.insert(d.findings.begin(), d.rejected.begin(), d.rejected.end());
-  d.rejected.clear();
-  d.model = std::move(d.rejected_model);
-  d.rejected_model.clear();
+  d = with_rejected_names(std::move(d));
   d.remainder = std::move(remainder);
   d.after.accepted = true;
   d.unexplained = false;

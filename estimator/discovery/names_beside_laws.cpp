@@ -76,6 +76,18 @@ std::size_t strongest_of(const LawFit& fit) {
   return strongest;
 }
 
+// The strongest of the equations that were rejected.
+const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
+  const auto found = std::max_element(names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) {
+    return square_of(a) < square_of(b);
+  });
+  return found == names.end() ? nullptr : &*found;
+}
+
+bool has(const std::vector<ModelEffect>& names, const diagnosis::Effect* effect) {
+  return std::any_of(names.begin(), names.end(), [effect](const ModelEffect& m) { return m.effect == effect; });
+}
+
 // What the catalogue says of a recording less some laws. Laws that were not fitted beside the names leave a part of themselves, for which the
 // names may have been rejected.
 struct Names {
@@ -133,8 +145,7 @@ class Together {
     Diagnosis& d = *outcome.diagnosis;
     const bool rejected = d.rejected_by_remains_alone;
     if (rejected) {
-      std::move(d.rejected.begin(), d.rejected.end(), std::back_inserter(d.findings));
-      std::move(d.rejected_model.begin(), d.rejected_model.end(), std::back_inserter(d.model));
+      d = with_rejected_names(std::move(d));
     } else if (d.unexplained) {
       return std::nullopt;
     }
@@ -144,17 +155,30 @@ class Together {
     return Names{std::move(d), rejected};
   }
 
-  // Beside names that the catalogue rejected: no more laws than `most_laws`, and no process.
-  std::optional<NamesBesideLaws> beside_rejected(const std::vector<ModelEffect>& names, std::size_t most_laws,
-                                                 double most_cost) const {
-    Diagnosis named = diagnosis_;
-    named.model = names;
-    std::erase_if(named.rejected, [&](const diagnosis::Finding& f) {
-      return std::none_of(names.begin(), names.end(), [&](const ModelEffect& m) { return m.effect == f.source; });
-    });
-    std::move(named.rejected.begin(), named.rejected.end(), std::back_inserter(named.findings));
-    auto both = answer(named, most_laws, most_cost);
-    return both && both->laws.processes.empty() ? std::move(both) : std::nullopt;
+  // Beside all equations that the catalogue rejected, or the strongest: two laws at most, and no process.
+  std::optional<NamesBesideLaws> beside_rejected(const std::vector<ModelEffect>& rejected, double most_cost) const {
+    constexpr std::size_t most_laws = 2;
+    const ModelEffect* name = strongest(rejected);
+    if (name == nullptr) {
+      return std::nullopt;
+    }
+    std::vector<std::vector<ModelEffect>> choices = {rejected};
+    if (rejected.size() > 1) {
+      choices.push_back({*name});
+    }
+    for (const std::vector<ModelEffect>& names : choices) {
+      if (of_laws_.stop.stop_requested()) {
+        break;
+      }
+      Diagnosis named = diagnosis_;
+      named.rejected_model = names;
+      std::erase_if(named.rejected, [&](const diagnosis::Finding& f) { return !has(names, f.source); });
+      auto both = answer(with_rejected_names(std::move(named)), most_laws, most_cost);
+      if (both && both->laws.processes.empty()) {
+        return both;
+      }
+    }
+    return std::nullopt;
   }
 
   // The names of `of_rest` in the words of the recording's own diagnosis, with the laws found beside them: no more of them than
@@ -208,14 +232,10 @@ class Together {
     if (!names) {
       return std::nullopt;
     }
-    const auto is_other = [&](const ModelEffect& name) {
-      const std::vector<ModelEffect>& before = both.diagnosis.model;
-      return std::none_of(before.begin(), before.end(), [&](const ModelEffect& m) { return m.effect == name.effect; });
-    };
     const std::vector<ModelEffect>& now = names->of_rest.model;
-    return std::any_of(now.begin(), now.end(), is_other)
-               ? answer(names->of_rest, laws.terms.size(), cost_of(both.laws, both.diagnosis.model))
-               : std::nullopt;
+    const bool others =
+        std::any_of(now.begin(), now.end(), [&](const ModelEffect& m) { return !has(both.diagnosis.model, m.effect); });
+    return others ? answer(names->of_rest, laws.terms.size(), cost_of(both.laws, both.diagnosis.model)) : std::nullopt;
   }
 
  private:
@@ -225,14 +245,6 @@ class Together {
   const DiscoveryOptions& of_laws_;
   const Progress& progress_;
 };
-
-// The strongest of the equations that were rejected.
-const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
-  const auto found = std::max_element(names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) {
-    return square_of(a) < square_of(b);
-  });
-  return found == names.end() ? nullptr : &*found;
-}
 
 // What to take out so that a name may stand: a first guess of which laws are none of the catalogue's. Cheapest first; empty ones are
 // passed over, and so are those in whose place no effect makes a part worth the name.
@@ -412,20 +424,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
     }
   }
   // A process may stand for all of what is there.
-  if (d.model.empty() && !alone.processes.empty() && !rejected.empty()) {
-    std::vector<std::vector<ModelEffect>> choices = {rejected};
-    if (rejected.size() > 1) {
-      choices.push_back({*strongest(rejected)});
-    }
-    for (const std::vector<ModelEffect>& names : choices) {
-      constexpr std::size_t most_laws = 2;
-      auto both = of_laws.stop.stop_requested() ? std::nullopt : together.beside_rejected(names, most_laws, most_cost);
-      if (both) {
-        return both;
-      }
-    }
-  }
-  return std::nullopt;
+  return d.model.empty() && !alone.processes.empty() ? together.beside_rejected(rejected, most_cost) : std::nullopt;
 }
 
 std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const Diagnosis& d,

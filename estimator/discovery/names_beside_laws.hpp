@@ -16,11 +16,12 @@ struct NamesBesideLaws {
 };
 
 // `alone`: what the search fitted on `searched`, the recording as it was calibrated, with nothing taken out. None where one law was
-// enough without a process, where no name stands, or where name and laws together say more than the laws alone. Names that the catalogue rejects for what
-// they leave are asked last, and where a process is told without any law taken out; names beside other laws than were taken out are asked for once more. A diagnosis and a search
-// each are made up to eight times, up to twelve where four laws and more stand alone. Where `diagnosis` has names, `alone` is of the recording
-// less these: then further names are looked for, in the place of laws that effects make, twice at most. A process that `diagnosis` names is
-// rejected: whoever asks sees to it that names and laws explain the recording without one.
+// enough without a process, where no name stands, or where name and laws together say more than the laws alone. Names that the catalogue
+// rejects for what they leave are asked last, and where a process is told without any law taken out; names beside other laws than were
+// taken out are asked for once more. A diagnosis and a search each are made up to eight times, up to twelve where four laws and more stand
+// alone. Where `diagnosis` has names, `alone` is of the recording less these: then further names are looked for, in the place of laws that
+// effects make, twice at most. A process that `diagnosis` names is rejected: whoever asks sees to it that names and laws explain the
+// recording without one.
 std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                                  const UnitRecording& searched, const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,

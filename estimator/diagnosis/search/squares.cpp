@@ -14,10 +14,9 @@ constexpr int accelerometers = 3;
 
 // One explanation of an accelerometer: b u_j^2 + c u_k^2 + a u_i^2, of which two at most are there.
 struct Squares {
-  Eigen::Vector2d fitted =
-      Eigen::Vector2d::Zero();  // what of b - a and c - a is left where some are zero, or both the same
-  double own = 0.0;             // a
-  double half_square = 0.0;     // of what it leaves
+  Eigen::Vector2d fitted = Eigen::Vector2d::Zero();  // b - a and c - a
+  double own = 0.0;                                  // a
+  double half_square = 0.0;                          // of what it leaves
   int coefficients = 0;
   bool others = false;  // b or c is there
 };
