@@ -134,8 +134,8 @@ void RecordingContext::remember_turns() {
     loads.push_back(std::move(of_load));
     travels.push_back(std::move(of_travel));
   }
-  load_memory_ = TurnMemory(std::move(loads));
-  travel_memory_ = TurnMemory(std::move(travels));
+  load_memory_ = TurnMemory(loads);
+  travel_memory_ = TurnMemory(travels);
 }
 
 std::size_t RecordingContext::segment_at(double t) const {
