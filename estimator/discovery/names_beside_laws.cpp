@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <utility>
 
 #include "estimator/discovery/catalogue_reach.hpp"
 #include "estimator/discovery/explanation_cost.hpp"
+#include "estimator/discovery/guessed_laws.hpp"
 #include "estimator/discovery/kept_names.hpp"
 #include "estimator/discovery/scene.hpp"
 
@@ -17,37 +17,6 @@ namespace {
 using diagnosis::Diagnosis;
 using diagnosis::ModelEffect;
 
-struct Laws {
-  std::vector<LawTerm> terms;
-  Eigen::VectorXd coefficient;  // in unit_of(axis)
-
-  // Without numbers: laws that differ by their constants alone are the same guess.
-  std::string forms() const {
-    std::string all;
-    for (const LawTerm& term : terms) {
-      std::string text = term.expression.text(term.constants) + ';';
-      std::erase_if(text, [](char c) { return c == '.' || c == 'e' || (c >= '0' && c <= '9'); });
-      all += static_cast<char>('a' + term.axis) + text;
-    }
-    return all;
-  }
-  static Laws fitted(const LawFit& fit) { return {fit.terms, fit.coefficient}; }
-  // Those for which `kept` says so.
-  template <typename Kept>
-  Laws where(Kept kept) const {
-    Laws some;
-    some.coefficient.resize(coefficient.size());
-    for (std::size_t k = 0; k < terms.size(); ++k) {
-      if (kept(k)) {
-        some.coefficient(static_cast<Eigen::Index>(some.terms.size())) = coefficient(static_cast<Eigen::Index>(k));
-        some.terms.push_back(terms[k]);
-      }
-    }
-    some.coefficient.conservativeResize(static_cast<Eigen::Index>(some.terms.size()));
-    return some;
-  }
-};
-
 double cost_in_words(const Discovery& found, const std::vector<ModelEffect>& names) {
   return cost_of_laws(found.fit.terms.size(), found.rows) + found.cost_of_processes + cost_of_names(names, found.rows);
 }
@@ -56,13 +25,6 @@ double cost_in_words(const Discovery& found, const std::vector<ModelEffect>& nam
 double cost_of(const Discovery& found, const std::vector<ModelEffect>& names) {
   return found.rows + found.misfit_after + found.log_determinant + cost_in_words(found, names);
 }
-
-// Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
-constexpr double least_share_of_laws = 0.3;
-// Of one law, that an effect makes of it in whose words it may be: constants of effects are tried at a few values.
-constexpr double nearly_all_of_a_law = 0.95;
-
-constexpr std::size_t many_laws = 4;
 
 std::size_t strongest_of(const LawFit& fit) {
   std::size_t strongest = 0;
@@ -76,19 +38,11 @@ std::size_t strongest_of(const LawFit& fit) {
   return strongest;
 }
 
-// The strongest of the equations that were rejected.
-const ModelEffect* strongest(const std::vector<ModelEffect>& names) {
-  const auto found = std::max_element(names.begin(), names.end(), [&](const ModelEffect& a, const ModelEffect& b) {
-    return square_of(a) < square_of(b);
-  });
-  return found == names.end() ? nullptr : &*found;
-}
-
 bool has(const std::vector<ModelEffect>& names, const diagnosis::Effect* effect) {
   return std::any_of(names.begin(), names.end(), [effect](const ModelEffect& m) { return m.effect == effect; });
 }
 
-// What the catalogue says of a recording less some laws. Laws that were not fitted beside the names leave a part of themselves, for which the
+// What the catalogue says of a recording less some laws. FittedLaws that were not fitted beside the names leave a part of themselves, for which the
 // names may have been rejected.
 struct Names {
   Diagnosis of_rest;
@@ -103,7 +57,7 @@ class Together {
 
   // What the search finds beside this name, fitted together with it. The name's size is that of a recording in which the law is: what
   // corrects it is no law.
-  std::optional<Laws> laws_beside(const ModelEffect& name) const {
+  std::optional<FittedLaws> laws_beside(const ModelEffect& name) const {
     Diagnosis as_named = diagnosis_;
     as_named.model = {name};
     as_named.findings.assign(1, {});
@@ -117,9 +71,9 @@ class Together {
     if (!search.fitted().processes.empty()) {
       return std::nullopt;
     }
-    const Laws all = Laws::fitted(search.fitted().fit);
+    const FittedLaws all = FittedLaws::fitted(search.fitted().fit);
     const std::vector<bool> made = made_by_effects(rest->recordings().front(), {name}, all.terms, of_laws_.stop);
-    Laws laws = all.where([&](std::size_t k) { return !made[k]; });
+    FittedLaws laws = all.where([&](std::size_t k) { return !made[k]; });
     if (laws.terms.empty()) {
       return std::nullopt;
     }
@@ -133,7 +87,7 @@ class Together {
 
   // What the catalogue says of the recording less these laws; none where it names nothing, not even what it rejects for nothing but what that
   // leaves.
-  std::optional<Names> without(const Laws& laws) const {
+  std::optional<Names> without(const FittedLaws& laws) const {
     Scene scene({data_, diagnosis_.calibration});
     scene.table = collect_nodes(scene.motion, scene.input);
     const diagnosis::CorrectedRecording rest =
@@ -224,7 +178,7 @@ class Together {
   // A guess that was another than the laws found beside the names has bent these: less what was found, the catalogue may have others that say
   // less.
   std::optional<NamesBesideLaws> named_anew(const NamesBesideLaws& both, const std::string& forms_of_guess) const {
-    const Laws laws = Laws::fitted(both.laws.fit);
+    const FittedLaws laws = FittedLaws::fitted(both.laws.fit);
     if (laws.terms.empty() || !both.laws.processes.empty() || laws.forms() == forms_of_guess) {
       return std::nullopt;
     }
@@ -246,128 +200,6 @@ class Together {
   const Progress& progress_;
 };
 
-// What to take out so that a name may stand: a first guess of which laws are none of the catalogue's. Cheapest first; empty ones are
-// passed over, and so are those in whose place no effect makes a part worth the name.
-class Guesses {
- public:
-  // `names`: some are named already, beside these laws.
-  Guesses(const Together& together, const UnitRecording& recording, const std::vector<ModelEffect>& rejected,
-          const Laws& alone, std::size_t strongest_law, bool processes, bool names, const std::stop_token& stop)
-      : together_(together),
-        recording_(recording),
-        rejected_(rejected),
-        alone_(alone),
-        processes_(processes),
-        stop_(stop) {
-    if (names) {
-      all_.emplace_back([this] { return not_made_by_any(); });
-      all_.emplace_back([this] { return not_made_best(); });
-      return;
-    }
-    all_.emplace_back([this] { return not_made_by_rejected(); });
-    all_.emplace_back([this] { return not_made_by_any(); });
-    if (const ModelEffect* name = strongest(rejected)) {
-      all_.emplace_back([this, name] { return beside(*name); });
-    }
-    // An effect of one triad may have been written as several laws of it.
-    const auto of_gyros = [&](std::size_t k) { return alone_.terms[k].axis < 3; };
-    const std::size_t laws = alone.terms.size();
-    std::size_t gyros = 0;
-    for (std::size_t k = 0; k < laws; ++k) {
-      gyros += of_gyros(k) ? 1 : 0;
-    }
-    if (gyros > 0 && gyros < laws) {
-      all_.emplace_back([this, of_gyros] { return where(of_gyros); });
-      all_.emplace_back([this, of_gyros] { return where([&](std::size_t k) { return !of_gyros(k); }); });
-    } else if (laws == 2) {
-      all_.emplace_back([this] { return where([](std::size_t k) { return k == 0; }); });
-      all_.emplace_back([this] { return where([](std::size_t k) { return k == 1; }); });
-    }
-    if (laws >= many_laws) {
-      add_for_many(strongest_law);
-    }
-  }
-  Guesses(const Guesses&) = delete;
-  Guesses& operator=(const Guesses&) = delete;
-  const std::vector<std::function<std::optional<Laws>()>>& all() const { return all_; }
-
- private:
-  // So many laws are rarely all there are: one of them may be a law and the others a description, or those of one axis an effect.
-  void add_for_many(std::size_t strongest_law) {
-    all_.emplace_back([this, strongest_law] { return where([&](std::size_t k) { return k == strongest_law; }); });
-    for (int axis = 0; axis < 6; ++axis) {
-      const auto there =
-          std::count_if(alone_.terms.begin(), alone_.terms.end(), [&](const LawTerm& l) { return l.axis == axis; });
-      if (there > 1) {
-        all_.emplace_back([this, axis] { return where([&](std::size_t k) { return alone_.terms[k].axis != axis; }); });
-      }
-    }
-  }
-  const CatalogueReach& reach() {
-    if (!reach_) {
-      reach_.emplace(recording_, alone_.terms, alone_.coefficient, stop_);
-    }
-    return *reach_;
-  }
-  std::optional<Laws> without_these(const std::vector<bool>& made) const {
-    const bool any = std::find(made.begin(), made.end(), true) != made.end();
-    return any ? std::optional(alone_.where([&](std::size_t k) { return !made[k]; })) : std::nullopt;
-  }
-  std::optional<Laws> not_made_by_rejected() const {
-    return without_these(made_by_effects(recording_, rejected_, alone_.terms, stop_));
-  }
-  // By no effect of the catalogue, alone or with the others of its axis: beside a strong law that nobody knew an effect may have been too weak
-  // to be rejected even.
-  std::optional<Laws> not_made_by_any() {
-    std::vector<bool> made;
-    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
-      made.push_back(share_of([k](std::size_t law) { return law == k; }) >= nearly_all_of_a_law ||
-                     share_of([&](std::size_t law) { return alone_.terms[law].axis == alone_.terms[k].axis; }) >=
-                         nearly_all_of_a_law);
-    }
-    return without_these(made);
-  }
-  // All but the one that an effect makes best.
-  std::optional<Laws> not_made_best() {
-    std::size_t best = 0;
-    double most = 0.0;
-    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
-      const double share = share_of([k](std::size_t law) { return law == k; });
-      best = share > most ? k : best;
-      most = std::max(most, share);
-    }
-    std::vector<bool> made(alone_.terms.size(), false);
-    made[best] = most >= nearly_all_of_a_law;
-    return without_these(made);
-  }
-  template <typename Of>
-  double share_of(Of of) {
-    std::vector<bool> those;
-    for (std::size_t k = 0; k < alone_.terms.size(); ++k) {
-      those.push_back(of(k));
-    }
-    return reach().share(those);
-  }
-  std::optional<Laws> beside(const ModelEffect& name) {
-    return !processes_ && reach().largest_share(*name.effect) < least_share_of_laws ? std::nullopt
-                                                                                    : together_.laws_beside(name);
-  }
-  template <typename Kept>
-  std::optional<Laws> where(Kept kept) {
-    const auto taken = [&kept](std::size_t k) { return !kept(k); };
-    return share_of(taken) < least_share_of_laws ? std::nullopt : std::optional(alone_.where(kept));
-  }
-
-  const Together& together_;
-  const UnitRecording& recording_;
-  const std::vector<ModelEffect>& rejected_;
-  const Laws& alone_;
-  bool processes_;  // beside the laws: they may stand for any part of a name
-  const std::stop_token& stop_;
-  std::vector<std::function<std::optional<Laws>()>> all_;
-  std::optional<CatalogueReach> reach_;
-};
-
 }  // namespace
 
 std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diagnosis& d, const UnitRecording& searched,
@@ -385,19 +217,21 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
                [](const ModelEffect& m) { return m.effect->sensor != nullptr; });
   const double least = std::max(0.0, alone.misfit_after) + cost_in_words(alone, d.model);
   const double most_cost = cost_of(alone, d.model);
-  const Laws laws_alone = Laws::fitted(alone.fit);
+  const FittedLaws laws_alone = FittedLaws::fitted(alone.fit);
   std::vector<std::string> tried;
-  const Guesses guesses(together, searched, rejected, laws_alone, strongest_of(alone.fit), !alone.processes.empty(),
-                        !d.model.empty(), of_laws.stop);
+  const LawGuesses guesses(
+      searched, rejected, laws_alone,
+      {.strongest_law = strongest_of(alone.fit), .processes = !alone.processes.empty(), .names = !d.model.empty()},
+      [&](const ModelEffect& name) { return together.laws_beside(name); }, of_laws.stop);
   // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
-  const auto answered = [&](const Laws& laws, const Diagnosis& of_rest) {
+  const auto answered = [&](const FittedLaws& laws, const Diagnosis& of_rest) {
     auto both = together.answer(of_rest, laws.terms.size(), most_cost);
     auto mended = both ? together.named_anew(*both, laws.forms()) : std::nullopt;
     return mended ? std::move(mended) : std::move(both);
   };
-  std::vector<std::pair<Laws, Diagnosis>> rejected_names;  // asked where no guess has names that stand
+  std::vector<std::pair<FittedLaws, Diagnosis>> rejected_names;  // asked where no guess has names that stand
   for (const auto& guess : guesses.all()) {
-    std::optional<Laws> laws = guess();
+    std::optional<FittedLaws> laws = guess();
     if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
       continue;
     }
@@ -430,7 +264,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
 std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const Diagnosis& d,
                                                       const UnitRecording& searched, const Discovery& beside,
                                                       const DiscoveryOptions& of_laws, const Progress& progress) {
-  const Laws found = Laws::fitted(beside.fit);
+  const FittedLaws found = FittedLaws::fitted(beside.fit);
   if (!(d.unexplained || names_process(d)) || d.model.empty() || found.terms.empty()) {
     return std::nullopt;
   }
