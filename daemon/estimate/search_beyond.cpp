@@ -133,6 +133,10 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
         return BeyondSearch{std::move(alone->rest), std::move(alone->laws)};
       }
     }
+    if (auto anew = discovery::named_anew(unit.front().data, first, search.fitted(), of_catalogue, of_laws, progress)) {
+      first = std::move(anew->diagnosis);
+      return BeyondSearch{std::move(anew->rest), std::move(anew->laws)};
+    }
   }
   discovery::Discovery told = search.told();
   BeyondSearch answer{std::move(*rest), std::move(told)};

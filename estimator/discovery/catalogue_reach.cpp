@@ -35,10 +35,10 @@ CatalogueReach::CatalogueReach(const UnitRecording& recording, const std::vector
   LawColumns of_laws(scene.motion, scene.table, laws, false);
   EffectColumns of_effects(scene.context, terms);
   TwoSources source(of_laws, of_effects);
-  sums_ = run_columns(scene.input, scene.trace, source, stop);
+  sums_ = run_beside(recording.beside, scene.context, scene.input, scene.trace, source, stop);
   int at = of_laws.count();
   for (const EffectTerm& term : terms) {
-    Variant variant{term.effect, std::vector<int>(static_cast<std::size_t>(term.count()))};
+    Variant variant{term.effect, term.constant, std::vector<int>(static_cast<std::size_t>(term.count()))};
     std::iota(variant.columns.begin(), variant.columns.end(), at);
     at += term.count();
     variants_.push_back(std::move(variant));
@@ -78,6 +78,40 @@ double CatalogueReach::largest_share(const diagnosis::Effect& effect) const {
     }
   }
   return largest;
+}
+
+std::vector<CatalogueReach::BesideOneLaw> CatalogueReach::beside_one_law() const {
+  std::vector<BesideOneLaw> best;
+  for (const Variant& variant : variants_) {
+    for (int law = 0; law < static_cast<int>(coefficient_.size()); ++law) {
+      std::vector<int> columns = variant.columns;
+      columns.push_back(law);
+      const double gain = gain_of(sums_, columns);
+      auto known = std::find_if(best.begin(), best.end(),
+                                [&](const BesideOneLaw& b) { return b.effect.effect == variant.effect; });
+      if (known != best.end() && known->gain >= gain) {
+        continue;
+      }
+      if (known == best.end()) {
+        known = best.insert(best.end(), BesideOneLaw{});
+      }
+      const Eigen::MatrixXd covariance =
+          sums_.information(columns, columns).completeOrthogonalDecomposition().pseudoInverse();
+      const auto sizes = static_cast<Eigen::Index>(variant.columns.size());
+      *known = {{variant.effect, variant.constant, (covariance * sums_.score(columns)).head(sizes),
+                 covariance.topLeftCorner(sizes, sizes)},
+                gain,
+                gain - gain_of(sums_, {law})};
+    }
+  }
+  std::stable_sort(best.begin(), best.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
+  return best;
+}
+
+double CatalogueReach::gain_of_laws() const {
+  std::vector<int> laws(static_cast<std::size_t>(coefficient_.size()));
+  std::iota(laws.begin(), laws.end(), 0);
+  return gain_of(sums_, laws);
 }
 
 }  // namespace selfcal::discovery

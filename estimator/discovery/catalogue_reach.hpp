@@ -1,10 +1,13 @@
-// How much of what laws make an effect of the catalogue can make: whether a name may stand in their place at all.
+// How much of what laws make an effect of the catalogue can make: whether a name may stand in their place at all. What is named already, and
+// was taken out, is projected out.
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <stop_token>
 #include <vector>
 
+#include "estimator/diagnosis/diagnosis.hpp"
 #include "estimator/diagnosis/effects/effect.hpp"
 #include "estimator/discovery/column_pass.hpp"
 #include "estimator/discovery/discovery.hpp"
@@ -22,9 +25,20 @@ class CatalogueReach {
   // The same of this effect, and of the sum that it makes best.
   double largest_share(const diagnosis::Effect& effect) const;
 
+  // An effect and one of the laws, both fitted anew: what the recording's square falls by, and by how much less for the law alone.
+  struct BesideOneLaw {
+    diagnosis::ModelEffect effect;
+    double gain = 0.0, more = 0.0;
+  };
+  // Each effect of a sensor with the constant and the law that go with it best, largest gain first.
+  std::vector<BesideOneLaw> beside_one_law() const;
+  // What the recording's square falls by where all laws are fitted anew.
+  double gain_of_laws() const;
+
  private:
   struct Variant {
     const diagnosis::Effect* effect = nullptr;
+    double constant = NAN;
     std::vector<int> columns;
   };
   double share(const Variant& variant, const Eigen::VectorXd& signature) const;

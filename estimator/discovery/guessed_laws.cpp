@@ -16,6 +16,11 @@ constexpr double nearly_all_of_a_law = 0.95;
 
 constexpr std::size_t many_laws = 4;
 
+// Of the effects that explain a recording best with one of the laws, so many are asked for beside laws. The square falls by so much more than
+// for the law alone, and by such a share of what all laws together make it fall by.
+constexpr std::size_t best_effects = 2;
+constexpr double least_more = 60.0, least_of_all_laws = 0.8;
+
 }  // namespace
 
 std::string FittedLaws::forms() const {
@@ -26,6 +31,12 @@ std::string FittedLaws::forms() const {
     all += static_cast<char>('a' + term.axis) + text;
   }
   return all;
+}
+
+bool FittedLaws::much_like(const FittedLaws& other) const {
+  constexpr double much = 0.2;
+  return forms() == other.forms() &&
+         ((coefficient - other.coefficient).array().abs() < much * other.coefficient.array().abs()).all();
 }
 
 FittedLaws FittedLaws::where(const std::function<bool(std::size_t)>& kept) const {
@@ -56,15 +67,18 @@ LawGuesses::LawGuesses(const UnitRecording& recording, const std::vector<ModelEf
       processes_(of.processes),
       laws_beside_(std::move(laws_beside)),
       stop_(stop) {
+  for (std::size_t place = 0; place < best_effects; ++place) {
+    beside_best_effects_.emplace_back([this, place] { return beside_best(place); });
+  }
   if (of.names) {
-    all_.emplace_back([this] { return not_made_by_any(); });
-    all_.emplace_back([this] { return not_made_best(); });
+    add([this] { return not_made_by_any(); });
+    add([this] { return not_made_best(); });
     return;
   }
-  all_.emplace_back([this] { return not_made_by_rejected(); });
-  all_.emplace_back([this] { return not_made_by_any(); });
+  add([this] { return not_made_by_rejected(); });
+  add([this] { return not_made_by_any(); });
   if (const ModelEffect* name = strongest(rejected)) {
-    all_.emplace_back([this, name] { return beside(*name); });
+    add([this, name] { return beside(*name); });
   }
   // An effect of one triad may have been written as several laws of it.
   const auto of_gyros = [&](std::size_t k) { return alone_.terms[k].axis < 3; };
@@ -74,25 +88,45 @@ LawGuesses::LawGuesses(const UnitRecording& recording, const std::vector<ModelEf
     gyros += of_gyros(k) ? 1 : 0;
   }
   if (gyros > 0 && gyros < laws) {
-    all_.emplace_back([this, of_gyros] { return where(of_gyros); });
-    all_.emplace_back([this, of_gyros] { return where([&](std::size_t k) { return !of_gyros(k); }); });
+    add([this, of_gyros] { return where(of_gyros); });
+    add([this, of_gyros] { return where([&](std::size_t k) { return !of_gyros(k); }); });
   } else if (laws == 2) {
-    all_.emplace_back([this] { return where([](std::size_t k) { return k == 0; }); });
-    all_.emplace_back([this] { return where([](std::size_t k) { return k == 1; }); });
+    add([this] { return where([](std::size_t k) { return k == 0; }); });
+    add([this] { return where([](std::size_t k) { return k == 1; }); });
   }
   if (laws >= many_laws) {
     add_for_many(of.strongest_law);
   }
 }
 
+void LawGuesses::add(std::function<std::optional<FittedLaws>()> choice) {
+  choices_.emplace_back([choice = std::move(choice)]() -> std::optional<LawGuess> {
+    std::optional<FittedLaws> laws = choice();
+    return laws ? std::optional<LawGuess>({std::move(*laws), {}}) : std::nullopt;
+  });
+}
+
+std::optional<LawGuess> LawGuesses::beside_best(std::size_t place) {
+  if (alone_.terms.empty()) {
+    return std::nullopt;
+  }
+  const std::vector<CatalogueReach::BesideOneLaw> best = reach().beside_one_law();
+  if (place >= best.size() || best[place].more < least_more ||
+      best[place].gain < least_of_all_laws * reach().gain_of_laws()) {
+    return std::nullopt;
+  }
+  std::optional<FittedLaws> laws = laws_beside_(best[place].effect);
+  return laws ? std::optional<LawGuess>({std::move(*laws), {best[place].effect.effect}}) : std::nullopt;
+}
+
 // So many laws are rarely all there are: one of them may be a law and the others a description, or those of one axis an effect.
 void LawGuesses::add_for_many(std::size_t strongest_law) {
-  all_.emplace_back([this, strongest_law] { return where([&](std::size_t k) { return k == strongest_law; }); });
+  add([this, strongest_law] { return where([&](std::size_t k) { return k == strongest_law; }); });
   for (int axis = 0; axis < 6; ++axis) {
     const auto there =
         std::count_if(alone_.terms.begin(), alone_.terms.end(), [&](const LawTerm& l) { return l.axis == axis; });
     if (there > 1) {
-      all_.emplace_back([this, axis] { return where([&](std::size_t k) { return alone_.terms[k].axis != axis; }); });
+      add([this, axis] { return where([&](std::size_t k) { return alone_.terms[k].axis != axis; }); });
     }
   }
 }

@@ -22,14 +22,23 @@ struct FittedLaws {
   Eigen::VectorXd coefficient;  // in unit_of(axis)
 
   static FittedLaws fitted(const LawFit& fit) { return {fit.terms, fit.coefficient}; }
-  // Without numbers: laws that differ by their constants alone are the same guess.
+  // Without numbers.
   std::string forms() const;
+  // Of the same forms, and of much the same sizes.
+  bool much_like(const FittedLaws& other) const;
   // Those for which `kept` says so.
   FittedLaws where(const std::function<bool(std::size_t)>& kept) const;
 };
 
 // Of the square of laws, that the best effect alone must make of it. A name may be several effects, and laws a poor likeness of it.
 constexpr double least_share_of_laws = 0.3;
+
+// Laws to take out, and the names beside which they were found where they are no choice among those that stand alone: what else the
+// catalogue would say of what is left is no matter.
+struct LawGuess {
+  FittedLaws laws;
+  std::vector<const diagnosis::Effect*> beside;
+};
 
 // The strongest of these effects; null: there is none.
 const diagnosis::ModelEffect* strongest(const std::vector<diagnosis::ModelEffect>& effects);
@@ -52,12 +61,19 @@ class LawGuesses {
   LawGuesses(const LawGuesses&) = delete;
   LawGuesses& operator=(const LawGuesses&) = delete;
 
-  const std::vector<std::function<std::optional<FittedLaws>()>>& all() const { return all_; }
+  using Guess = std::function<std::optional<LawGuess>()>;
+  // Some of the laws that stand alone.
+  const std::vector<Guess>& choices() const { return choices_; }
+  // What is found beside an effect that explains the recording best with one of the laws: of it the laws, or a process, may have made no
+  // likeness that the choices would see.
+  const std::vector<Guess>& beside_best_effects() const { return beside_best_effects_; }
 
  private:
   using Chosen = std::function<bool(std::size_t)>;
 
+  void add(std::function<std::optional<FittedLaws>()> choice);
   void add_for_many(std::size_t strongest_law);
+  std::optional<LawGuess> beside_best(std::size_t place);
   const CatalogueReach& reach();
   std::optional<FittedLaws> without_these(const std::vector<bool>& made) const;
   std::optional<FittedLaws> not_made_by_rejected() const;
@@ -73,7 +89,7 @@ class LawGuesses {
   bool processes_;
   LawsBeside laws_beside_;
   const std::stop_token& stop_;
-  std::vector<std::function<std::optional<FittedLaws>()>> all_;
+  std::vector<Guess> choices_, beside_best_effects_;
   std::optional<CatalogueReach> reach_;
 };
 

@@ -42,7 +42,11 @@ bool has(const std::vector<ModelEffect>& names, const diagnosis::Effect* effect)
   return std::any_of(names.begin(), names.end(), [effect](const ModelEffect& m) { return m.effect == effect; });
 }
 
-// What the catalogue says of a recording less some laws. FittedLaws that were not fitted beside the names leave a part of themselves, for which the
+bool has_others(const std::vector<ModelEffect>& names, const std::vector<ModelEffect>& than) {
+  return std::any_of(names.begin(), names.end(), [&](const ModelEffect& m) { return !has(than, m.effect); });
+}
+
+// What the catalogue says of a recording less some laws. Laws that were not fitted beside the names leave a part of themselves, for which the
 // names may have been rejected.
 struct Names {
   Diagnosis of_rest;
@@ -55,13 +59,12 @@ class Together {
            const DiscoveryOptions& of_laws, const Progress& progress)
       : data_(data), diagnosis_(diagnosis), of_catalogue_(of_catalogue), of_laws_(of_laws), progress_(progress) {}
 
-  // What the search finds beside this name, fitted together with it. The name's size is that of a recording in which the law is: what
-  // corrects it is no law.
+  // What the search finds beside this name and those that stand, fitted together with them. The name's size is that of a recording in which the
+  // law is: what corrects it is no law.
   std::optional<FittedLaws> laws_beside(const ModelEffect& name) const {
     Diagnosis as_named = diagnosis_;
-    as_named.model = {name};
-    as_named.findings.assign(1, {});
-    as_named.findings.front().source = name.effect;
+    as_named.model.push_back(name);
+    as_named.findings.emplace_back().source = name.effect;
     const DiagnosedRecording recording{data_, as_named};
     const auto rest = UnexplainedRest::of({&recording, 1}, of_laws_.stop);
     if (!rest) {
@@ -72,7 +75,8 @@ class Together {
       return std::nullopt;
     }
     const FittedLaws all = FittedLaws::fitted(search.fitted().fit);
-    const std::vector<bool> made = made_by_effects(rest->recordings().front(), {name}, all.terms, of_laws_.stop);
+    const std::vector<bool> made =
+        made_by_effects(rest->recordings().front(), as_named.model, all.terms, of_laws_.stop);
     FittedLaws laws = all.where([&](std::size_t k) { return !made[k]; });
     if (laws.terms.empty()) {
       return std::nullopt;
@@ -86,8 +90,8 @@ class Together {
   }
 
   // What the catalogue says of the recording less these laws; none where it names nothing, not even what it rejects for nothing but what that
-  // leaves.
-  std::optional<Names> without(const FittedLaws& laws) const {
+  // leaves. Of what it rejects for other things too, the names that stand already and those of `beside` alone, where these are all there.
+  std::optional<Names> without(const FittedLaws& laws, const std::vector<const diagnosis::Effect*>& beside = {}) const {
     Scene scene({data_, diagnosis_.calibration});
     scene.table = collect_nodes(scene.motion, scene.input);
     const diagnosis::CorrectedRecording rest =
@@ -97,7 +101,7 @@ class Together {
       return std::nullopt;
     }
     Diagnosis& d = *outcome.diagnosis;
-    const bool rejected = d.rejected_by_remains_alone;
+    const bool rejected = d.rejected_by_remains_alone || (d.unexplained && kept_of_rejected(d, beside));
     if (rejected) {
       d = with_rejected_names(std::move(d));
     } else if (d.unexplained) {
@@ -175,24 +179,37 @@ class Together {
     return NamesBesideLaws{std::move(named), std::move(*rest), std::move(laws)};
   }
 
-  // A guess that was another than the laws found beside the names has bent these: less what was found, the catalogue may have others that say
-  // less.
-  std::optional<NamesBesideLaws> named_anew(const NamesBesideLaws& both, const std::string& forms_of_guess) const {
-    const FittedLaws laws = FittedLaws::fitted(both.laws.fit);
-    if (laws.terms.empty() || !both.laws.processes.empty() || laws.forms() == forms_of_guess) {
+  // Names that were given before these laws were known may be bent by them: less what was found, the catalogue may have others that say less.
+  std::optional<NamesBesideLaws> named_anew(const std::vector<ModelEffect>& before, const Discovery& found) const {
+    const FittedLaws laws = FittedLaws::fitted(found.fit);
+    if (laws.terms.empty() || !found.processes.empty()) {
       return std::nullopt;
     }
     const std::optional<Names> names = without(laws);
     if (!names) {
       return std::nullopt;
     }
-    const std::vector<ModelEffect>& now = names->of_rest.model;
-    const bool others =
-        std::any_of(now.begin(), now.end(), [&](const ModelEffect& m) { return !has(both.diagnosis.model, m.effect); });
-    return others ? answer(names->of_rest, laws.terms.size(), cost_of(both.laws, both.diagnosis.model)) : std::nullopt;
+    return has_others(names->of_rest.model, before) ? answer(names->of_rest, laws.terms.size(), cost_of(found, before))
+                                                    : std::nullopt;
   }
 
  private:
+  // Whether the names that stand and these are rejected, which are all that is left of what is.
+  bool kept_of_rejected(Diagnosis& d, const std::vector<const diagnosis::Effect*>& beside) const {
+    const auto wanted = [&](const diagnosis::Effect* effect) {
+      return has(diagnosis_.model, effect) || std::find(beside.begin(), beside.end(), effect) != beside.end();
+    };
+    const auto there = [&](const diagnosis::Effect* effect) { return has(d.rejected_model, effect); };
+    const bool all = !beside.empty() && std::all_of(beside.begin(), beside.end(), there) &&
+                     std::all_of(diagnosis_.model.begin(), diagnosis_.model.end(),
+                                 [&](const ModelEffect& m) { return m.effect->sensor == nullptr || there(m.effect); });
+    if (all) {
+      std::erase_if(d.rejected_model, [&](const ModelEffect& m) { return !wanted(m.effect); });
+      std::erase_if(d.rejected, [&](const diagnosis::Finding& f) { return !wanted(f.source); });
+    }
+    return all;
+  }
+
   const ImuData& data_;
   const Diagnosis& diagnosis_;
   const diagnosis::DiagnosisOptions& of_catalogue_;
@@ -218,7 +235,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   const double least = std::max(0.0, alone.misfit_after) + cost_in_words(alone, d.model);
   const double most_cost = cost_of(alone, d.model);
   const FittedLaws laws_alone = FittedLaws::fitted(alone.fit);
-  std::vector<std::string> tried;
+  std::vector<LawGuess> tried;
   const LawGuesses guesses(
       searched, rejected, laws_alone,
       {.strongest_law = strongest_of(alone.fit), .processes = !alone.processes.empty(), .names = !d.model.empty()},
@@ -226,39 +243,59 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
   // Where the search finds more laws beside the names than were taken out, the names do not explain what stood in their place.
   const auto answered = [&](const FittedLaws& laws, const Diagnosis& of_rest) {
     auto both = together.answer(of_rest, laws.terms.size(), most_cost);
-    auto mended = both ? together.named_anew(*both, laws.forms()) : std::nullopt;
+    const bool bent = both && FittedLaws::fitted(both->laws.fit).forms() != laws.forms();
+    auto mended = bent ? together.named_anew(both->diagnosis.model, both->laws) : std::nullopt;
     return mended ? std::move(mended) : std::move(both);
   };
-  std::vector<std::pair<FittedLaws, Diagnosis>> rejected_names;  // asked where no guess has names that stand
-  for (const auto& guess : guesses.all()) {
-    std::optional<FittedLaws> laws = guess();
-    if (!laws || laws->terms.empty() || of_laws.stop.stop_requested()) {
-      continue;
+  const auto among = [&](const std::vector<LawGuesses::Guess>& those) -> std::optional<NamesBesideLaws> {
+    std::vector<std::pair<FittedLaws, Diagnosis>> rejected_names;  // asked where no guess has names that stand
+    for (const auto& made : those) {
+      std::optional<LawGuess> guess = made();
+      if (!guess || guess->laws.terms.empty() || of_laws.stop.stop_requested()) {
+        continue;
+      }
+      const double cost = cost_of_laws(guess->laws.terms.size(), alone.rows);
+      const bool known = std::any_of(tried.begin(), tried.end(), [&](const LawGuess& before) {
+        return guess->laws.much_like(before.laws) && guess->beside == before.beside;
+      });
+      if (known || cost + cost_of_a_name(alone.rows) >= least) {
+        continue;
+      }
+      tried.push_back(*guess);
+      std::optional<Names> names = together.without(guess->laws, guess->beside);
+      // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further, nor those that stand already.
+      if (!names || !has_others(names->of_rest.model, d.model) ||
+          cost + cost_of_names(names->of_rest.model, alone.rows) >= least) {
+        continue;
+      }
+      if (names->rejected) {
+        rejected_names.emplace_back(std::move(guess->laws), std::move(names->of_rest));
+      } else if (auto both = answered(guess->laws, names->of_rest)) {
+        return both;
+      }
     }
-    const double cost = cost_of_laws(laws->terms.size(), alone.rows);
-    if (std::find(tried.begin(), tried.end(), laws->forms()) != tried.end() ||
-        cost + cost_of_a_name(alone.rows) >= least) {
-      continue;
+    for (const auto& [laws, of_rest] : rejected_names) {
+      if (auto both = of_laws.stop.stop_requested() ? std::nullopt : answered(laws, of_rest)) {
+        return both;
+      }
     }
-    tried.push_back(laws->forms());
-    std::optional<Names> names = together.without(*laws);
-    // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further.
-    if (!names || cost + cost_of_names(names->of_rest.model, alone.rows) >= least) {
-      continue;
-    }
-    if (names->rejected) {
-      rejected_names.emplace_back(std::move(*laws), std::move(names->of_rest));
-    } else if (auto both = answered(*laws, names->of_rest)) {
-      return both;
-    }
-  }
-  for (const auto& [laws, of_rest] : rejected_names) {
-    if (auto both = of_laws.stop.stop_requested() ? std::nullopt : answered(laws, of_rest)) {
+    return std::nullopt;
+  };
+  for (const auto* those : {&guesses.choices(), &guesses.beside_best_effects()}) {
+    if (auto both = among(*those)) {
       return both;
     }
   }
   // A process may stand for all of what is there.
   return d.model.empty() && !alone.processes.empty() ? together.beside_rejected(rejected, most_cost) : std::nullopt;
+}
+
+std::optional<NamesBesideLaws> named_anew(const ImuData& data, const Diagnosis& d, const Discovery& beside,
+                                          const diagnosis::DiagnosisOptions& of_catalogue,
+                                          const DiscoveryOptions& of_laws, const Progress& progress) {
+  const bool any =
+      std::any_of(d.model.begin(), d.model.end(), [](const ModelEffect& m) { return m.effect->sensor != nullptr; });
+  return any ? Together(data, d, of_catalogue, of_laws, progress).named_anew(d.model, beside) : std::nullopt;
 }
 
 std::optional<NamesBesideLaws> laws_in_place_of_names(const ImuData& data, const Diagnosis& d,

@@ -17,15 +17,22 @@ struct NamesBesideLaws {
 
 // `alone`: what the search fitted on `searched`, the recording as it was calibrated, with nothing taken out. None where one law was
 // enough without a process, where no name stands, or where name and laws together say more than the laws alone. Names that the catalogue
-// rejects for what they leave are asked last, and where a process is told without any law taken out; names beside other laws than were
-// taken out are asked for once more. A diagnosis and a search each are made up to eight times, up to twelve where four laws and more stand
-// alone. Where `diagnosis` has names, `alone` is of the recording less these: then further names are looked for, in the place of laws that
-// effects make, twice at most. A process that `diagnosis` names is rejected: whoever asks sees to it that names and laws explain the
-// recording without one.
+// rejects for what they leave are asked after those that it gives; then the two effects that with one of the laws explain the recording best,
+// whatever else the catalogue would say of what is left; last, where a process is told, what was rejected without any law taken out. Names
+// beside other laws than were taken out are asked for once more. A diagnosis and a search each are made up to ten times, up to fourteen where
+// four laws and more stand alone. Where `diagnosis` has names, `alone` is of the recording less these: then further names are looked for, in the
+// place of laws that effects make and of those two effects. A process that `diagnosis` names is rejected: whoever asks sees to it that names and
+// laws explain the recording without one.
 std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                                  const UnitRecording& searched, const Discovery& alone,
                                                  const diagnosis::DiagnosisOptions& of_catalogue,
                                                  const DiscoveryOptions& of_laws, const Progress& progress = {});
+
+// Names of sensors that were given before laws were found beside them, asked once more of the recording less these: a field may be taken
+// for a g-sensitivity while a law is in the way. None where the catalogue has no others, or where names and laws say more then.
+std::optional<NamesBesideLaws> named_anew(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
+                                          const Discovery& beside, const diagnosis::DiagnosisOptions& of_catalogue,
+                                          const DiscoveryOptions& of_laws, const Progress& progress = {});
 
 // A name that takes up a part of a law is no physics of its own: g-sensitivity follows the mean of a creep that has the sign of a force,
 // and what the search finds beside it mends what it took too much. Where an effect that was named could make a part of the laws found

@@ -59,5 +59,18 @@ TEST(TurnMemory, OfSeveralTurnsIsTheirSum) {
   }
 }
 
+// However many time constants are asked for in between: each has its own past.
+TEST(TurnMemory, OfManyTimeConstantsEachIsItsOwn) {
+  const TurnMemory memory({{100.0, 0.1, {step, step}}, {200.0, 0.1, {-step}}});
+  for (int round = 0; round < 2; ++round) {
+    for (int k = 1; k <= 50; ++k) {
+      const double tau_s = 3.0 * k;
+      const auto left = [&](double since_s) { return std::exp(-since_s / tau_s); };
+      const double closed = tau_s * (left(150.0) - left(151.0) + left(149.9) - left(150.9) - left(50.0) + left(51.0));
+      EXPECT_NEAR((memory.integral(250.0, 251.0, tau_s) - step * closed).norm(), 0.0, 1e-12) << tau_s;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace selfcal::diagnosis

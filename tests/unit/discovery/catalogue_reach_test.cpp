@@ -8,6 +8,7 @@
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/diagnosis/ideal_recording.hpp"
+#include "estimator/discovery/scene.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::discovery {
@@ -33,16 +34,22 @@ LawTerm law(int axis, const std::string& expression) {
 // A creep on the z accelerometer, a cube of the force on x, and on the z gyro a strong wave that no effect has.
 class Reach : public testing::Test {
  protected:
-  static CatalogueReach of_three() {
-    const diagnosis::IdealRecording ideal(*named_schedule("horizontal", 60.0, 5.0), {0.02, -0.03, 0.6}, {0.7, 0.2, 0.0},
-                                          50.0);
+  static diagnosis::IdealRecording ideal() {
+    return {*named_schedule("horizontal", 60.0, 5.0), {0.02, -0.03, 0.6}, {0.7, 0.2, 0.0}, 50.0};
+  }
+  static CalibrationResult calibration_of(const diagnosis::IdealRecording& ideal) {
     CalibrationResult calibration;
     calibration.noise.gyro_arw = 0.001 * units::degree_per_sqrt_hour;
     calibration.noise.accel_vrw = 5.0 * units::micro_g_per_sqrt_hz;
     calibration.noise.observation.sigma = 3e-6;
     calibration.linearised_value.setZero();
     calibration.linearised_C_nb = ideal.C_nb_start();
-    return {{ideal.data(), calibration},
+    return calibration;
+  }
+  static CatalogueReach of_three() {
+    const diagnosis::IdealRecording recording = ideal();
+    const CalibrationResult calibration = calibration_of(recording);
+    return {{recording.data(), calibration},
             {law(5, "exp(-since/35)"), law(3, "fx**3"), law(2, "sin(2*pi*t/0.04)")},
             Eigen::Vector3d(60.0, 40.0, 5.0)};
   }
@@ -63,6 +70,32 @@ TEST_F(Reach, IsThatOfTheSum) {
   const CatalogueReach reach = of_three();
   EXPECT_LT(reach.share({true, false, true}), 0.3);
   EXPECT_EQ(reach.share({false, false, false}), 0.0);
+}
+
+// Both are concealed as laws: a cube of the force, which is an effect's, and a creep. A law that is not there stands in the place of the first.
+TEST_F(Reach, TheEffectThatExplainsARecordingBesideOneLaw) {
+  const diagnosis::IdealRecording recording = ideal();
+  const CalibrationResult calibration = calibration_of(recording);
+  const std::vector<LawTerm> there = {law(3, "fx**3"), law(5, "exp(-since/35)")};
+  const Eigen::Vector2d size(40.0, 60.0);  // ug
+  Scene scene({recording.data(), calibration});
+  scene.table = collect_nodes(scene.motion, scene.input);
+  const diagnosis::CorrectedRecording concealed = without_laws(scene.motion, scene.table, scene.input, there, -size);
+
+  const UnitRecording searched{concealed.data(), calibration};
+  const CatalogueReach reach(searched, {there[1], law(3, "exp(-since/200)*fx")}, Eigen::Vector2d(60.0, 10.0));
+  const std::vector<CatalogueReach::BesideOneLaw> best = reach.beside_one_law();
+  ASSERT_FALSE(best.empty());
+  EXPECT_EQ(best.front().effect.effect, &effect_of("accel_cubic"));
+  EXPECT_GT(best.front().gain, 1.2 * reach.gain_of_laws());
+  EXPECT_GT(best.front().more, 0.1 * best.front().gain);
+  // All of the recording: the laws that are there make no more of it.
+  const CatalogueReach by_truth(searched, there, size);
+  EXPECT_NEAR(best.front().gain / by_truth.gain_of_laws(), 1.0, 1e-6);
+  // Of that size: a cube of 1 g along x, in typical sizes.
+  const Eigen::Index x = 0;
+  const double typical = best.front().effect.effect->parameters.front().typical;
+  EXPECT_NEAR(best.front().effect.size(x) * typical, 40.0, 0.4);
 }
 
 }  // namespace
