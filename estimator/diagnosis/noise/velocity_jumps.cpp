@@ -76,7 +76,8 @@ struct Score {
     F.topLeftCorner(d, d) = step.Phi;
     F.topRightCorner(d, c) = step.Gamma;
     score = (F.transpose() * score).eval();
-    information = (F.transpose() * information * F).eval();
+    const MatrixX back = F.transpose() * information * F;
+    information = 0.5 * (back + back.transpose());  // what rounding makes unsymmetric would grow
   }
 };
 
