@@ -70,7 +70,7 @@ class LawSearch::Search {
     const bool may_stand_alone = significant(alone);
     take_laws();
     settle();
-    take_laws();
+    take_more_laws();
     bool process_left = significant(best_process());
     if (state_.terms.size() > 1 || process_left) {
       begin_with_two();
@@ -147,31 +147,44 @@ class LawSearch::Search {
     choose(state_.terms.size());
     exchange(state_.terms.size());
     settle();
-    take_laws();
+    take_more_laws();
     if (log_posterior_of_laws(state_) < log_posterior_of_laws(one_by_one)) {
       state_ = one_by_one;
       settle();
     }
   }
 
-  // About what the laws leave, exactly.
+  // About what the laws leave, exactly; beside the processes.
   void settle() {
     if (state_.terms.empty()) {
       residual_.put_back();
-      return;
+    } else {
+      said("what the laws leave", [&] { residual_.take_out(state_.fit); });
+      choose(state_.terms.size());
     }
-    said("what the laws leave", [&] { residual_.take_out(state_.fit); });
-    choose(state_.terms.size());
+    for (const ProcessFit& process : integrated_out_) {
+      residual_.model().integrate_out(process.columns, process.size * process.size);
+    }
+  }
+
+  // Beside those that are settled already: of one that is taken in addition the means of the pieces leave what a process could take up.
+  void take_more_laws() {
+    const std::size_t settled = state_.terms.size();
+    take_laws();
+    if (state_.terms.size() != settled) {
+      settle();
+    }
   }
 
   void processes_too() {
     take_processes();
     const SearchState laws_first = state_;
+    const std::vector<ProcessFit> beside_laws = std::exchange(integrated_out_, {});
     const double laws_first_posterior = log_posterior();
     state_ = empty_;
     residual_.put_back();
     take_processes();
-    take_laws();
+    take_more_laws();
     const double ahead = state_.processes.empty() ? -1.0 : log_posterior() - laws_first_posterior;
     if (!state_.processes.empty()) {
       result_.instead = ahead < 0.0 ? other_explanation(laws_first, state_, -ahead, options_.least_odds)
@@ -179,10 +192,13 @@ class LawSearch::Search {
     }
     if (ahead < 0.0) {
       state_ = laws_first;
+      integrated_out_ = beside_laws;
       if (state_.processes.empty()) {
         // What may stand in a law's place is asked of the recording with no process in it.
         residual_.renew();
         choose(state_.terms.size());
+      } else {
+        settle();
       }
     }
   }
@@ -229,6 +245,7 @@ class LawSearch::Search {
       state_.half_log_determinant += 0.5 * (before - residual_.model().square()) - process.log_likelihood_gain;
       state_.processes.push_back(
           {process.kind, process.axis, process.size, process.sigma, process.log_likelihood_gain, process.ahead});
+      integrated_out_.push_back(std::move(process));
     }
   }
 
@@ -437,6 +454,7 @@ class LawSearch::Search {
   Shortlist shortlist_;
   Discovery result_;
   SearchState empty_, state_;
+  std::vector<ProcessFit> integrated_out_;  // the processes of state_
 };
 
 LawSearch::LawSearch(std::span<const UnitRecording> recordings, const DiscoveryOptions& options,

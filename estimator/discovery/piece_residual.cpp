@@ -48,11 +48,14 @@ PieceSums PieceResidual::sum_whole() {
 
 PieceSums PieceResidual::sum_without(const LawFit& fit) const {
   std::vector<PieceSums> all;
-  for (const auto& scene : scenes_) {
+  for (std::size_t r = 0; r < scenes_.size(); ++r) {
+    const auto& scene = scenes_[r];
     const diagnosis::CorrectedRecording rest =
         without_laws(scene->motion, scene->table, scene->input, fit.terms, fit.coefficient);
     PassInput input = scene->input;
     input.data = &rest.data();
+    // Of a law that moves a scale factor by hundreds of ppm the second order would be left, which a process could take up.
+    input.parameters = fit.recordings[r].parameters;
     all.push_back(sum_over_pieces(scene->motion, input, trace_pass(input, stop_), scene->beside, stop_,
                                   pieces_of_each(scenes_.size())));
   }
