@@ -134,7 +134,6 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
       }
     }
     if (auto anew = discovery::named_anew(unit.front().data, first, search.fitted(), of_catalogue, of_laws, progress)) {
-      replace_process(anew->diagnosis, anew->laws);
       first = std::move(anew->diagnosis);
       return BeyondSearch{std::move(anew->rest), std::move(anew->laws)};
     }

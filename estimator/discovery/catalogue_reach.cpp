@@ -31,18 +31,30 @@ CatalogueReach::CatalogueReach(const UnitRecording& recording, const std::vector
     : coefficient_(coefficient) {
   Scene scene(recording);
   scene.table = collect_nodes(scene.motion, scene.input);
-  const std::vector<EffectTerm> terms = all_effects(scene.context.has_temperature());
+  std::vector<EffectTerm> terms(recording.beside.begin(), recording.beside.end());
+  const std::vector<EffectTerm> all = all_effects(scene.context.has_temperature());
+  terms.insert(terms.end(), all.begin(), all.end());
   LawColumns of_laws(scene.motion, scene.table, laws, false);
   EffectColumns of_effects(scene.context, terms);
   TwoSources source(of_laws, of_effects);
-  sums_ = run_beside(recording.beside, scene.context, scene.input, scene.trace, source, stop);
+  sums_ = run_columns(scene.input, scene.trace, source, stop);
   int at = of_laws.count();
-  for (const EffectTerm& term : terms) {
-    Variant variant{term.effect, term.constant, std::vector<int>(static_cast<std::size_t>(term.count()))};
-    std::iota(variant.columns.begin(), variant.columns.end(), at);
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    const EffectTerm& term = terms[k];
+    std::vector<int> columns(static_cast<std::size_t>(term.count()));
+    std::iota(columns.begin(), columns.end(), at);
     at += term.count();
-    variants_.push_back(std::move(variant));
+    if (k < recording.beside.size()) {
+      named_.insert(named_.end(), columns.begin(), columns.end());
+    } else {
+      variants_.push_back({term.effect, term.constant, std::move(columns)});
+    }
   }
+}
+
+double CatalogueReach::gain_beside_named(std::vector<int> columns) const {
+  columns.insert(columns.end(), named_.begin(), named_.end());
+  return gain_of(sums_, columns) - gain_of(sums_, named_);
 }
 
 double CatalogueReach::share(const Variant& variant, const Eigen::VectorXd& signature) const {
@@ -86,7 +98,7 @@ std::vector<CatalogueReach::BesideOneLaw> CatalogueReach::beside_one_law() const
     for (int law = 0; law < static_cast<int>(coefficient_.size()); ++law) {
       std::vector<int> columns = variant.columns;
       columns.push_back(law);
-      const double gain = gain_of(sums_, columns);
+      const double gain = gain_beside_named(columns);
       auto known = std::find_if(best.begin(), best.end(),
                                 [&](const BesideOneLaw& b) { return b.effect.effect == variant.effect; });
       if (known != best.end() && known->gain >= gain) {
@@ -95,13 +107,14 @@ std::vector<CatalogueReach::BesideOneLaw> CatalogueReach::beside_one_law() const
       if (known == best.end()) {
         known = best.insert(best.end(), BesideOneLaw{});
       }
+      columns.insert(columns.end(), named_.begin(), named_.end());
       const Eigen::MatrixXd covariance =
           sums_.information(columns, columns).completeOrthogonalDecomposition().pseudoInverse();
       const auto sizes = static_cast<Eigen::Index>(variant.columns.size());
       *known = {{variant.effect, variant.constant, (covariance * sums_.score(columns)).head(sizes),
                  covariance.topLeftCorner(sizes, sizes)},
                 gain,
-                gain - gain_of(sums_, {law})};
+                gain - gain_beside_named({law})};
     }
   }
   std::stable_sort(best.begin(), best.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
@@ -111,7 +124,7 @@ std::vector<CatalogueReach::BesideOneLaw> CatalogueReach::beside_one_law() const
 double CatalogueReach::gain_of_laws() const {
   std::vector<int> laws(static_cast<std::size_t>(coefficient_.size()));
   std::iota(laws.begin(), laws.end(), 0);
-  return gain_of(sums_, laws);
+  return gain_beside_named(laws);
 }
 
 }  // namespace selfcal::discovery

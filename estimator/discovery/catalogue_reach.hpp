@@ -1,5 +1,5 @@
-// How much of what laws make an effect of the catalogue can make: whether a name may stand in their place at all. What is named already, and
-// was taken out, is projected out.
+// How much of what laws make an effect of the catalogue can make: whether a name may stand in their place at all; and what effects and laws together
+// make of the recording.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,14 +25,15 @@ class CatalogueReach {
   // The same of this effect, and of the sum that it makes best.
   double largest_share(const diagnosis::Effect& effect) const;
 
-  // An effect and one of the laws, both fitted anew: what the recording's square falls by, and by how much less for the law alone.
+  // An effect and one of the laws, both fitted anew beside what is named and was taken out (`recording.beside`): what the recording's square
+  // falls by, and by how much less for the law alone.
   struct BesideOneLaw {
     diagnosis::ModelEffect effect;
     double gain = 0.0, more = 0.0;
   };
   // Each effect of a sensor with the constant and the law that go with it best, largest gain first.
   std::vector<BesideOneLaw> beside_one_law() const;
-  // What the recording's square falls by where all laws are fitted anew.
+  // What the recording's square falls by where all laws are fitted anew, beside the same.
   double gain_of_laws() const;
 
  private:
@@ -42,9 +43,11 @@ class CatalogueReach {
     std::vector<int> columns;
   };
   double share(const Variant& variant, const Eigen::VectorXd& signature) const;
+  double gain_beside_named(std::vector<int> columns) const;
 
   Eigen::VectorXd coefficient_;
   std::vector<Variant> variants_;
+  std::vector<int> named_;  // columns of recording.beside
   ColumnSums sums_;
 };
 

@@ -89,23 +89,18 @@ class Together {
     return laws;
   }
 
-  // What the catalogue says of the recording less these laws.
-  std::optional<Diagnosis> of_rest(const FittedLaws& laws) const {
+  // What the catalogue says of the recording less these laws; none where it names nothing, not even what it rejects for nothing but what that
+  // leaves. Of what it rejects for other things too, the names that stand already and those of `beside` alone, where these are all there.
+  std::optional<Names> without(const FittedLaws& laws, const std::vector<const diagnosis::Effect*>& beside = {}) const {
     Scene scene({data_, diagnosis_.calibration});
     scene.table = collect_nodes(scene.motion, scene.input);
     const diagnosis::CorrectedRecording rest =
         without_laws(scene.motion, scene.table, scene.input, laws.terms, laws.coefficient);
-    return std::move(diagnosis::diagnose(rest.data(), of_catalogue_, progress_).diagnosis);
-  }
-
-  // The names in it; none where nothing is named, not even what is rejected for nothing but what that leaves. Of what is rejected for other
-  // things too, the names that stand already and those of `beside` alone, where these are all there.
-  std::optional<Names> names_in(std::optional<Diagnosis> said,
-                                const std::vector<const diagnosis::Effect*>& beside = {}) const {
-    if (!said) {
+    diagnosis::DiagnosisOutcome outcome = diagnosis::diagnose(rest.data(), of_catalogue_, progress_);
+    if (!outcome.diagnosis) {
       return std::nullopt;
     }
-    Diagnosis& d = *said;
+    Diagnosis& d = *outcome.diagnosis;
     const bool rejected = d.rejected_by_remains_alone || (d.unexplained && kept_of_rejected(d, beside));
     if (rejected) {
       d = with_rejected_names(std::move(d));
@@ -184,46 +179,20 @@ class Together {
     return NamesBesideLaws{std::move(named), std::move(*rest), std::move(laws)};
   }
 
-  // Names that were given before these laws were known may be bent by them: less what was found, the catalogue may have others that say less,
-  // or none.
+  // Names that were given before these laws were known may be bent by them: less what was found, the catalogue may have others that say less.
   std::optional<NamesBesideLaws> named_anew(const std::vector<ModelEffect>& before, const Discovery& found) const {
     const FittedLaws laws = FittedLaws::fitted(found.fit);
     if (laws.terms.empty() || !found.processes.empty()) {
       return std::nullopt;
     }
-    std::optional<Diagnosis> said = of_rest(laws);
-    if (said && said->model.empty() && !said->unexplained && !names_process(*said)) {
-      return laws_alone(laws.terms.size());
-    }
-    const std::optional<Names> names = names_in(std::move(said));
-    if (!names) {
+    const std::optional<Names> names = without(laws);
+    if (!names || !has_others(names->of_rest.model, before)) {
       return std::nullopt;
     }
-    return has_others(names->of_rest.model, before) ? answer(names->of_rest, laws.terms.size(), cost_of(found, before))
-                                                    : std::nullopt;
+    return answer(names->of_rest, laws.terms.size(), cost_of(found, before));
   }
 
  private:
-  // Without a name; so many at most, and no process.
-  std::optional<NamesBesideLaws> laws_alone(std::size_t most_laws) const {
-    Diagnosis unnamed = without_names(diagnosis_);
-    unnamed.unexplained = unnamed.mismatch = true;
-    const DiagnosedRecording recording{data_, unnamed};
-    auto rest = UnexplainedRest::of({&recording, 1}, of_laws_.stop);
-    if (!rest) {
-      return std::nullopt;
-    }
-    LawSearch search(rest->recordings(), of_laws_, progress_);
-    if (search.fitted().fit.terms.size() > most_laws || !search.fitted().processes.empty()) {
-      return std::nullopt;
-    }
-    Discovery laws = search.told();
-    if (laws.laws.empty() || !laws.described.empty()) {
-      return std::nullopt;
-    }
-    return NamesBesideLaws{std::move(unnamed), std::move(*rest), std::move(laws)};
-  }
-
   // Whether the names that stand and these are rejected, which are all that is left of what is.
   bool kept_of_rejected(Diagnosis& d, const std::vector<const diagnosis::Effect*>& beside) const {
     const auto wanted = [&](const diagnosis::Effect* effect) {
@@ -292,7 +261,7 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diag
         continue;
       }
       tried.push_back(*guess);
-      std::optional<Names> names = together.names_in(together.of_rest(guess->laws), guess->beside);
+      std::optional<Names> names = together.without(guess->laws, guess->beside);
       // Names that say more, beside the laws that were taken out, than the laws alone do are not looked at further, nor those that stand already.
       if (!names || !has_others(names->of_rest.model, d.model) ||
           cost + cost_of_names(names->of_rest.model, alone.rows) >= least) {

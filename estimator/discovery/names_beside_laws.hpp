@@ -29,8 +29,8 @@ std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const diag
                                                  const DiscoveryOptions& of_laws, const Progress& progress = {});
 
 // Names of sensors that were given before laws were found beside them, asked once more of the recording less these: a field may be taken
-// for a g-sensitivity while a law is in the way. Where nothing is named then, the laws stand alone. None where the catalogue has no other
-// names, or where names and laws say more then.
+// for a g-sensitivity while a law is in the way. None where the catalogue has no others, or where names and laws say more
+// then.
 std::optional<NamesBesideLaws> named_anew(const ImuData& data, const diagnosis::Diagnosis& diagnosis,
                                           const Discovery& beside, const diagnosis::DiagnosisOptions& of_catalogue,
                                           const DiscoveryOptions& of_laws, const Progress& progress = {});
