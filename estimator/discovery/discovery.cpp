@@ -193,13 +193,9 @@ class LawSearch::Search {
     if (ahead < 0.0) {
       state_ = laws_first;
       integrated_out_ = beside_laws;
-      if (state_.processes.empty()) {
-        // What may stand in a law's place is asked of the recording with no process in it.
-        residual_.renew();
-        choose(state_.terms.size());
-      } else {
-        settle();
-      }
+      residual_
+          .put_back();  // what may stand in a law's place is asked of the recording without the other way's processes
+      settle();
     }
   }
 
