@@ -229,6 +229,16 @@ ParameterMatrix positive_part(const ParameterMatrix& matrix) {
   return root * root.transpose();
 }
 
+// What may stand in a term's place; where squares of other axes are named, but for the square of the own one: add_squares weighs that.
+std::vector<Candidate> rivals_of(const Stage& stage) {
+  std::vector<Candidate> rivals = stage.model.alternatives();
+  const std::vector<Term>& terms = stage.hypothesis().terms;
+  if (std::any_of(terms.begin(), terms.end(), [](const Term& t) { return has_squares_of_others(*t.effect); })) {
+    std::erase_if(rivals, [](const Candidate& c) { return has_square_of_own(*c.effect); });
+  }
+  return rivals;
+}
+
 // Where squares of other axes are named: that they may be the square of the own one.
 void add_squares(const Stage& stage, const Hypothesis& reported, SearchResult& result) {
   constexpr double of_the_class = 0.01;
@@ -244,7 +254,14 @@ void add_squares(const Stage& stage, const Hypothesis& reported, SearchResult& r
     const auto named = std::find_if(result.named.begin(), result.named.end(),
                                     [&](const NamedTerm& n) { return n.effect == term.effect; });
     if (average.own_square > of_the_class && named != result.named.end()) {
-      named->equivalent.push_back(&*std::find_if(catalogue().begin(), catalogue().end(), has_square_of_own));
+      const Effect* own = &*std::find_if(catalogue().begin(), catalogue().end(), has_square_of_own);
+      for (auto& [effect, probability] : named->probability) {
+        probability *= 1.0 - average.own_square;
+      }
+      named->probability[own] = average.own_square;
+      if (std::find(named->equivalent.begin(), named->equivalent.end(), own) == named->equivalent.end()) {
+        named->equivalent.push_back(own);
+      }
     }
   }
 }
@@ -301,7 +318,7 @@ SearchResult search(const RecordingContext& context, const PassInput& input, con
   Stage stage = course(ground, std::move(first), options);
   const WithConstants with = with_constants(context, stage);
   const Averages averages =
-      average_explanations(with.model.evidence(), with.model.rows().shift, with.terms, stage.model.alternatives());
+      average_explanations(with.model.evidence(), with.model.rows().shift, with.terms, rivals_of(stage));
   const Hypothesis reported = averaged(stage.hypothesis(), averages);
   result.log_p_lack_of_fit = log_p_of_lack_of_fit(context, stage, with, reported);
   result.named = named_terms(context, stage, reported, averages, ground.significance);

@@ -25,8 +25,29 @@ constexpr double contained_gain = 2.0, contained_share = 0.8;
 // What is to take a term's place must be better by a factor of e: else two that are alike would change places for ever.
 constexpr double least_improvement = 1.0;
 
+// One effect contains another where it leaves less than this share of what that one shows: the squares of the other axes contain the own
+// one's, for gravity's add up to a constant.
+constexpr double left_of_contained = 0.01;
+
 bool names(const std::vector<Candidate>& terms, const Effect* effect) {
   return std::any_of(terms.begin(), terms.end(), [&](const Candidate& t) { return t.effect == effect; });
+}
+
+bool contains(const Evidence& evidence, const Candidate& whole, const Candidate& part, const std::vector<int>& others) {
+  std::vector<int> beside = columns_of(whole);
+  beside.insert(beside.end(), others.begin(), others.end());
+  const std::vector<int> own = columns_of(part);
+  const Eigen::VectorXd left = evidence.given(own, beside).information.diagonal(),
+                        all = evidence.given(own, others).information.diagonal();
+  return all.maxCoeff() > least_information &&
+         (left.array() <= left_of_contained * all.array() + least_information).all();
+}
+
+// Of two effects that explain a recording alike, one of which contains the other, the simpler one is named.
+bool gives_way(const Evidence& evidence, const Candidate& whole, const GroupTest& of_whole, const Candidate& part,
+               const GroupTest& of_part, const std::vector<int>& others) {
+  return of_part.rank < of_whole.rank && of_part.log_p < of_whole.log_p + class_log_odds &&
+         contains(evidence, whole, part, others);
 }
 
 }  // namespace
@@ -45,6 +66,8 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
                                       const std::function<bool(const Candidate&, const GroupTest&)>& immaterial) {
   double best_equation = 0.0, best_walk = 0.0, detected = 0.0;  // name by the former, presence by the last
   const Candidate* equation = nullptr;
+  GroupTest of_equation;
+  std::vector<std::pair<const Candidate*, GroupTest>> seen;
   for (const Candidate& c : alternatives) {
     const GroupTest test = test_group(evidence, columns_of(c), fitted);
     const double log_p = significance.corrected(test.log_detection, *c.effect);
@@ -52,9 +75,18 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
       continue;
     }
     detected = std::min(detected, log_p);
+    seen.emplace_back(&c, test);
     if (test.log_p < best_equation) {
       best_equation = test.log_p;
       equation = &c;
+      of_equation = test;
+    }
+  }
+  for (const auto& [part, test] : seen) {
+    if (equation != nullptr && gives_way(evidence, *equation, of_equation, *part, test, fitted)) {
+      equation = part;
+      of_equation = test;
+      best_equation = test.log_p;
     }
   }
   // A walk has one coefficient, at the edge of its range (half a chi-squared), an instability its correlation time besides.
@@ -95,15 +127,19 @@ std::optional<Exchange> better_exchange(const Evidence& evidence, const std::vec
                                         const std::vector<Candidate>& alternatives) {
   for (std::size_t i = 0; i < terms.size(); ++i) {
     const std::vector<int> others = columns_of(terms, i);
-    double best = test_group(evidence, columns_of(terms[i]), others).log_p - least_improvement;
+    const GroupTest own = test_group(evidence, columns_of(terms[i]), others);
+    double best = own.log_p - least_improvement;
     const Candidate* winner = nullptr;
     for (const Candidate& c : alternatives) {
       if (names(terms, c.effect)) {  // its constant is refined already
         continue;
       }
-      const double log_p = test_group(evidence, columns_of(c), others).log_p;
-      if (log_p < best) {
-        best = log_p;
+      const GroupTest test = test_group(evidence, columns_of(c), others);
+      if (gives_way(evidence, terms[i], own, c, test, others)) {
+        return Exchange{i, c};
+      }
+      if (test.log_p < best && !gives_way(evidence, c, test, terms[i], own, others)) {
+        best = test.log_p;
         winner = &c;
       }
     }

@@ -30,7 +30,8 @@ struct Addition {
 // What explains most beside what is fitted: among `alternatives`, best by the p of its whole group, and `walks`, tested on the
 // same evidence. None where nothing at all is significant. A walk can follow any slow curve: it is taken where it beats every
 // equation by far, and by further where it does not go on inside the dwells (`goes_on`, asked when it matters).
-// What is `immaterial` though significant is passed over.
+// What is `immaterial` though significant is passed over. An effect that contains another, and explains no more than odds of 1:100 against it
+// tell, gives way to it.
 std::optional<Addition> best_addition(const Evidence& evidence, const std::vector<int>& fitted,
                                       const std::vector<Candidate>& alternatives,
                                       const std::vector<BiasProcess>& processes, const Significance& significance,
@@ -41,7 +42,8 @@ std::optional<Addition> best_addition(const Evidence& evidence, const std::vecto
 std::optional<std::size_t> weak_term(const Evidence& evidence, const std::vector<Candidate>& terms,
                                      const Significance& significance);
 
-// The first term in whose place an alternative is better, and the best of those: an early choice may have been the least bad.
+// The first term in whose place an alternative is better, and the best of those: an early choice may have been the least bad. Better is also
+// what the term contains and does not beat (best_addition).
 struct Exchange {
   std::size_t term = 0;
   Candidate by;

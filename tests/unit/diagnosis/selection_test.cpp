@@ -95,6 +95,41 @@ TEST(BetterExchange, TakesTheTrueTermForItsTwin) {
   EXPECT_FALSE(better_exchange(one_a(0.9999), {column_b}, all)) << "twins would change places for ever";
 }
 
+// An effect with the first two axes, and one with the middle between them, which it contains: beside that one it gains `across` squared.
+struct Contained {
+  Effect pair = a;
+  std::vector<Candidate> alternatives;
+  Evidence evidence;
+  explicit Contained(double across) {
+    pair.parameters.push_back(pair.parameters.front());
+    alternatives = {{&pair, NAN, 0, 2}, {&b, NAN, 2, 1}};
+    Eigen::MatrixXd columns = length * Eigen::MatrixXd::Identity(3, 3);
+    columns.col(2) = length / std::sqrt(2.0) * Eigen::Vector3d(1.0, 1.0, 0.0);
+    evidence = evidence_of(columns, columns.col(2) + across / std::sqrt(2.0) * Eigen::Vector3d(1.0, -1.0, 0.0));
+  }
+  const Effect* best() const {
+    const auto found = best_addition(evidence, {}, alternatives, {}, with_threshold(-10.0), never);
+    return found && found->term ? found->term->effect : nullptr;
+  }
+  const Effect* instead_of(std::size_t named) const {
+    const auto found = better_exchange(evidence, {alternatives[named]}, alternatives);
+    return found ? found->by.effect : nullptr;
+  }
+};
+
+// Log p of a gain of 100 with one degree is -52.5, of 100 + across^2 with two -(100 + across^2)/2, and log 2 for the choice of it or of one column:
+// 3.5 is 2.9 in favour of the pair, odds of less than 1:100 (4.6), and 7 is 21.
+TEST(ContainedEffect, IsNamedWhereTheOtherDoesNotBeatIt) {
+  const Contained alike(3.5), unlike(7.0);
+  EXPECT_LT(test_group(alike.evidence, {0, 1}, {}).log_p, test_group(alike.evidence, {2}, {}).log_p - 1.0);
+  EXPECT_EQ(alike.best(), &b);
+  EXPECT_EQ(alike.instead_of(0), &b);
+  EXPECT_EQ(alike.instead_of(1), nullptr) << "both would change places for ever";
+  EXPECT_EQ(unlike.best(), &unlike.pair);
+  EXPECT_EQ(unlike.instead_of(0), nullptr);
+  EXPECT_EQ(unlike.instead_of(1), &unlike.pair);
+}
+
 // Odds of 1:100 are 4.6 in log p, some 9.2 in Δχ²: b is in a's class at k^2 = 0.94 and not at 0.88. c never is.
 TEST(Equivalents, AreThoseWithOddsAboveOneInAHundred) {
   const std::vector<const Effect*> twin = {&b};
