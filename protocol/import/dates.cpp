@@ -1,9 +1,12 @@
 #include "protocol/import/dates.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <string>
 
 namespace selfcal::import {
@@ -139,33 +142,97 @@ std::optional<Date> day_of(std::string_view& text) {
              : std::optional(month_first ? Date{*third, *first, *second} : Date{*third, *second, *first});
 }
 
+constexpr long double day_s = 86400.0L;
+
+// Since 1970; none of a day that no calendar has.
+std::optional<long double> days_of(const Date& day) {
+  const std::chrono::year_month_day date{std::chrono::year{day.year},
+                                         std::chrono::month{static_cast<unsigned>(day.month)},
+                                         std::chrono::day{static_cast<unsigned>(day.day)}};
+  return date.ok() ? std::optional(static_cast<long double>(std::chrono::sys_days(date).time_since_epoch().count()))
+                   : std::nullopt;
+}
+
+void take_blanks(std::string_view& text) {
+  while (take(text, ' ')) {
+  }
+}
+
+// "Wed Dec 22 21:09:46 2021", as C's ctime writes it: the day of the week may lack, GMT, UTC or an offset may stand before the year.
+std::optional<long double> named_day_first(std::string_view text) {
+  constexpr std::array<std::string_view, 7> weekdays{"mon", "tue", "wed", "thu", "fri", "sat", "sun"};
+  const auto begins = [&text](std::string_view word) {
+    return text.size() > word.size() &&
+           std::equal(word.begin(), word.end(), text.begin(), [](char a, char b) { return a == lower(b); });
+  };
+  if (std::any_of(weekdays.begin(), weekdays.end(), begins)) {
+    text.remove_prefix(weekdays.front().size());
+    take(text, ',');
+    take_blanks(text);
+  }
+  const auto month = month_of(text);
+  if (!month || !take(text, ' ')) {
+    return std::nullopt;
+  }
+  take_blanks(text);
+  const auto day = digits(text, 1, 2);
+  if (!day || !take(text, ' ')) {
+    return std::nullopt;
+  }
+  const auto seconds = clock_of(text);
+  if (!seconds || !take(text, ' ')) {
+    return std::nullopt;
+  }
+  if (begins("gmt") || begins("utc")) {
+    text.remove_prefix(3);
+  }
+  const std::size_t blank = text.find(' ');
+  const auto offset = blank == std::string_view::npos ? std::optional(0) : offset_of(text.substr(0, blank));
+  text.remove_prefix(blank == std::string_view::npos ? 0 : blank + 1);
+  const auto year = digits(text, 4, 4);
+  const auto days = offset && year && text.empty() ? days_of({*year, *month, *day}) : std::nullopt;
+  return days ? std::optional(*days * day_s + *seconds - static_cast<long double>(*offset)) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<long double> date_of(std::string_view field) {
   std::string_view text = field;
   long double days = 0.0L;
+  if (!field.empty() && lower(field.front()) >= 'a' && lower(field.front()) <= 'z') {
+    return named_day_first(field);
+  }
   if (field.find_first_of("-/.") < field.find(':')) {
     const auto day = day_of(text);
-    if (!day) {
+    const auto since_1970 = day ? days_of(*day) : std::nullopt;
+    if (!since_1970) {
       return std::nullopt;
     }
-    const std::chrono::year_month_day date{std::chrono::year{day->year},
-                                           std::chrono::month{static_cast<unsigned>(day->month)},
-                                           std::chrono::day{static_cast<unsigned>(day->day)}};
-    if (!date.ok()) {
-      return std::nullopt;
-    }
-    days = static_cast<long double>(std::chrono::sys_days(date).time_since_epoch().count());
-    while (take(text, ' ')) {
-    }
+    days = *since_1970;
+    take_blanks(text);
   }
   const auto seconds = clock_of(text);
   const auto offset = seconds ? offset_of(text) : std::nullopt;
   if (!offset) {
     return std::nullopt;
   }
-  constexpr long double day_s = 86400.0L;
   return days * day_s + *seconds - static_cast<long double>(*offset);
+}
+
+std::string date_words(long double seconds) {
+  constexpr int hour_s = 3600, minute_s = 60;
+  const long double days = std::floor(seconds / day_s);
+  const auto in_day = static_cast<double>(seconds - days * day_s);
+  const int whole = static_cast<int>(in_day);
+  const std::string clock = fmt::format("{:02}:{:02}:{:06.3f}", whole / hour_s, whole % hour_s / minute_s,
+                                        std::floor(1e3 * (in_day - minute_s * (whole / minute_s))) / 1e3);
+  constexpr long double year_10000 = 2932897.0L;  // in days
+  if (days == 0.0L || !(std::abs(days) < year_10000)) {
+    return clock;
+  }
+  const std::chrono::year_month_day date{std::chrono::sys_days(std::chrono::days(static_cast<int>(days)))};
+  return fmt::format("{:04}-{:02}-{:02} {}", static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
+                     static_cast<unsigned>(date.day()), clock);
 }
 
 }  // namespace selfcal::import

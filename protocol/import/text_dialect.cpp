@@ -1,5 +1,7 @@
 #include "protocol/import/text_dialect.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -135,6 +137,40 @@ std::optional<Number> sexagesimal(std::string_view field, char decimal) {
   return field.empty() && part < Number{1} ? std::optional<Number>(negative ? -value : value) : std::nullopt;
 }
 
+// "13 / 22": so many of so many, as of satellites.
+bool is_share(std::string_view field) {
+  const std::size_t slash = field.find(" / ");
+  return slash != std::string_view::npos && number_of(trimmed(field.substr(0, slash)), '.') &&
+         number_of(trimmed(field.substr(slash + 3)), '.');
+}
+
+// "10:12:00.123 -> ", which Arduino's serial monitor puts before a line: its length, and the time; 0: it does not stand there.
+struct Arrival {
+  std::string_view time;
+  std::size_t length = 0;
+};
+Arrival arrival_of(std::string_view line) {
+  constexpr std::string_view arrow = " -> ";
+  constexpr std::size_t longest = 32;
+  const std::string_view begin = line.substr(0, longest);
+  const std::size_t at = begin.find(arrow);
+  const std::string_view time = at == std::string_view::npos ? std::string_view() : trimmed(begin.substr(0, at));
+  return !time.empty() && date_of(time) ? Arrival{time, at + arrow.size()} : Arrival{};
+}
+
+// "IMU:0.1,0.2,9.8": a word and a colon before the first number of a line, which are a field of their own; 0: there are none.
+std::size_t mark_before_numbers(std::string_view line, char separator) {
+  const std::string_view first = line.substr(0, line.find(separator));
+  const std::size_t colon = first.find(':');
+  if (first.size() == line.size() || colon == 0 || colon == std::string_view::npos ||
+      line.find(':', colon + 1) != std::string_view::npos) {
+    return 0;
+  }
+  const bool word = std::all_of(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(colon),
+                                [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; });
+  return word && number_of(trimmed(first.substr(colon + 1)), '.') ? colon + 1 : 0;
+}
+
 enum class Field { number, date, empty, word, wrong };
 
 Field kind_of(std::string_view field, char decimal) {
@@ -151,6 +187,9 @@ Field kind_of(std::string_view field, char decimal) {
   if (date_of(field)) {
     return Field::date;
   }
+  if (is_share(field)) {
+    return Field::word;
+  }
   // Numbers with a separator between them are a sign that the text is split in the wrong way; "2023-4-11 10:12:00" and "GPS fix" are none.
   std::size_t parts = 0, numbers = 0;
   for (std::string_view rest = field; !rest.empty();) {
@@ -165,8 +204,7 @@ Field kind_of(std::string_view field, char decimal) {
 // Number of fields of a line of numbers (a date and a few words may be among them), 0 for any other.
 std::size_t numeric_fields(std::string_view line, char separator, char decimal, std::vector<std::string_view>& fields) {
   split_fields(line, separator, fields);
-  std::size_t numbers = 0;
-  std::size_t words = 0;
+  std::size_t numbers = 0, words = 0, empty = 0;
   for (const std::string_view field : fields) {
     const Field kind = kind_of(field, decimal);
     if (kind == Field::wrong) {
@@ -174,8 +212,11 @@ std::size_t numeric_fields(std::string_view line, char separator, char decimal, 
     }
     numbers += kind == Field::number ? 1 : 0;
     words += kind == Field::word ? 1 : 0;
+    empty += kind == Field::empty ? 1 : 0;
   }
-  return numbers > 0 && words < numbers ? fields.size() : 0;
+  // A row of a table of which most lacks: its number, and a time that no date is.
+  const bool sparse = words == numbers && 2 * empty > fields.size();
+  return numbers > 0 && (words < numbers || sparse) ? fields.size() : 0;
 }
 
 struct Run {
@@ -238,6 +279,11 @@ void find_header(const std::vector<std::string_view>& lines, const Run& run, Tex
   }
   const std::vector<std::string> nearest = count(k - 1);
   if (!fits(nearest)) {
+    constexpr std::size_t fewest = 4;
+    const bool names = nearest.size() >= fewest && std::none_of(nearest.begin(), nearest.end(), [&](const auto& f) {
+                         return number_of(f, dialect.decimal).has_value();
+                       });
+    dialect.other_names = names ? nearest.size() : 0;
     return;
   }
   const auto units = std::count_if(nearest.begin(), nearest.end(), [](const std::string& f) { return is_unit(f); });
@@ -262,6 +308,14 @@ std::string_view trimmed(std::string_view text) {
 
 void split_fields(std::string_view line, char separator, std::vector<std::string_view>& fields) {
   fields.clear();
+  if (const Arrival arrival = arrival_of(line); arrival.length > 0) {
+    fields.push_back(arrival.time);
+    line.remove_prefix(arrival.length);
+  }
+  if (const std::size_t mark = separator == ' ' ? 0 : mark_before_numbers(line, separator); mark > 0) {
+    fields.push_back(line.substr(0, mark - 1));
+    line.remove_prefix(mark);
+  }
   if (separator == ' ') {
     constexpr std::string_view blanks = " \t";
     for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
@@ -329,7 +383,12 @@ std::vector<std::string> header_fields(std::string_view line, const TextDialect&
   std::vector<std::string_view> fields;
   split_fields(line, dialect.separator, fields);
   std::vector<std::string> names;
+  const bool arrived = arrival_of(line).length > 0;
   for (std::string_view field : fields) {
+    if (arrived && names.empty()) {
+      names.emplace_back("arrival time");
+      continue;
+    }
     if (field.size() >= 2 &&
         ((field.front() == '[' && field.back() == ']') || (field.front() == '(' && field.back() == ')'))) {
       field = field.substr(1, field.size() - 2);
@@ -337,6 +396,29 @@ std::vector<std::string> header_fields(std::string_view line, const TextDialect&
     names.emplace_back(field);
   }
   return names;
+}
+
+std::string unread_field(const std::vector<std::string_view>& lines) {
+  const auto last = std::find_if(lines.rbegin(), lines.rend(), [](std::string_view l) { return !trimmed(l).empty(); });
+  std::vector<std::string_view> fields;
+  for (const char separator : {'\t', ';', ','}) {
+    if (last == lines.rend()) {
+      break;
+    }
+    split_fields(*last, separator, fields);
+    constexpr std::size_t fewest = 4, longest = 40;
+    const auto wrong = std::find_if(fields.begin(), fields.end(),
+                                    [](std::string_view field) { return kind_of(field, '.') == Field::wrong; });
+    if (fields.size() < fewest || wrong == fields.end()) {
+      continue;
+    }
+    std::string text(wrong->substr(0, longest));
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    return fmt::format("line {}, field {}: \"{}\" is no number, no date and no word", lines.rend() - last,
+                       wrong - fields.begin() + 1, text);
+  }
+  return {};
 }
 
 std::optional<TextDialect> detect_dialect(const std::vector<std::string_view>& lines) {
@@ -374,6 +456,7 @@ std::optional<TextDialect> detect_dialect(const std::vector<std::string_view>& l
     }
   }
   dialect.first_line = best.first + 1;
+  dialect.fields = best.fields;
   for (const std::string_view line : lines) {
     if (const std::string_view mark = comment_of(line); !mark.empty() && dialect.comment.empty()) {
       dialect.comment = std::string(mark);

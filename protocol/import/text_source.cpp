@@ -93,9 +93,14 @@ class TextSource final : public ColumnSource {
     if (labelled_) {
       return "text, a label before each value";
     }
+    const std::string names =
+        dialect_.header_line > 0 ? fmt::format("names in line {}", dialect_.header_line)
+        : dialect_.other_names > 0
+            ? fmt::format("no names: {} stand above rows of {}, so that nobody knows whose they are",
+                          dialect_.other_names, dialect_.fields)
+            : "no names";
     return fmt::format("text, {}{}, {}", separator_words(dialect_.separator),
-                       dialect_.decimal == ',' ? ", decimal commas" : "",
-                       dialect_.header_line > 0 ? fmt::format("names in line {}", dialect_.header_line) : "no names");
+                       dialect_.decimal == ',' ? ", decimal commas" : "", names);
   }
   Expected<ColumnData> read(const ColumnRequest& request) const override;
 
@@ -346,6 +351,22 @@ struct Form {
   std::optional<Labels> labels;
 };
 
+// Empatica's E4: its first line is when it began, in s since 1970, once for each column, the second how many rows a second holds.
+bool empatica_head(const std::vector<std::string_view>& lines) {
+  if (lines.size() < 3) {
+    return false;
+  }
+  const auto all_alike = [](std::string_view line, double least, double most) {
+    std::vector<std::string_view> fields;
+    split_fields(line, ',', fields);
+    const auto first = number_of(fields.front(), '.');
+    return first && *first > least && *first < most &&
+           std::all_of(fields.begin(), fields.end(), [&](std::string_view f) { return number_of(f, '.') == first; });
+  };
+  constexpr double year_2010 = 1262304000.0, year_2100 = 4102444800.0, fastest = 1000.0;
+  return all_alike(lines[0], year_2010, year_2100) && all_alike(lines[1], 0.0, fastest);
+}
+
 Expected<Form> judged_form(const std::filesystem::path& file) {
   const Expected<std::vector<std::string>> lines = first_lines(file);
   if (!lines) {
@@ -375,12 +396,17 @@ Expected<Form> judged_form(const std::filesystem::path& file) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", file.string(), known));
   }
   if (!dialect) {
+    const std::string field = unread_field(views);
     return fail(ErrorKind::bad_input,
                 fmt::format("{}: no lines of numbers: of the first {} none has two numbers between commas, semicolons, "
-                            "tabs or blanks",
-                            file.string(), views.size()));
+                            "tabs or blanks{}{}",
+                            file.string(), views.size(), field.empty() ? "" : "; ", field));
   }
   form.dialect = *dialect;
+  if (empatica_head(views)) {
+    form.dialect.first_line = 3;
+    return form;
+  }
   // PSINS: three lines of initial values and scale factors stand before the samples, with as many fields.
   constexpr std::size_t psins_header_lines = 3;
   if (!lines->empty() && lines->front().find("PSINS-format") != std::string::npos &&

@@ -126,5 +126,73 @@ TEST(Dates, SecondsSince1970AndOffsets) {
   }
 }
 
+TEST(Dates, AsCWritesThem) {
+  for (const char* same : {"Wed Oct  4 10:12:33 2023", "Oct 4 10:12:33 2023", "Wed Oct 4 13:12:33 GMT+03:00 2023",
+                           "Wed, Oct 4 10:12:33 UTC 2023"}) {
+    EXPECT_EQ(date_of(same), 1696414353.0L) << same;
+  }
+  for (const char* none : {"Wed Feb 31 10:12:33 2023", "Wed Oct 4 10:12:33", "Wed", "Octopus 4 10:12:33 2023"}) {
+    EXPECT_FALSE(date_of(none)) << none;
+  }
+  EXPECT_EQ(date_words(1696414353.25L), "2023-10-04 10:12:33.250");
+  EXPECT_EQ(date_words(36733.5L), "10:12:13.500");
+}
+
+// Satellites in range, among a phone's readings.
+TEST(Dialect, SoManyOfSoManyAreAWord) {
+  const auto d = dialect_of({"x;y;Satellites", "0.1;2.5;13 / 22", "0.2;2.6;12 / 22"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->separator, ';');
+  EXPECT_EQ(d->header_line, 1U);
+}
+
+TEST(Dialect, RowsOfATableThatMostlyLacksEndNoTable) {
+  const auto d = dialect_of({"Index,Time,x,y,z", "0,,,,", "1,2018:522.0,,,", "2,,0.1,0.2,9.8", "3,2018:523.0,,,"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->header_line, 1U);
+  EXPECT_EQ(d->first_line, 2U);
+}
+
+TEST(Dialect, TheTimeOfASerialMonitorIsAField) {
+  const std::vector<std::string_view> lines{"10:12:13.100 -> ax,ay,az", "10:12:13.110 -> 0.1,-2,9.8",
+                                            "10:12:13.120 -> 0.2,-2,9.7"};
+  const auto d = dialect_of(lines);
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->separator, ',');
+  EXPECT_EQ(d->header_line, 1U);
+  EXPECT_THAT(header_fields(lines[0], *d), ElementsAre("arrival time", "ax", "ay", "az"));
+  std::vector<std::string_view> fields;
+  split_fields(lines[1], d->separator, fields);
+  EXPECT_THAT(fields, ElementsAre("10:12:13.110", "0.1", "-2", "9.8"));
+}
+
+// A word and a colon that a program prints before each line.
+TEST(Dialect, AMarkBeforeTheNumbersIsAField) {
+  const std::vector<std::string_view> lines{"IMU:0.1,-2,9.8,1,2,3", "IMU: 0.2,-2,9.7,1,2,4"};
+  const auto d = dialect_of(lines);
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->fields, 7U);
+  std::vector<std::string_view> fields;
+  split_fields(lines[1], d->separator, fields);
+  EXPECT_EQ(fields[0], "IMU");
+  EXPECT_EQ(fields[1], "0.2");
+  split_fields("10:12:13,4,5", ',', fields);
+  EXPECT_EQ(fields.size(), 3U);
+}
+
+TEST(Dialect, NamesOfOtherColumnsAreCounted) {
+  const auto d = dialect_of({"n,gx,gy,gz,ax", "0,1,2,3,4,5,6", "1,2,3,4,5,6,7"});
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->header_line, 0U);
+  EXPECT_EQ(d->other_names, 5U);
+  EXPECT_EQ(d->fields, 7U);
+}
+
+TEST(Dialect, WhatIsNotReadIsNamed) {
+  const std::vector<std::string_view> lines{"a,b,c,d", "1,2,3 of 7 4,5"};
+  EXPECT_FALSE(detect_dialect(lines));
+  EXPECT_EQ(unread_field(lines), "line 2, field 3: \"3 of 7 4\" is no number, no date and no word");
+}
+
 }  // namespace
 }  // namespace selfcal::import

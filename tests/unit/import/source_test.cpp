@@ -65,6 +65,21 @@ TEST_F(Source, RowsOfTwoSensorsAreToldFromAFlagThatChanges) {
   EXPECT_EQ((*one)->mixed_rows(), "");
 }
 
+// Empatica's E4: when it began and how many rows a second it holds stand where the numbers stand, once for each column.
+TEST_F(Source, TheTwoLinesBeforeAWristbandsNumbersAreNone) {
+  const auto source = open(
+      "1544027337.000000, 1544027337.000000, 1544027337.000000\n32.000000, 32.000000, 32.000000\n"
+      "-20,30,51\n-21,31,50\n");
+  ASSERT_TRUE(source);
+  ColumnRequest request;
+  request.columns = {0, 1, 2};
+  request.most_rows = 10;
+  const auto data = (*source)->read(request);
+  ASSERT_TRUE(data);
+  EXPECT_EQ(data->rows, 2U);
+  EXPECT_EQ(data->values[2].front(), 51.0);
+}
+
 // Two sensors with biases of their own take turns; a flag of new data beside one sensor does so too, and tells nothing apart.
 TEST_F(Source, RowsOfNumberedSensorsAreToldByWhatTheyRead) {
   std::string mixed = "time,I,x,y,z\n", flagged = mixed;
