@@ -151,13 +151,15 @@ Role triad_role(const Words& w) {
   if (is_one_of(w, {"g"}) && is_one_of(w, {"f"})) {
     return Role::accelerometer;
   }
-  if (holds(w, {"gyr", "pqr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
-      is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "rot", "dth", "da"}) ||
+  const bool turned =
+      holds(w, {"gyr", "pqr", "omega", "angular", "angrate", "turnrate", "dtheta", "dang", "drehrate", "rotation"}) ||
       (inc && (holds(w, {"theta", "angle"}) || is_one_of(w, {"ang"}))) ||
-      (holds(w, {"ang"}) && holds(w, {"rate", "vel"}))) {
+      (holds(w, {"ang"}) && holds(w, {"rate", "vel"}));
+  const bool pushed = holds(w, {"acc", "force", "beschl"});  // "accel_g_x": its g is a unit
+  if (turned || (!pushed && is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "rot", "dth", "da"}))) {
     return Role::gyro;
   }
-  if (holds(w, {"acc", "force", "beschl"}) || is_one_of(w, {"a", "f", "fb", "fib", "dv", "dvel"}) ||
+  if (pushed || is_one_of(w, {"a", "f", "fb", "fib", "dv", "dvel"}) ||
       (inc && (holds(w, {"vel"}) || is_one_of(w, {"v"})))) {
     return Role::accelerometer;
   }
@@ -293,6 +295,14 @@ NamedColumn read_plain_name(std::string_view name, std::string_view unit) {
     column.axis = about;
     column.role = Role::gyro;
     return column;
+  }
+  // "gyro_dps_x", "accel_mg_y": the unit before the axis.
+  if (column.axis >= 0 && column.unit.empty() && holds(stems, {"gyr", "acc"})) {
+    const std::string inner = unit_at_end(stems);
+    const auto known = find_unit(inner);
+    const bool fits =
+        known && known->quantity == (holds(stems, {"gyr"}) ? Quantity::angular_rate : Quantity::acceleration);
+    column.unit = fits ? inner : std::string();
   }
   column.increment = delta || (column.axis >= 0 && is_one_of(stems, {"dv", "dth", "da", "dtheta", "dvel", "dang"}));
   column.role = column.axis >= 0 ? triad_role(stems) : single_role(words);

@@ -1,6 +1,8 @@
 // Which unit fits the size of gravity and a turn, and what is ambiguous.
 #include <gmock/gmock.h>
 
+#include <tuple>
+
 #include "protocol/import/guess_names.hpp"
 #include "protocol/import/guess_units.hpp"
 
@@ -79,6 +81,21 @@ TEST(Units, TimesThatMakeASampleRate) {
   EXPECT_THAT(time_units(10000), ElementsAre("us"));
   EXPECT_THAT(time_units(0.1), ElementsAre("s", "ms"));  // 10 Hz or 10 kHz
   EXPECT_THAT(time_units(1e12), IsEmpty());
+}
+
+// "accel_g_x" was a gyro for its g.
+TEST(Names, AUnitBeforeTheAxis) {
+  for (const auto& [name, role, unit] : {std::tuple{"accel_g_x", Role::accelerometer, "g"},
+                                         {"acc_mg_y", Role::accelerometer, "mg"},
+                                         {"accel_ms2_z", Role::accelerometer, "m/s^2"},
+                                         {"gyro_dps_x", Role::gyro, "deg/s"},
+                                         {"gyro_rad_s_y", Role::gyro, "rad/s"},
+                                         {"accel_ms_x", Role::accelerometer, ""}}) {
+    const NamedColumn column = read_name(name, "");
+    EXPECT_EQ(column.role, role) << name;
+    EXPECT_EQ(column.unit, unit) << name;
+    EXPECT_FALSE(column.increment) << name;
+  }
 }
 
 TEST(Names, DirectionsAreARightHandedTriad) {
