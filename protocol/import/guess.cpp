@@ -10,6 +10,7 @@
 #include "protocol/import/guess_orientation.hpp"
 #include "protocol/import/guess_roles.hpp"
 #include "protocol/import/guess_table.hpp"
+#include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/psins.hpp"
@@ -100,13 +101,14 @@ class Guesser {
         return say("time",
                    fmt::format("no column of it; {} Hz {}", *rate, psins_ ? "from the file's header" : "as given"));
       }
-      return doubt("time", "no column increases evenly: the sample rate is not known (--rate gives it)");
+      return doubt("time",
+                   "no column increases evenly: the sample rate is not known: " + rate_words(source_.preamble()));
     }
     const std::size_t column = *roles_.time;
     map.time.column = reference(column);
     const double interval = static_cast<double>(1.0L / static_cast<long double>(rate_of(roles_.stamps, 1.0L).rate_hz));
     const bool xsens = source_.names()[column].find("SampleTimeFine") != std::string::npos;
-    const std::vector<std::string> units = xsens ? xsens_time_units(interval) : time_units(interval);
+    const std::vector<std::string> units = xsens ? xsens_time_units(interval) : time_units_of(roles_.stamps, interval);
     const std::string& claimed = named_[column].unit;
     if (roles_.time_is_date) {
       map.time.unit = "date";
@@ -143,8 +145,10 @@ class Guesser {
     const double first_s = static_cast<double>(roles_.stamps.front()) * si;
     if (first_s < -*interval_s_ || first_s > 2.5 * *interval_s_) {
       map.time.origin_first = true;
-      say("time.origin", fmt::format("the first time, {} {}, is taken to be one interval after the start",
-                                     static_cast<double>(roles_.stamps.front()), map.time.unit));
+      const std::string first = roles_.time_is_date
+                                    ? date_words(roles_.stamps.front())
+                                    : fmt::format("{} {}", static_cast<double>(roles_.stamps.front()), map.time.unit);
+      say("time.origin", fmt::format("the first time, {}, is taken to be one interval after the start", first));
     }
     if (known_.sample_rate_hz && std::abs(*known_.sample_rate_hz / rate.rate_hz - 1.0) > 1e-3) {
       doubt("time.unit", fmt::format("the times make {} Hz, {} Hz is given", rate.rate_hz, *known_.sample_rate_hz));
@@ -242,16 +246,6 @@ class Guesser {
         "accelerometer.zero",
         fmt::format("counts {:.0f}, {:.0f}, {:.0f} mean no force: the centre of gravity's directions; biases are in it",
                     (*zero)[0], (*zero)[1], (*zero)[2]));
-  }
-
-  static void set_axes(const Matrix3& axes, TriadMap& triad) {
-    for (int k = 0; k < 3; ++k) {
-      for (int j = 0; j < 3; ++j) {
-        if (axes(k, j) != 0.0) {
-          triad.axes[static_cast<std::size_t>(k)] = {j, axes(k, j)};
-        }
-      }
-    }
   }
 
   void set_psins() {
@@ -418,6 +412,16 @@ class Guesser {
                    fmt::format("{} by the name, but the usual force is {:.5g} of it: a sensor that "
                                "moves, or another unit",
                                said.unit, size));
+    }
+    // Without a rate nobody knows whether they are rates; if so, the size may be that of a unit.
+    const auto rates =
+        interval_s_ || said.increments || !(size > 0.0) ? std::nullopt : accelerometer_unit(size, 1.0, {});
+    if (rates && !rates->increments && rates->off < nearness(triad_columns(values_, *roles_.accelerometer))) {
+      accel.unit = rates->unit;
+      return doubt("accelerometer.unit",
+                   fmt::format("{} if these are rates: gravity is {:.5g} of it, and the sample rate "
+                               "is not known",
+                               rates->unit, size));
     }
     accel.unit = said.increments ? "m/s" : "m/s^2";
     const double scale = 9.80665 * (said.increments ? interval : 1.0) / size;

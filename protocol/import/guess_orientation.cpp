@@ -12,6 +12,10 @@
 namespace selfcal::import {
 namespace {
 
+std::string other_ways(std::size_t count) {
+  return count == 1 ? "one other way may" : fmt::format("{} other ways", count);
+}
+
 constexpr double good_gravity = 0.98;  // |mean direction|^2: accelerometer errors of some per cent
 constexpr double good_turns = 0.95;    // of the sum of squares: scale factors off by ten per cent
 constexpr double fair_turns = 0.5;     // by hand: the accelerometers see every jerk
@@ -149,11 +153,11 @@ class Finder {
     }
     if (!gyro.alike.empty()) {
       doubt("gyro.axes",
-            fmt::format("{} other ways fit the turns as well: too few axes are turned about", gyro.alike.size()));
+            fmt::format("{} fit the turns as well: too few axes are turned about", other_ways(gyro.alike.size())));
     }
     if (!accelerometer.alike.empty()) {
       doubt("accelerometer.axes",
-            fmt::format("{} other ways fit gravity as well: too few positions", accelerometer.alike.size()));
+            fmt::format("{} fit gravity as well: too few positions", other_ways(accelerometer.alike.size())));
     }
     say("gyro.axes", fmt::format("{}: {} turns of the gimbal show it", axes_words(out_.gyro), gyro.seen));
     say("gimbal.signs",
@@ -199,7 +203,7 @@ class Finder {
     }
     if (!fit->alike.empty()) {
       doubt("gyro.axes",
-            fmt::format("{} other ways explain the turning of the specific force as well", fit->alike.size()));
+            fmt::format("{} explain the turning of the specific force as well", other_ways(fit->alike.size())));
     }
   }
 
@@ -302,6 +306,16 @@ std::string axes_words(const Matrix3& axes) {
 
 Orientation find_orientation(const OrientationInput& input, std::vector<Remark>& remarks) {
   return Finder(input, remarks).find();
+}
+
+void set_axes(const Matrix3& axes, TriadMap& triad) {
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      if (axes(k, j) != 0.0) {
+        triad.axes[static_cast<std::size_t>(k)] = {j, axes(k, j)};
+      }
+    }
+  }
 }
 
 }  // namespace selfcal::import

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol/import/guess.hpp"
+#include "protocol/import/import_map.hpp"
 #include "protocol/import/motion.hpp"
 
 namespace selfcal::import {
@@ -38,5 +39,8 @@ Orientation find_orientation(const OrientationInput& input, std::vector<Remark>&
 
 // "x = -y, y = z, z = x"
 std::string axes_words(const Matrix3& axes);
+
+// The rows of AXES, each with one number that is not zero, as a map has them.
+void set_axes(const Matrix3& axes, TriadMap& triad);
 
 }  // namespace selfcal::import

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
-#include <numeric>
 
 #include "estimator/geometry/units.hpp"
+#include "protocol/import/gravity_columns.hpp"
 #include "protocol/import/guess_axes.hpp"
 #include "protocol/import/guess_time.hpp"
+#include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/name_words.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
@@ -34,8 +36,8 @@ class Assigner {
 
   Roles assign() {
     find_time();
-    roles_.gyro = triad_by_name(Role::gyro, "gyro");
-    roles_.accelerometer = triad_by_name(Role::accelerometer, "accelerometer");
+    roles_.gyro = triad_by_name(Role::gyro, "gyro.columns");
+    roles_.accelerometer = triad_by_name(Role::accelerometer, "accelerometer.columns");
     find_gimbal_by_name();
     for (std::size_t k = 0; k < named_.size(); ++k) {
       if (named_[k].role == Role::temperature && !used_[k]) {
@@ -56,6 +58,11 @@ class Assigner {
  private:
   void say(const char* key, std::string text) { remarks_.push_back({key, std::move(text), false}); }
   void doubt(const char* key, std::string text) { remarks_.push_back({key, std::move(text), true}); }
+  void doubt_if_new(const char* key, std::string text) {
+    if (std::none_of(remarks_.begin(), remarks_.end(), [key](const Remark& r) { return r.doubt && r.key == key; })) {
+      doubt(key, std::move(text));
+    }
+  }
   void take(std::size_t column) {
     used_[column] = true;
     taken_.push_back(column);
@@ -89,15 +96,31 @@ class Assigner {
     return false;
   }
 
+  // Another column that is called a time, and runs at another rate than the one that was taken.
+  void doubt_rivals(const std::vector<std::size_t>& times) {
+    const NamedColumn& taken = named_[*roles_.time];
+    const double unit = roles_.time_is_date ? 1.0 : seconds_of_unit(taken.unit);
+    for (const std::size_t k : times) {
+      const bool comparable = k != *roles_.time && taken.other_unit.empty() && named_[k].other_unit.empty();
+      const auto faster = comparable && all_finite(values_[k])
+                              ? other_rate(roles_.stamps, unit, values_[k], seconds_of_unit(named_[k].unit))
+                              : std::nullopt;
+      if (faster) {
+        return doubt("time.column", fmt::format("{} runs {:.3g} times as fast as {}: which is the sensors' clock?",
+                                                source_.title(k), *faster, source_.title(*roles_.time)));
+      }
+    }
+  }
+
   void find_time() {
     std::string named_but;
-    for (std::size_t k = 0; k < named_.size(); ++k) {
-      if (named_[k].role == Role::time) {
-        if (try_time(k)) {
-          return say("time.column", fmt::format("{}, by its name; it increases evenly", source_.title(k)));
-        }
-        named_but = fmt::format("{} is named so, but {}", source_.title(k), why_uneven(values_[k]));
+    const std::vector<std::size_t> times = times_by_name(source_.names(), named_);
+    for (const std::size_t k : times) {
+      if (try_time(k)) {
+        say("time.column", fmt::format("{}, by its name; it increases evenly", source_.title(k)));
+        return doubt_rivals(times);
       }
+      named_but = fmt::format("{} is named so, but {}", source_.title(k), why_uneven(values_[k]));
     }
     // A column that rises by 1 is a counter as well as a time.
     for (const bool counters : {false, true}) {
@@ -106,9 +129,9 @@ class Assigner {
                           (counters && named_[k].role == Role::counter);
         const bool rises_by_1 = values_[k].size() > 1 && values_[k][1] - values_[k][0] == 1.0;
         if (free && rises_by_1 == counters && (!used_[k] || !std::isfinite(values_[k].front())) && try_time(k)) {
-          counters ? doubt("time.column", fmt::format("{} rises by 1: a time in units of the interval, or a counter",
-                                                      source_.title(k)))
-                   : say("time.column", fmt::format("{}: it increases evenly", source_.title(k)));
+          const std::string told =
+              source_.title(k) + (counters ? counter_words(source_.preamble()) : ": it increases evenly");
+          remarks_.push_back({"time.column", told, counters});
           return;
         }
       }
@@ -117,8 +140,6 @@ class Assigner {
       doubt("time.column", named_but);
     }
   }
-
-  using Triad = std::array<std::size_t, 3>;
 
   // The first x, y and z that are named so, the second ones, and so on. `several`: there are more of some than of all.
   std::vector<Triad> triads_by_name(Role role, bool& several) const {
@@ -136,10 +157,23 @@ class Assigner {
     several = most > 1;
     return triads;
   }
+  // A column that is named so and of no use, for many lines lack its number.
+  void doubt_incomplete(Role role, const char* key) {
+    for (std::size_t k = 0; k < named_.size(); ++k) {
+      const auto lacks =
+          std::count_if(values_[k].begin(), values_[k].end(), [](double v) { return !std::isfinite(v); });
+      if (named_[k].role == role && named_[k].axis >= 0 && lacks > 0) {
+        return doubt(key, fmt::format("{} is named so, but {} of {} lines lack its number: take them out of the file",
+                                      source_.title(k), lacks, values_[k].size()));
+      }
+    }
+  }
+
   std::optional<Triad> triad_by_name(Role role, const char* key) {
     bool several = false;
     std::vector<Triad> triads = triads_by_name(role, several);
     if (triads.empty()) {
+      doubt_incomplete(role, key);
       return std::nullopt;
     }
     // A phone's "linear acceleration" is without gravity.
@@ -147,8 +181,8 @@ class Assigner {
     if (role == Role::accelerometer && named_so > 1) {
       std::vector<Triad> heavy = triads;
       std::erase_if(heavy, [this](const Triad& triad) {
-        const auto size = size_of(triad);
-        return !size || size->scatter > most_scatter;
+        const auto size = size_of_triad(values_, triad, block());
+        return !size || size->scatter > most_scatter_of_gravity;
       });
       if (heavy.size() == 1) {
         triads = heavy;
@@ -166,7 +200,7 @@ class Assigner {
                         : several      ? ": the first of several that are named so"
                         : named_so > 1 ? ": of several that are named so the only ones of gravity's size throughout"
                                        : ", by their names";
-    remarks_.push_back({fmt::format("{}.columns", key), which + words, several});
+    remarks_.push_back({key, which + words, several});
     return triad;
   }
 
@@ -197,8 +231,8 @@ class Assigner {
   }
 
   // Runs of three free columns side by side.
-  std::vector<std::array<std::size_t, 3>> free_triads() const {
-    std::vector<std::array<std::size_t, 3>> all;
+  std::vector<Triad> free_triads() const {
+    std::vector<Triad> all;
     for (std::size_t k = 0; k + 2 < values_.size(); ++k) {
       if (!used_[k] && !used_[k + 1] && !used_[k + 2]) {
         all.push_back({k, k + 1, k + 2});
@@ -210,89 +244,48 @@ class Assigner {
   // Samples of a block: a turn takes some seconds, and a recording a thousand of them.
   std::size_t block() const { return std::clamp<std::size_t>(values_.front().size() / 2000, 2, 25); }
 
-  static constexpr double most_scatter = 0.05;  // of gravity's size
-  struct SizeOfTriad {
-    double scatter = 0.0;  // of the size of a block's mean, in parts of it
-    bool turns = false;    // the direction changes
-  };
-  std::optional<SizeOfTriad> size_of(const std::array<std::size_t, 3>& triad) const {
-    const TriadColumns columns = triad_columns(values_, triad);
-    const Motion motion = find_motion(columns, columns, std::nullopt, block());
-    constexpr std::size_t fewest = 8;
-    if (motion.blocks.size() < fewest) {
-      return std::nullopt;
+  // What an interval of the time may be in s.
+  std::vector<double> intervals_s() const {
+    std::vector<double> all;
+    if (roles_.time && roles_.stamps.size() > 1) {
+      const auto interval = static_cast<double>(median_interval(roles_.stamps));
+      if (roles_.time_is_date) {
+        return {interval};
+      }
+      for (const std::string& unit : time_units_of(roles_.stamps, interval)) {
+        all.push_back(interval * find_unit(unit)->si);
+      }
     }
-    const auto count = static_cast<double>(motion.blocks.size());
-    double sum = 0.0;
-    for (const Block& block : motion.blocks) {
-      sum += block.accel.norm() / count;
-    }
-    SizeOfTriad found;
-    double squares = 0.0;
-    const Vector3 first = motion.blocks.front().accel.normalized();
-    for (const Block& block : motion.blocks) {
-      squares += std::pow(block.accel.norm() / sum - 1.0, 2) / count;
-      constexpr double far = 0.5;  // rad
-      found.turns = found.turns || block.accel.normalized().cross(first).norm() > far;
-    }
-    found.scatter = std::sqrt(squares);
-    if (found.scatter < 1e-9) {
-      return std::nullopt;  // flags and constants: no sensor is without noise
-    }
-    return sum > 0.0 ? std::optional<SizeOfTriad>(found) : std::nullopt;
+    return all;
   }
 
-  // Gravity: the size of the mean over a block is the same in all blocks, in whatever attitude. Three columns with a large
-  // constant one among them have a constant size too; but their direction does not turn.
   void find_accelerometers() {
     if (roles_.accelerometer) {
       return;
     }
-    SizeOfTriad best;
-    std::size_t alike = 0;
-    for (const auto& triad : free_triads()) {
-      const auto size = size_of(triad);
-      if (!size || size->scatter > most_scatter) {
-        continue;
-      }
-      if (!roles_.accelerometer || size->turns > best.turns) {
-        alike = 0;
-      }
-      alike += !roles_.accelerometer || size->turns >= best.turns ? 1 : 0;
-      if (!roles_.accelerometer || size->turns > best.turns ||
-          (size->turns == best.turns && size->scatter < best.scatter)) {
-        best = *size;
-        roles_.accelerometer = triad;
-      }
+    const auto found = gravity_columns(values_, free_triads(), block(), intervals_s());
+    if (!found) {
+      doubt_if_new("gyro.columns", "not looked for: without accelerometers nothing shows them");
+      return doubt_if_new("accelerometer.columns", "no three columns side by side of a constant size, as gravity has");
     }
-    if (!roles_.accelerometer) {
-      doubt("gyro.columns", "not looked for: without accelerometers nothing shows them");
-      return doubt("accelerometer.columns", "no three columns side by side of a constant size, as gravity has");
-    }
-    if (alike > 1) {
+    roles_.accelerometer = found->triad;
+    accelerometers_to_show_ = found->moves;
+    if (found->alike > 1) {
       doubt("accelerometer.columns",
-            fmt::format("{} sets of three columns side by side have a constant size, as gravity has", alike));
+            fmt::format("{} sets of three columns side by side have a constant size, as gravity has", found->alike));
     }
     for (const std::size_t k : *roles_.accelerometer) {
       take(k);
     }
     say("accelerometer.columns",
-        fmt::format("columns {} to {}: their size is constant within {:.2g} %, as gravity's is",
-                    roles_.accelerometer->front() + 1, roles_.accelerometer->back() + 1, 100.0 * best.scatter));
+        fmt::format("columns {} to {}: their size is constant within {:.2g} %{}", roles_.accelerometer->front() + 1,
+                    roles_.accelerometer->back() + 1, 100.0 * found->scatter,
+                    found->words.empty() ? ", as gravity's is" : ": " + found->words));
   }
 
-  // The least of three columns' largest deviation over what a block usually deviates by.
-  static double least_contrast(const Motion& motion) {
-    double least = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < 3; ++k) {
-      std::vector<double> off;
-      for (const Block& block : motion.blocks) {
-        off.push_back(std::abs(block.gyro[k] / static_cast<double>(motion.samples) - motion.bias[k]));
-      }
-      std::sort(off.begin(), off.end());
-      least = std::min(least, off.back() / std::max(off[off.size() / 4], 1e-300));
-    }
-    return least;
+  // Whether none of three columns stands still throughout.
+  bool varies(const Triad& triad) const {
+    return std::none_of(triad.begin(), triad.end(), [this](std::size_t k) { return is_constant(values_[k]); });
   }
 
   // What turns the specific force.
@@ -301,11 +294,11 @@ class Assigner {
       return;
     }
     struct Candidate {
-      std::array<std::size_t, 3> triad;
+      Triad triad;
       double explained, gimbal, contrast;
     };
     std::vector<Candidate> candidates;
-    const std::vector<std::array<std::size_t, 3>> free = free_triads();
+    const std::vector<Triad> free = free_triads();
     double best = 0.3;
     for (const auto& triad : free) {
       const Motion motion = find_motion(triad_columns(values_, triad), triad_columns(values_, *roles_.accelerometer),
@@ -320,6 +313,9 @@ class Assigner {
     // Turns about the vertical are not seen so: two gyros and a stranger may explain as much. What leaves a gimbal that fits
     // is right; else, a gyro turns and rests.
     std::erase_if(candidates, [best](const Candidate& c) { return c.explained < best - 0.05; });
+    if (std::any_of(candidates.begin(), candidates.end(), [this](const Candidate& c) { return varies(c.triad); })) {
+      std::erase_if(candidates, [this](const Candidate& c) { return !varies(c.triad); });
+    }
     std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
       return std::abs(a.gimbal - b.gimbal) > 0.02 ? a.gimbal > b.gimbal : a.contrast > b.contrast;
     });
@@ -334,9 +330,13 @@ class Assigner {
       say("gyro.columns", fmt::format("columns {} to {}: they explain {:.0f} % of how the specific force turns",
                                       roles_.gyro->front() + 1, roles_.gyro->back() + 1, 100.0 * best));
     } else if (!free.empty()) {
-      roles_.gyro = free.front();
+      const auto first = std::find_if(free.begin(), free.end(), [this](const Triad& t) { return varies(t); });
+      roles_.gyro = first == free.end() ? free.front() : *first;
       doubt("gyro.columns", fmt::format("columns {} to {}: three that are free; nothing shows that they are gyros",
                                         roles_.gyro->front() + 1, roles_.gyro->back() + 1));
+      if (accelerometers_to_show_) {
+        doubt_if_new("accelerometer.columns", "they turn, and no three columns beside them turn them, as gyros would");
+      }
     } else {
       return doubt("gyro.columns", "no three columns side by side are left");
     }
@@ -394,11 +394,7 @@ class Assigner {
   }
 
   bool says(std::size_t column, std::initializer_list<std::string_view> words) const {
-    const std::string& name = source_.names()[column];
-    return std::any_of(words.begin(), words.end(), [&name](std::string_view word) {
-      return std::search(name.begin(), name.end(), word.begin(), word.end(),
-                         [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; }) != name.end();
-    });
+    return name_says(source_.names()[column], words);
   }
   bool is_read_out(std::size_t column) const {
     return named_[column].role == Role::gimbal ||
@@ -474,6 +470,7 @@ class Assigner {
   std::vector<bool> used_;
   std::vector<std::size_t> taken_;
   Roles roles_;
+  bool accelerometers_to_show_ = false;  // found by their size alone, and turning
 };
 
 }  // namespace

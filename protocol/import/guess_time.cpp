@@ -3,7 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <regex>
+
+#include "protocol/import/name_words.hpp"
+#include "protocol/import/units.hpp"
 
 namespace selfcal::import {
 namespace {
@@ -29,6 +34,83 @@ bool even(const std::vector<long double>& values) {
 }  // namespace
 
 bool rises_evenly(const std::vector<long double>& stamps) { return increasing(stamps) && even(stamps); }
+
+std::string rate_in_head(std::string_view head) {
+  std::string found;
+  while (!head.empty()) {
+    const std::size_t end = std::min(head.find('\n'), head.size());
+    const std::string line(head.substr(0, end));
+    head.remove_prefix(std::min(end + 1, head.size()));
+    if (!holds(words_of(line), {"rate", "frequency", "speed"})) {
+      continue;
+    }
+    std::smatch match;
+    static const std::regex hertz("([0-9]+(?:\\.[0-9]+)?) ?[Hh][Zz]");
+    if (std::regex_search(line, match, hertz)) {
+      if (!found.empty() && found != match[1]) {
+        return {};
+      }
+      found = match[1];
+    }
+  }
+  return found;
+}
+
+std::string rate_words(std::string_view head) {
+  const std::string said = rate_in_head(head);
+  return said.empty() ? "--rate gives it" : fmt::format("the head says {} Hz, --rate {} takes it", said, said);
+}
+
+std::string counter_words(std::string_view head) {
+  return " rises by 1: a time in units of the interval, or a counter: " + rate_words(head);
+}
+
+int remoteness_of_clock(std::string_view name) {
+  const Words words = words_of(name);
+  if (holds(words, {"header", "device", "sensor"})) {
+    return 0;
+  }
+  return is_one_of(words, {"server", "host", "pc", "system", "received", "recv", "arrival", "logging"}) ? 2 : 1;
+}
+
+std::vector<std::size_t> times_by_name(const std::vector<std::string>& names, const std::vector<NamedColumn>& named) {
+  std::vector<std::size_t> times;
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    if (named[k].role == Role::time) {
+      times.push_back(k);
+    }
+  }
+  std::stable_sort(times.begin(), times.end(), [&names](std::size_t a, std::size_t b) {
+    return remoteness_of_clock(names[a]) < remoteness_of_clock(names[b]);
+  });
+  return times;
+}
+
+double seconds_of_unit(const std::string& unit) {
+  const auto known = find_unit(unit);
+  return known && known->quantity == Quantity::time ? known->si : 0.0;
+}
+
+std::optional<double> other_rate(const std::vector<long double>& stamps, double unit_s,
+                                 const std::vector<double>& others, double unit_of_others_s) {
+  const std::vector<long double> rival(others.begin(), others.end());
+  if (stamps.size() != rival.size() || stamps.size() < 2 || !rises_evenly(rival)) {
+    return std::nullopt;
+  }
+  constexpr double alike = 0.02;  // of the length: rows wait on their way, and two clocks differ
+  const auto ratio = static_cast<double>((rival.back() - rival.front()) / (stamps.back() - stamps.front()));
+  if (unit_s > 0.0 && unit_of_others_s > 0.0) {
+    const double faster = ratio * unit_of_others_s / unit_s;
+    return std::abs(faster - 1.0) < alike ? std::nullopt : std::optional(faster);
+  }
+  // Of unknown units: s, ms, 100us, us and ns differ by a power of ten.
+  const double tens = std::pow(10.0, std::round(std::log10(ratio)));
+  return std::abs(ratio / tens - 1.0) < alike ? std::nullopt : std::optional(ratio / tens);
+}
+
+bool counts_by_one(const std::vector<long double>& stamps) {
+  return std::adjacent_find(stamps.begin(), stamps.end(), [](auto a, auto b) { return b - a != 1.0L; }) == stamps.end();
+}
 
 std::string why_uneven(const std::vector<double>& times) {
   std::size_t places = 0, first = 0;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <initializer_list>
+#include <iterator>
 
 namespace selfcal::import {
 namespace {
@@ -52,6 +53,14 @@ std::optional<UnitFit> best_unit(double seen, double interval_s, const UnitClaim
   }
   const auto usual = std::find_if(fits.begin(), fits.end(), [](const UnitFit& f) { return !is_rare(f.unit); });
   UnitFit best = usual != fits.end() && usual->off <= tolerance.match ? *usual : fits.front();
+  // Who writes increments says so, as a rule.
+  const auto rates = std::find_if(fits.begin(), fits.end(), [&](const UnitFit& f) {
+    return !f.increments && !is_rare(f.unit) && f.off < tolerance.match &&
+           f.off < std::max(tolerance.rival, 3.0 * best.off);
+  });
+  if (best.increments && !claim.increments && claim.unit.empty() && rates != fits.end()) {
+    best = *rates;
+  }
   for (const UnitFit& fit : fits) {
     const bool other = fit.unit != best.unit || fit.increments != best.increments;
     if (other && fit.off < (is_rare(fit.unit) ? best.off : std::max(tolerance.rival, 3.0 * best.off))) {
@@ -129,6 +138,33 @@ TemperatureFit temperature_unit(double mean, const std::string& claimed, bool wh
 
 std::vector<std::string> time_units(double interval) {
   return units_by_rate(interval, {"s", "ms", "us", "ns"}, 1.0, 20000.0);
+}
+
+std::vector<std::string> time_units_of(const std::vector<long double>& stamps, double interval) {
+  std::vector<std::string> units = time_units(interval);
+  if (units.size() < 2 || stamps.empty()) {
+    return units;
+  }
+  const auto seconds_of = [](const std::string& unit) { return static_cast<long double>(find_unit(unit)->si); };
+  constexpr long double year_2000 = 946684800.0L, year_2100 = 4102444800.0L;  // s since 1970
+  std::vector<std::string> dated;
+  std::copy_if(units.begin(), units.end(), std::back_inserter(dated), [&](const std::string& unit) {
+    const long double first = stamps.front() * seconds_of(unit);
+    return first > year_2000 && first < year_2100;
+  });
+  if (dated.size() == 1) {
+    return dated;
+  }
+  // Nobody keeps a log that is over within a second. Whole numbers may as well be rows that were counted.
+  const bool whole =
+      std::all_of(stamps.begin(), stamps.end(), [](long double stamp) { return stamp == std::floor(stamp); });
+  const auto lasts = [&](const std::string& unit) {
+    return (stamps.back() - stamps.front()) * seconds_of(unit) > 1.0L;
+  };
+  if (!whole && std::any_of(units.begin(), units.end(), lasts)) {
+    std::erase_if(units, [&](const std::string& unit) { return !lasts(unit); });
+  }
+  return units;
 }
 
 std::vector<std::string> xsens_time_units(double interval) {

@@ -45,6 +45,9 @@ TemperatureFit temperature_unit(double mean, const std::string& claimed, bool wh
 
 // Units (s, ms, us, ns) in which times with this interval make 1 Hz to 20 kHz, the likeliest first.
 std::vector<std::string> time_units(double interval);
+// The same of a whole log: not by what the interval leaves open, where in one unit alone the stamps are since 1970 of this century, or where in
+// one of them the log is over within a second and its stamps are no whole numbers.
+std::vector<std::string> time_units_of(const std::vector<long double>& stamps, double interval);
 
 // The same of Xsens' SampleTimeFine, which counts 100us in some instruments and us in others, at 2 Hz to 5 kHz.
 std::vector<std::string> xsens_time_units(double interval);

@@ -195,6 +195,19 @@ std::vector<Turn> turns_of(const Motion& motion, const std::vector<Rest>& rests)
   return turns;
 }
 
+double least_contrast(const Motion& motion) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    std::vector<double> off;
+    for (const Block& block : motion.blocks) {
+      off.push_back(std::abs(block.gyro[k] / static_cast<double>(motion.samples) - motion.bias[k]));
+    }
+    std::sort(off.begin(), off.end());
+    least = std::min(least, off.back() / std::max(off[off.size() / 4], 1e-300));
+  }
+  return least;
+}
+
 double usual_force(const TriadColumns& accel) {
   const Motion motion =
       find_motion(accel, accel, std::nullopt, std::clamp<std::size_t>(accel.column[0]->size() / 2000, 2, 25));

@@ -54,6 +54,9 @@ std::vector<Rest> rests_of(const Motion& motion);
 std::optional<Vector3> centre_of_gravity_sphere(const TriadColumns& gyro, const TriadColumns& accel);
 std::vector<Turn> turns_of(const Motion& motion, const std::vector<Rest>& rests);
 
+// The least of three gyros' largest deviation over what a block usually deviates by: a gyro turns and rests.
+double least_contrast(const Motion& motion);
+
 // Size of the specific force over a few samples, the median of all: gravity's, of a sensor that mostly stands or is turned by hand.
 double usual_force(const TriadColumns& accel);
 

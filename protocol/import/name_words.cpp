@@ -41,6 +41,13 @@ bool holds(const Words& words, std::initializer_list<std::string_view> parts) {
   });
 }
 
+bool name_says(std::string_view name, std::initializer_list<std::string_view> parts) {
+  return std::any_of(parts.begin(), parts.end(), [&name](std::string_view part) {
+    return std::search(name.begin(), name.end(), part.begin(), part.end(),
+                       [](char a, char b) { return lower(a) == b; }) != name.end();
+  });
+}
+
 bool is_one_of(const Words& words, std::initializer_list<std::string_view> whole) {
   return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
     return std::any_of(whole.begin(), whole.end(), [&](std::string_view one) { return word == one; });

@@ -15,5 +15,7 @@ Words words_of(std::string_view name);
 // Whether a word holds one of these, or is one.
 bool holds(const Words& words, std::initializer_list<std::string_view> parts);
 bool is_one_of(const Words& words, std::initializer_list<std::string_view> whole);
+// Whether a name holds one of PARTS, written small, wherever its words end.
+bool name_says(std::string_view name, std::initializer_list<std::string_view> parts);
 
 }  // namespace selfcal::import

@@ -76,11 +76,14 @@ bool holds_stamps(const import::ColumnSource& source, std::size_t column) {
   return false;
 }
 
-Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std::vector<std::size_t>& times,
+Expected<TimedRows> read_with_time(const import::ColumnSource& source, std::vector<std::size_t> times,
                                    import::ColumnRequest request) {
   if (times.empty()) {
     return source.read(request).map([](import::ColumnData data) { return TimedRows{std::move(data), 0, {}}; });
   }
+  std::stable_sort(times.begin(), times.end(), [&source](std::size_t a, std::size_t b) {
+    return import::remoteness_of_clock(source.names()[a]) < import::remoteness_of_clock(source.names()[b]);
+  });
   std::optional<Expected<TimedRows>> first;
   for (const std::size_t candidate : times) {
     if (!holds_stamps(source, candidate) && candidate != times.back()) {
@@ -141,7 +144,8 @@ Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSourc
                                                   source.title(rows.time), other, way_out));
   }
   const bool xsens = source.names()[rows.time].find("SampleTimeFine") != std::string::npos;
-  const std::vector<std::string> units = xsens ? import::xsens_time_units(interval) : import::time_units(interval);
+  const std::vector<std::string> units =
+      xsens ? import::xsens_time_units(interval) : import::time_units_of(stamps, interval);
   // Excel's and MATLAB's days since 1900 and since 0.
   constexpr double shortest_s = 5e-5;
   constexpr std::array<std::pair<long double, long double>, 2> days{{{25000.0L, 80000.0L}, {690000.0L, 800000.0L}}};
@@ -154,6 +158,12 @@ Expected<std::string> time_unit(const TimedRows& rows, const import::ColumnSourc
                           fmt::format("{}: {}: intervals of {:.3g}: in s nothing samples so fast; a unit in its name "
                                       "says what it is (time_h); {}",
                                       file, source.title(rows.time), interval, way_out));
+  }
+  constexpr long double longest_count = 1e7L;  // s since 1970 are more
+  if (units.size() > 1 && stamps.back() < longest_count && import::counts_by_one(stamps)) {
+    return fail(ErrorKind::bad_input,
+                fmt::format("{}: {} rises by 1 from row to row: a second, or rows that are counted: {}", file,
+                            source.title(rows.time), way_out));
   }
   if (units.empty() || std::find(units.begin(), units.end(), "s") != units.end()) {
     return std::string("s");

@@ -24,7 +24,7 @@ bool holds_stamps(const import::ColumnSource& source, std::size_t column);
 // the day. Rows that stand twice are taken once, a few
 // that stand behind later ones are put in order, clocks that begin again where they are full go on, and where the request is tolerant rows
 // without a time are left out. No `times`: no stamps.
-Expected<TimedRows> read_with_time(const import::ColumnSource& source, const std::vector<std::size_t>& times,
+Expected<TimedRows> read_with_time(const import::ColumnSource& source, std::vector<std::size_t> times,
                                    import::ColumnRequest request);
 
 // A time that no name gives a unit is seconds, unless these make less than a sample a second and one other unit makes a usual rate. Error

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "protocol/import/guess_names.hpp"
+#include "protocol/import/guess_time.hpp"
 #include "protocol/import/guess_units.hpp"
 
 namespace selfcal::import {
@@ -27,8 +28,8 @@ TEST(Units, GravityTellsTheUnitWhereOneFits) {
 TEST(Units, WhatFitsTwiceIsTold) {
   const auto fit = accelerometer_unit(0.981, 0.1, {});
   ASSERT_TRUE(fit);
-  EXPECT_EQ(fit->unit, "m/s");
-  EXPECT_THAT(fit->rivals, ElementsAre("g (rates)"));
+  EXPECT_EQ(fit->unit, "g");
+  EXPECT_THAT(fit->rivals, ElementsAre("m/s (increments)"));
   const auto named = accelerometer_unit(0.981, 0.1, {"g", false});
   ASSERT_TRUE(named);
   EXPECT_EQ(named->unit, "g");
@@ -59,11 +60,21 @@ TEST(Units, AUnitSaysWhatANameOfAnotherLanguageIs) {
   EXPECT_EQ(read_name("wz [rev/s]", "").unit, "rev/s");
 }
 
+// At 10 Hz a g is an increment of 0.98 m/s too.
+TEST(Units, RatesBeforeIncrementsThatNobodySays) {
+  const auto fit = accelerometer_unit(0.966, 1.0 / 9.9, {});
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(fit->unit, "g");
+  EXPECT_THAT(fit->rivals, ElementsAre("m/s (increments)"));
+  EXPECT_EQ(accelerometer_unit(0.966, 1.0 / 9.9, {"", true})->unit, "m/s");
+}
+
 TEST(Units, TurnsTellRatesFromIncrements) {
   // 0.01 rad a count and sample at 100 Hz: rad/s. 57 Hz: rad/s and degrees are the same to a per cent.
   EXPECT_EQ(gyro_unit(0.01, 0.01, {}).value().unit, "rad/s");
   EXPECT_EQ(gyro_unit(0.0174533, 0.01, {}).value().unit, "deg");
-  EXPECT_THAT(gyro_unit(0.0174533, 1.0 / 57.0, {}).value().rivals, ElementsAre("rad/s (rates)"));
+  EXPECT_EQ(gyro_unit(0.0174533, 1.0 / 57.0, {}).value().unit, "rad/s");
+  EXPECT_THAT(gyro_unit(0.0174533, 1.0 / 57.0, {}).value().rivals, ElementsAre("deg (increments)"));
   EXPECT_EQ(gyro_unit(4.848e-8, 0.01, {}).value().unit, "deg/h");
 }
 
@@ -81,6 +92,45 @@ TEST(Units, TimesThatMakeASampleRate) {
   EXPECT_THAT(time_units(10000), ElementsAre("us"));
   EXPECT_THAT(time_units(0.1), ElementsAre("s", "ms"));  // 10 Hz or 10 kHz
   EXPECT_THAT(time_units(1e12), IsEmpty());
+}
+
+TEST(Units, TimesOfAWholeLog) {
+  const auto stamps = [](long double first, long double interval, int rows) {
+    std::vector<long double> all;
+    for (int k = 0; k < rows; ++k) {
+      all.push_back(first + interval * static_cast<long double>(k));
+    }
+    return all;
+  };
+  EXPECT_THAT(time_units_of(stamps(1582107260391.0L, 50.0L, 100000), 50.0), ElementsAre("ms"));  // since 1970
+  EXPECT_THAT(time_units_of(stamps(1582107260391000.0L, 500.0L, 100000), 500.0), ElementsAre("us"));
+  EXPECT_THAT(time_units_of(stamps(0.0L, 0.1L, 500), 0.1), ElementsAre("s"));  // over within 50 ms otherwise
+  EXPECT_THAT(time_units_of(stamps(0.0L, 0.1L, 100000), 0.1), ElementsAre("s", "ms"));
+  EXPECT_EQ(time_units_of(stamps(0.0L, 1.0L, 500), 1.0).size(), 2U);  // a counter that is called a time
+}
+
+// A clock of the computer that wrote the rows down stands behind the sensor's.
+TEST(Times, TwoClocksAreHeldAgainstEachOther) {
+  EXPECT_LT(remoteness_of_clock("field.header.stamp"), remoteness_of_clock("%time"));
+  EXPECT_LT(remoteness_of_clock("time"), remoteness_of_clock("server_time"));
+  std::vector<long double> stamps;
+  std::vector<double> alike, slower;
+  for (int k = 0; k < 100; ++k) {
+    stamps.push_back(static_cast<long double>(k));
+    alike.push_back(1e6 + 1e3 * (k + 0.1 * (k % 3)));
+    slower.push_back(560.0 * k);
+  }
+  EXPECT_FALSE(other_rate(stamps, 0.0, alike, 0.0));
+  EXPECT_FALSE(other_rate(stamps, 1.0, alike, 1e-3));
+  EXPECT_NEAR(other_rate(stamps, 1.0, slower, 1e-3).value(), 0.56, 1e-9);
+  EXPECT_NEAR(other_rate(stamps, 0.0, slower, 0.0).value(), 0.56, 1e-9);
+}
+
+TEST(Times, TheRateThatAHeadSays) {
+  EXPECT_EQ(rate_in_head("// Start Time: Unknown\n// Sample rate: 100.0Hz\n"), "100.0");
+  EXPECT_EQ(rate_in_head("# Config: data_rate = 2000 Hz, filter = 488 Hz\n"), "2000");
+  EXPECT_EQ(rate_in_head("OutputRate:,60Hz\nsampling rate 120 Hz\n"), "");
+  EXPECT_EQ(rate_in_head("# filter 42 Hz\n"), "");
 }
 
 // "accel_g_x" was a gyro for its g.

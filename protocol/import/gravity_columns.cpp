@@ -1,0 +1,125 @@
+#include "protocol/import/gravity_columns.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "estimator/geometry/units.hpp"
+
+namespace selfcal::import {
+namespace {
+
+constexpr double turns =
+    0.5;  // rad: of the direction, which three columns with a large constant one among them do not do
+
+struct Candidate {
+  Triad triad{};
+  SizeOfTriad size;
+  std::string words;
+};
+
+// In which unit SIZE is gravity's. Empty: in none.
+std::string gravity_words(double size, const std::vector<double>& intervals_s) {
+  constexpr double gravity = 9.807, near = 0.03;
+  const auto is = [size](double one) { return std::abs(size / one - 1.0) < near; };
+  for (const auto& [one, unit] : {std::pair{gravity, "m/s^2"}, std::pair{1.0, "g"}, std::pair{1000.0, "mg"}}) {
+    if (is(one)) {
+      return fmt::format("{:.4g}, gravity's in {}", size, unit);
+    }
+  }
+  for (const double interval : intervals_s) {
+    for (const auto& [one, unit] : {std::pair{gravity, "m/s"}, std::pair{1.0, "g*s"}}) {
+      if (is(one * interval)) {
+        return fmt::format("{:.4g}, gravity's in increments of {}", size, unit);
+      }
+    }
+  }
+  return {};
+}
+
+// Whether three free columns side by side stand beside TRIAD.
+bool leaves_gyros(const Triad& triad, const std::vector<Triad>& free) {
+  return std::any_of(free.begin(), free.end(), [&triad](const Triad& other) {
+    return other.back() < triad.front() || other.front() > triad.back();
+  });
+}
+
+bool overlap(const Triad& a, const Triad& b) { return a.front() <= b.back() && b.front() <= a.back(); }
+
+}  // namespace
+
+bool is_constant(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [&values](double v) { return v == values.front(); });
+}
+
+std::optional<SizeOfTriad> size_of_triad(const Values& values, const Triad& triad, std::size_t samples) {
+  const TriadColumns columns = triad_columns(values, triad);
+  const Motion motion = find_motion(columns, columns, std::nullopt, samples);
+  constexpr std::size_t fewest = 8;
+  if (motion.blocks.size() < fewest) {
+    return std::nullopt;
+  }
+  const auto count = static_cast<double>(motion.blocks.size());
+  double sum = 0.0;
+  for (const Block& block : motion.blocks) {
+    sum += block.accel.norm() / count;
+  }
+  SizeOfTriad found;
+  double squares = 0.0;
+  const Vector3 first = motion.blocks.front().accel.normalized();
+  for (const Block& block : motion.blocks) {
+    squares += std::pow(block.accel.norm() / sum - 1.0, 2) / count;
+    found.turned = std::max(found.turned, block.accel.normalized().cross(first).norm());
+  }
+  found.scatter = std::sqrt(squares);
+  found.size = sum;
+  if (found.scatter < 1e-9) {
+    return std::nullopt;  // flags and constants: no sensor is without noise
+  }
+  return sum > 0.0 ? std::optional<SizeOfTriad>(found) : std::nullopt;
+}
+
+std::optional<GravityColumns> gravity_columns(const Values& values, const std::vector<Triad>& free, std::size_t samples,
+                                              const std::vector<double>& intervals_s) {
+  std::vector<Candidate> found;
+  for (const Triad& triad : free) {
+    const auto size = size_of_triad(values, triad, samples);
+    if (size && size->scatter <= most_scatter_of_gravity) {
+      found.push_back({triad, *size, gravity_words(size->size, intervals_s)});
+    }
+  }
+  // Columns of two triads side by side have a constant size at rest too; but they leave no gyros.
+  const auto keep = [&found](auto&& good) {
+    if (std::any_of(found.begin(), found.end(), good)) {
+      std::erase_if(found, [&good](const Candidate& c) { return !good(c); });
+    }
+  };
+  keep([](const Candidate& c) { return c.size.turned > turns; });
+  keep([&](const Candidate& c) {
+    return std::none_of(c.triad.begin(), c.triad.end(), [&](std::size_t k) { return is_constant(values[k]); });
+  });
+  std::vector<Candidate> sized;
+  std::copy_if(found.begin(), found.end(), std::back_inserter(sized),
+               [&](const Candidate& c) { return !c.words.empty() && leaves_gyros(c.triad, free); });
+  std::erase_if(found, [&](const Candidate& c) {
+    return (c.words.empty() || !leaves_gyros(c.triad, free)) &&
+           std::any_of(sized.begin(), sized.end(),
+                       [&c](const Candidate& other) { return overlap(c.triad, other.triad); });
+  });
+  // A magnetometer that was made one long has the size of a g, and none of 9.8 m/s^2.
+  keep([&](const Candidate& c) { return c.words.find("m/s") != std::string::npos && leaves_gyros(c.triad, free); });
+  const auto best = std::min_element(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
+    return a.words.empty() == b.words.empty() ? a.size.scatter < b.size.scatter : b.words.empty();
+  });
+  if (best == found.end()) {
+    return std::nullopt;
+  }
+  constexpr double rests = 0.02;  // rad
+  GravityColumns chosen{best->triad, best->size.scatter, found.size(), best->words, best->size.turned > rests};
+  return chosen;
+}
+
+}  // namespace selfcal::import
