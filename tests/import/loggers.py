@@ -5,8 +5,10 @@
   T.UNIT            temperature                  m                 three magnetometers
   e e.rad           roll, pitch, yaw             lin grav          a phone's acceleration without gravity, and its gravity
   n n8 zero one     counter, one of 8 bits, constants              word q dt alt
+  date share        date and time, "13 / 22"                       three four five
 """
 import dataclasses
+import datetime
 
 import numpy
 
@@ -74,8 +76,15 @@ LOGGERS = [
     Logger("AndroSensor", ";", "sep=;\nACCELEROMETER X (m/s²);ACCELEROMETER Y (m/s²);ACCELEROMETER Z (m/s²);GRAVITY X (m/s²);GRAVITY Y (m/s²);GRAVITY Z (m/s²);"
            "LINEAR ACCELERATION X (m/s²);LINEAR ACCELERATION Y (m/s²);LINEAR ACCELERATION Z (m/s²);GYROSCOPE X (rad/s);GYROSCOPE Y (rad/s);"
            "GYROSCOPE Z (rad/s);LIGHT (lux);MAGNETIC FIELD X (μT);MAGNETIC FIELD Y (μT);MAGNETIC FIELD Z (μT);ORIENTATION Z (azimuth °);"
-           "ORIENTATION X (pitch °);ORIENTATION Y (roll °);Time since start in ms ;YYYY-MO-DD HH-MI-SS_SSS",
-           "a.m/s^2 grav lin g.rad/s one m e t.ms word", 1),
+           "ORIENTATION X (pitch °);ORIENTATION Y (roll °);Satellites in range;Time since start in ms ;YYYY-MO-DD HH-MI-SS_SSS",
+           "a.m/s^2 grav lin g.rad/s one m e share t.ms date", 1),
+    Logger("HyperIMU", ",", "@ HyperIMU -ianovir - 2018\n@ Date:Wed Feb 19 13:14:20 GMT+03:00 2020, Sampling Rate:10ms\n\n"
+           "timestamp,accelerometer_lsm6ds3_c.x,accelerometer_lsm6ds3_c.y,accelerometer_lsm6ds3_c.z,akm_akm09918.x,akm_akm09918.y,akm_akm09918.z,"
+           "gyroscope_lsm6ds3_c.x,gyroscope_lsm6ds3_c.y,gyroscope_lsm6ds3_c.z,gravity.x,gravity.y,gravity.z,linear_Acceleration.x,"
+           "linear_Acceleration.y,linear_Acceleration.z", "t.ms.1582107260 a.m/s^2 m g.rad/s grav lin", 3),
+    Logger("IMU+GPS stream, sensors by number", ", ", "", "t.s.683432 three a.m/s^2 four g.rad/s five m", -1),
+    Logger("a network's clock and the sensor's", ",", "server_time,device_timestamp_ms,accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z,mag_x,mag_y,mag_z,temp_c",
+           "date t.ms.40 a.g g.deg/s m T.C"),
     Logger("Sensor Logger", ",", "time,seconds_elapsed,Gyroscope_z,Gyroscope_y,Gyroscope_x,TotalAcceleration_z,TotalAcceleration_y,TotalAcceleration_x",
            "t.ns.1709164800 t.s gz.rad/s az.m/s^2"),
     Logger("Gyroflow .gcsv", ",", "GYROFLOW IMU LOG\nversion,1.3\nid,custom_logger\norientation,YxZ\ntscale,0.001\ngscale,0.0010642\nascale,0.00059855\n"
@@ -175,7 +184,9 @@ def column(what, t, rng):
         return [str(k % 256 if kind == "n8" else k + 4000) for k in range(n)]
     if kind == "alt":
         return text(9.81 + rng.normal(0, 0.01, n), 6)
-    constant = {"zero": "0", "one": "1", "word": "imu_link", "dt": "5000", "nov": "484620.664;00", "nov2": "00801503", "end": "-9895*a5db8c7b"}
+    if kind == "date":
+        return [(datetime.datetime(2020, 2, 19, 13, 14) + datetime.timedelta(seconds=e)).isoformat(" ", "milliseconds") for e in t["end"]]
+    constant = {"share": "13 / 22", "three": "3", "four": "4", "five": "5", "zero": "0", "one": "1", "word": "imu_link", "dt": "5000", "nov": "484620.664;00", "nov2": "00801503", "end": "-9895*a5db8c7b"}
     return [constant[kind]] * n
 
 
