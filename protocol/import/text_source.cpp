@@ -256,7 +256,7 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
   std::vector<std::string> found;
   std::string_view line;
   std::vector<std::string_view> fields;
-  constexpr std::size_t most = 8, one_in = 4;  // a flag that changes now and then tells no rows apart
+  constexpr std::size_t fewest = 20, most = 8, one_in = 4;  // a flag that changes now and then tells no rows apart
   std::string before;
   std::size_t changes = 0, row = 0;
   while (reader && row < lines_to_judge && found.size() <= most) {
@@ -281,8 +281,8 @@ std::vector<std::string> TextSource::labels(std::size_t column) const {
       found.emplace_back(fields[column]);
     }
   }
-  return found.size() < 2 || found.size() > most || one_in * changes < row ? std::vector<std::string>{}
-                                                                           : as_utf8(found);
+  return found.size() < 2 || found.size() > most || row < fewest || one_in * changes < row ? std::vector<std::string>{}
+                                                                                           : as_utf8(found);
 }
 
 Expected<std::vector<std::string>> first_lines(const std::filesystem::path& file) {
@@ -333,8 +333,11 @@ bool is_hex_dump(const std::vector<std::string_view>& lines) {
 std::string known_words(const std::vector<std::string_view>& lines) {
   const auto first = std::find_if(lines.begin(), lines.end(), [](std::string_view l) { return !trimmed(l).empty(); });
   const std::string_view begin = first == lines.end() ? std::string_view() : trimmed(*first);
-  if (begin == "[" || begin == "{" || begin.starts_with("[{") || begin.starts_with("{\"")) {
+  if (begin == "[" || begin.starts_with("[{")) {
     return "JSON that is no object a line: `jq -c '.[]'` makes such lines of an array of objects";
+  }
+  if (begin == "{" || begin.starts_with("{\"")) {
+    return "JSON that is no object a line: `jq -c '.NAME[]'` makes such lines of the array that is called NAME in it";
   }
   if (std::any_of(lines.begin(), lines.end(), [](std::string_view l) { return l == "linear_acceleration:"; })) {
     return "what `topic echo` prints: `rostopic echo -p` or `ros2 topic echo --csv` prints columns";

@@ -259,7 +259,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   OneLog log;
   PoseInput& input = log.input;
   input.sensors = layout->sensors;
-  log.nameless = !layout->by_names && layout->sensors == Sensors::both;
+  log.nameless = !layout->by_names && layout->sensors == Sensors::both && layout->gyro.front() < layout->accel.front();
   add_time(*rows, unit, columns.rate_hz, log);
   if (counter > 0) {
     take_lost_rows(rows->data.values[counted], (*source)->title(counter - 1), *columns.rate_hz, log);

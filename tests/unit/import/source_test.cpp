@@ -65,6 +65,18 @@ TEST_F(Source, RowsOfTwoSensorsAreToldFromAFlagThatChanges) {
   EXPECT_EQ((*one)->mixed_rows(), "");
 }
 
+// Two rows of a table are not two sensors that take turns.
+TEST_F(Source, FewRowsWithWordsAreNoSensors) {
+  const auto source = open("who,n,mean,std\nHealthy,520,12.8,6.1\nPD,519,12.9,4.7\n");
+  ASSERT_TRUE(source);
+  EXPECT_EQ((*source)->mixed_rows(), "");
+}
+
+TEST_F(Source, JsonInOnePieceSaysWhatMakesLinesOfIt) {
+  EXPECT_THAT(fault("{\"Meas\":{\"IMU9\":[{\"x\":0.03},{\"x\":0.04}]}}\n"), HasSubstr("jq -c '.NAME[]'"));
+  EXPECT_THAT(fault("[{\"x\":0.03},\n{\"x\":0.04}]\n"), HasSubstr("jq -c '.[]'"));
+}
+
 // Empatica's E4: when it began and how many rows a second it holds stand where the numbers stand, once for each column.
 TEST_F(Source, TheTwoLinesBeforeAWristbandsNumbersAreNone) {
   const auto source = open(
