@@ -408,12 +408,12 @@ class Guesser {
     accel.increments = said.increments;
     if (claimed && (claimed->quantity == Quantity::acceleration || claimed->quantity == Quantity::velocity)) {
       accel.unit = claimed->name;
+      const bool light = size * claimed->si < 2.0 * (claimed->quantity == Quantity::velocity ? interval : 1.0);
       return doubt("accelerometer.unit",
-                   fmt::format("{} by the name, but the usual force is {:.5g} of it: a sensor that "
-                               "moves, or another unit",
-                               said.unit, size));
+                   fmt::format("{} by the name, but the usual force is {:.5g} of it: {}", said.unit, size,
+                               light ? "gravity is not in it, as in a phone's linear acceleration"
+                                     : "a sensor that moves, or another unit"));
     }
-    // Without a rate nobody knows whether they are rates; if so, the size may be that of a unit.
     const auto rates =
         interval_s_ || said.increments || !(size > 0.0) ? std::nullopt : accelerometer_unit(size, 1.0, {});
     if (rates && !rates->increments && rates->off < nearness(triad_columns(values_, *roles_.accelerometer))) {

@@ -105,7 +105,7 @@ void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedCo
   std::vector<bool> plain(all.size(), false), linear(all.size(), false);
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (all[k].role == Role::accelerometer) {
-      linear[k] = holds(words_of(names[k]), {"linear", "user"});
+      linear[k] = holds(words_of(names[k]), {"linear", "linacc", "user"});
       plain[k] = !linear[k];
     }
   }

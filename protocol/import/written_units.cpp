@@ -11,6 +11,30 @@ namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+// "radianspersecond", "meters/second2": what people write in full, blanks left out, as it is written for short.
+std::string without_long_words(std::string text) {
+  constexpr std::array<std::array<std::string_view, 2>, 13> pairs{{{"radians", "rad"},
+                                                                   {"radian", "rad"},
+                                                                   {"degrees", "deg"},
+                                                                   {"degree", "deg"},
+                                                                   {"meters", "m"},
+                                                                   {"metres", "m"},
+                                                                   {"meter", "m"},
+                                                                   {"metre", "m"},
+                                                                   {"squared", "2"},
+                                                                   {"seconds", "s"},
+                                                                   {"second", "s"},
+                                                                   {"sec", "s"},
+                                                                   {"per", "/"}}};
+  for (const auto& [word, brief] : pairs) {
+    for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at)) {
+      text.replace(at, word.size(), brief);
+      at += brief.size();
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 // Blanks, points, carets and parentheses are taken out first.
@@ -139,8 +163,13 @@ std::string known_unit(std::string_view written) {
       {"f", "F"},
       {"degf", "F"},
   }};
-  const auto* const found = std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.written == text; });
-  return found == known.end() ? std::string() : std::string(found->unit);
+  const auto unit_of = [](const std::string& name) {
+    const auto* const found =
+        std::find_if(known.begin(), known.end(), [&](const Known& k) { return k.written == name; });
+    return found == known.end() ? std::string() : std::string(found->unit);
+  };
+  const std::string unit = unit_of(text);
+  return unit.empty() ? unit_of(without_long_words(std::move(text))) : unit;
 }
 
 }  // namespace selfcal::import

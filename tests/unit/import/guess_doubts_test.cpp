@@ -71,6 +71,15 @@ TEST_F(GuessDoubts, TheRateThatTheHeadSays) {
   EXPECT_THAT(remarks(text, "accelerometer.unit", true), HasSubstr("m/s^2 if these are rates"));
 }
 
+TEST_F(GuessDoubts, AccelerometersWithoutGravity) {
+  const std::string text = log(
+      "t,user_acc_x(G),user_acc_y(G),user_acc_z(G),rotation_rate_x(radians/s),rotation_rate_y(radians/s),"
+      "rotation_rate_z(radians/s)\n",
+      [](int k) { return fmt::format("{:.2f},", 0.01 * k); }, 0.0);
+  EXPECT_THAT(remarks(text, "accelerometer.unit", true), HasSubstr("gravity is not in it"));
+  EXPECT_THAT(remarks(text, "gyro.unit", false), HasSubstr("rad/s by its name"));
+}
+
 TEST_F(GuessDoubts, ANamedColumnThatLacksNumbers) {
   const std::string text = log("t," + names, [](int k) {
     return fmt::format("{:.2f},{}", 0.01 * k, k % 5 == 0 ? ",,,,,\n" + fmt::format("{:.3f},", 0.01 * k + 0.005) : "");

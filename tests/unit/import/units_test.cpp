@@ -163,6 +163,14 @@ TEST(Names, DirectionsAreARightHandedTriad) {
   EXPECT_EQ(axes({"lat", "long", "alt", "vert_acc"}), (std::vector<int>{-1, -1, -1, -1}));
 }
 
+TEST(Names, UnitsInFull) {
+  EXPECT_EQ(known_unit("radians/s"), "rad/s");
+  EXPECT_EQ(known_unit("degrees per second"), "deg/s");
+  EXPECT_EQ(known_unit("meters/second^2"), "m/s^2");
+  EXPECT_EQ(known_unit("metres per second squared"), "m/s^2");
+  EXPECT_EQ(known_unit("microteslas"), "");
+}
+
 TEST(Names, WhatATimeCounts) {
   EXPECT_EQ(read_name("Time [min]", "").unit, "min");
   EXPECT_EQ(read_name("time_hrs", "").unit, "h");
