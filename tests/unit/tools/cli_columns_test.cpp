@@ -63,6 +63,24 @@ TEST_F(PosesColumns, OfAPlanarModuleTheGyroIsAnswered) {
   }
 }
 
+// "Timestamp" 0, 1, 2: a second, or rows that were counted. Those since 1970 are seconds.
+TEST_F(PosesColumns, ATimeThatOnlyCountsRowsIsAskedFor) {
+  for (const long begin : {0L, 1700000000L}) {
+    const std::string log = folder_ / "counted.csv";
+    std::ofstream file(log);
+    file << "Timestamp,acc_x_g,acc_y_g,acc_z_g,gyr_x_dps,gyr_y_dps,gyr_z_dps\n";
+    for (int row = 0; row < 400; ++row) {
+      file << fmt::format("{},0.01,0.02,{:.3f},0.1,{:.2f},0.3\n", begin + row, 1.0 + 1e-3 * (row % 7),
+                          0.01 * (row % 5));
+    }
+    file.close();
+    const auto read = run_selfcal({"poses", log});
+    EXPECT_EQ(read.error.find("rows that are counted") != std::string::npos, begin == 0) << read.error;
+    const auto told = run_selfcal({"poses", log, "--rate", "100"});
+    EXPECT_THAT(told.error, Not(HasSubstr("rows that are counted")));
+  }
+}
+
 TEST_F(PosesColumns, OfSeveralSetsTheRawOneOrThatWhichIsListed) {
   const std::vector<std::string> sets = {"ax_g", "ay_g", "az_g", "a_raw_x", "a_raw_y", "a_raw_z"};
   const auto raw = poses(sets);
