@@ -482,10 +482,33 @@ async function open(browser, page_file, where, width, scheme) {
   const context = await browser.newContext({viewport: {width, height: 1000}, colorScheme: scheme, offline: true});
   const page = await context.newPage();
   page.setDefaultTimeout(patience_ms);
-  page.on('console', (message) => failures.push(`${where}: console: ${message.text()}`));
-  page.on('pageerror', (error) => failures.push(`${where}: ${error.message}`));
-  page.on('request', (request) => expect(/^(file|data|blob):/.test(request.url()), `${where}: asks for ${request.url()}`));
+  page.on('console', (message) => failures.push(`${page.where}: console: ${message.text()}`));
+  page.on('pageerror', (error) => failures.push(`${page.where}: ${error.message}`));
+  page.on('request', (request) => expect(/^(file|data|blob):/.test(request.url()), `${page.where}: asks for ${request.url()}`));
+  await go(page, page_file, where);
+  return page;
+}
+
+async function go(page, page_file, where) {
+  page.where = where;
   await page.goto(pathToFileURL(page_file).href, {waitUntil: 'domcontentloaded'});
+}
+
+// One window of each width and scheme for all pages, which keep nothing from one to the next: a new one takes longer than a page. Where
+// the time of a page is asked for each has its own.
+const windows = new Map();
+
+async function show(browser, page_file, where, width, scheme) {
+  const key = `${width} ${scheme}`;
+  let page = windows.get(key);
+  if (page && slowest_plot_ms === Infinity) {
+    await page.setViewportSize({width, height: 1000});
+    await go(page, page_file, where);
+  } else {
+    await page?.context().close();
+    page = await open(browser, page_file, where, width, scheme);
+    windows.set(key, page);
+  }
   return page;
 }
 
@@ -493,7 +516,7 @@ async function check_page(browser, page_file) {
   expect(statSync(page_file).size < largest_page, `${statSync(page_file).size} bytes`);
   for (const [width, scheme] of [[1400, 'light'], [800, 'dark']]) {
     const where = `${kind}, ${width} px ${scheme}`;
-    const page = await open(browser, page_file, where, width, scheme);
+    const page = await show(browser, page_file, where, width, scheme);
     await page.waitForSelector('html[data-ready]', {state: 'attached'});
     if (wanted[kind].length > 0) {
       await page.waitForFunction(() => performance.getEntriesByName('first-plot').length > 0);
@@ -522,26 +545,24 @@ async function check_page(browser, page_file) {
     if (pictures) {
       await page.screenshot({path: `${pictures}/${kind}-${width}.png`, fullPage: true});
     }
-    await page.context().close();
   }
+  // Printed as it comes from a window of its own.
   const page = await open(browser, page_file, `${kind}, paper`, 1400, 'light');
   await check_paper(page, `${kind}, paper`);
   await page.context().close();
 }
 
 async function check_altered(browser, page_file) {
-  const page = await open(browser, page_file, `${kind} ${page_file}`, 1400, 'light');
+  const page = await show(browser, page_file, `${kind} ${page_file}`, 1400, 'light');
   await page.waitForSelector('html[data-ready]', {state: 'attached'});
   await check_hostile(page);
-  await page.context().close();
 }
 
 // The test itself must be able to fail.
 async function check_other_numbers(browser, page_file) {
-  const page = await open(browser, page_file, kind, 1400, 'light');
+  const page = await show(browser, page_file, kind, 1400, 'light');
   await page.waitForSelector('html[data-ready]', {state: 'attached'});
   await check_estimate(page);
-  await page.context().close();
   const found = failures.length;
   failures = found > 0 ? [] : ["the page passes with another calibration's numbers"];
 }
