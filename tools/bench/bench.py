@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import freshness
+import service_bus
 
 ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("SELFCAL_BIN", ROOT / "build" / "bin"))
@@ -55,7 +56,7 @@ class Bench:
         self.folder.mkdir(parents=True, exist_ok=True)
         self.interface, self.name, self.speed, self.seed = interface, name, speed, seed
         self.sim_options = list(sim_options)
-        self.sim_process = self.daemon_process = None
+        self.sim_process = self.daemon_process = self.service_bus = None
         self.truth_file = self.folder / "truth.json"
         self.key_file = self.folder / "ins.key"
         self.key_file.touch(mode=0o600)
@@ -138,6 +139,7 @@ class Bench:
         self._end(self.daemon_process, signal.SIGTERM)
 
     def stop(self):
+        self.leave_service_bus()
         self.end_daemon()
         self._end(self.sim_process, signal.SIGTERM)
 
@@ -175,12 +177,29 @@ class Bench:
         return seen
 
     def wait_for_end(self, run, timeout=300.0):
+        """The run's document. The first and the last are asked with `selfcal show`; those between them of the service itself."""
         end = time.monotonic() + timeout
         while (document := self.document(run))["exit_status"] is None:
-            if time.monotonic() > end:
-                raise RuntimeError(f"run {run} has not ended within {timeout:g} s; state {document['state']}")
-            time.sleep(0.1)
+            while document["exit_status"] is None:
+                if time.monotonic() > end:
+                    raise RuntimeError(f"run {run} has not ended within {timeout:g} s; state {document['state']}")
+                time.sleep(0.1)
+                document = self.document_of_service(run) or self.document(run)
         return document
+
+    def document_of_service(self, run):
+        """None where the service does not answer."""
+        try:
+            self.service_bus = self.service_bus or service_bus.ServiceBus()
+            return self.service_bus.document(run)
+        except OSError:
+            self.leave_service_bus()
+            return None
+
+    def leave_service_bus(self):
+        if self.service_bus is not None:
+            self.service_bus.close()
+            self.service_bus = None
 
     def truth(self):
         return {p["name"]: p["value"] for p in json.loads(self.truth_file.read_text(encoding="utf-8"))["parameters"]}
