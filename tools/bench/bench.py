@@ -102,8 +102,8 @@ class Bench:
 
     def start_daemon(self):
         self.spawn_daemon()
-        self._wait_for(lambda: self.selfcal("status", "--json", check=False).returncode == 0, self.daemon_process,
-                       "selfcald")
+        self._wait_for(lambda: self.of_service_bus(lambda bus: bus.has_service(), True) and
+                       self.selfcal("status", "--json", check=False).returncode == 0, self.daemon_process, "selfcald")
 
     def _wait_for(self, ready, process, name, seconds=120.0):
         end = time.monotonic() + seconds
@@ -189,12 +189,16 @@ class Bench:
 
     def document_of_service(self, run):
         """None where the service does not answer."""
+        return self.of_service_bus(lambda bus: bus.document(run), None)
+
+    def of_service_bus(self, question, unknown):
+        """`unknown` where there is no bus to be asked."""
         try:
             self.service_bus = self.service_bus or service_bus.ServiceBus()
-            return self.service_bus.document(run)
+            return question(self.service_bus)
         except OSError:
             self.leave_service_bus()
-            return None
+            return unknown
 
     def leave_service_bus(self):
         if self.service_bus is not None:

@@ -8,6 +8,7 @@ import struct
 CALL, RETURN, ERROR = 1, 2, 3
 PATH, INTERFACE, MEMBER, DESTINATION, SIGNATURE = 1, 2, 3, 6, 8
 SYSTEM = "unix:path=/var/run/dbus/system_bus_socket"
+BUS, SERVICE = "org.freedesktop.DBus", "org.selfcal.Manager1"
 PATIENCE_S = 180.0
 
 
@@ -47,7 +48,7 @@ class ServiceBus:
             if not answer.startswith(b"OK "):
                 raise ConnectionError(f"the bus does not let us in: {answer}")
             self.socket.sendall(b"BEGIN\r\n")
-            self.ask("org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus", "Hello")
+            self.ask(BUS, "/org/freedesktop/DBus", BUS, "Hello")
         except OSError:
             self.close()
             raise
@@ -79,7 +80,10 @@ class ServiceBus:
                 length, = struct.unpack("<I" if order == b"l" else ">I", body[:4])
                 return body[4:4 + length].decode()
 
+    def has_service(self):
+        return self.ask(BUS, "/org/freedesktop/DBus", BUS, "GetNameOwner", "s", string(SERVICE)) is not None
+
     def document(self, run):
         """What `selfcal show RUN --json` prints; None where the service has none or is not there."""
-        text = self.ask("org.selfcal.Manager1", "/org/selfcal/Manager", "org.selfcal.Manager1", "Show", "t", struct.pack("<Q", run))
+        text = self.ask(SERVICE, "/org/selfcal/Manager", SERVICE, "Show", "t", struct.pack("<Q", run))
         return None if text is None else json.loads(text)
