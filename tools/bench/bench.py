@@ -11,6 +11,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import dbus
 import freshness
 import service_bus
 
@@ -196,7 +197,7 @@ class Bench:
         try:
             self.service_bus = self.service_bus or service_bus.ServiceBus()
             return question(self.service_bus)
-        except OSError:
+        except dbus.DBusException:
             self.leave_service_bus()
             return unknown
 
