@@ -11,7 +11,9 @@ namespace {
 // Z^T Z, of which one half is reckoned.
 Eigen::MatrixXd square_of(const Eigen::MatrixXd& Z) {
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(Z.cols(), Z.cols());
-  G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+  if (Z.size() > 0) {  // BLAS calls a matrix without elements an error, and says so on standard output
+    G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+  }
   return G.selfadjointView<Eigen::Lower>();
 }
 

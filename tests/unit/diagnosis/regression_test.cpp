@@ -22,6 +22,19 @@ TEST(FitColumns, LeavesOutWhatCannotBeSeen) {
   EXPECT_EQ(seen.rank, 2);  // the negative control
 }
 
+// Where nothing is named and every axis has its noise there is no column. BLAS would say on standard output, where an answer is read from, that
+// a matrix without elements is an error.
+TEST(EvidenceOfRows, WithoutColumnsSaysNothing) {
+  SignatureRows rows;
+  rows.columns.resize(3, 0);
+  rows.residual = Eigen::Vector3d(1.0, 2.0, 2.0);
+  testing::internal::CaptureStdout();
+  const Evidence evidence(rows);
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(evidence.information.size(), 0);
+  EXPECT_EQ(evidence.square, 9.0);
+}
+
 TEST(SigmaAbout, IsThatOfASingleNormal) {
   EXPECT_NEAR(sigma_about(3.0, {{0.2, 3.0, 0.7}}), 0.7, 1e-12);
   EXPECT_EQ(sigma_about(3.0, {{1.0, 3.0, 0.0}}), 0.0);
