@@ -7,33 +7,36 @@
 #include <iterator>
 #include <utility>
 
-#include "estimator/geometry/units.hpp"
-
 namespace selfcal::import {
 namespace {
 
-constexpr double turns =
-    0.5;  // rad: of the direction, which three columns with a large constant one among them do not do
+// Sine of a turn of the direction, which three columns with a large constant one among them do not make.
+constexpr double turns = 0.5;
+
+// In which unit a size is gravity's; no words: in none.
+struct GravityUnit {
+  std::string words;
+  bool metres = false;  // of m/s^2 or m/s
+};
 
 struct Candidate {
   Triad triad{};
   SizeOfTriad size;
-  std::string words;
+  GravityUnit unit;
 };
 
-// In which unit SIZE is gravity's. Empty: in none.
-std::string gravity_words(double size, const std::vector<double>& intervals_s) {
+GravityUnit gravity_unit(double size, const std::vector<double>& intervals_s) {
   constexpr double gravity = 9.807, near = 0.03;
   const auto is = [size](double one) { return std::abs(size / one - 1.0) < near; };
   for (const auto& [one, unit] : {std::pair{gravity, "m/s^2"}, std::pair{1.0, "g"}, std::pair{1000.0, "mg"}}) {
     if (is(one)) {
-      return fmt::format("{:.4g}, gravity's in {}", size, unit);
+      return {fmt::format("{:.4g}, gravity's in {}", size, unit), one == gravity};
     }
   }
   for (const double interval : intervals_s) {
     for (const auto& [one, unit] : {std::pair{gravity, "m/s"}, std::pair{1.0, "g*s"}}) {
       if (is(one * interval)) {
-        return fmt::format("{:.4g}, gravity's in increments of {}", size, unit);
+        return {fmt::format("{:.4g}, gravity's in increments of {}", size, unit), one == gravity};
       }
     }
   }
@@ -88,7 +91,7 @@ std::optional<GravityColumns> gravity_columns(const Values& values, const std::v
   for (const Triad& triad : free) {
     const auto size = size_of_triad(values, triad, samples);
     if (size && size->scatter <= most_scatter_of_gravity) {
-      found.push_back({triad, *size, gravity_words(size->size, intervals_s)});
+      found.push_back({triad, *size, gravity_unit(size->size, intervals_s)});
     }
   }
   // Columns of two triads side by side have a constant size at rest too; but they leave no gyros.
@@ -103,23 +106,22 @@ std::optional<GravityColumns> gravity_columns(const Values& values, const std::v
   });
   std::vector<Candidate> sized;
   std::copy_if(found.begin(), found.end(), std::back_inserter(sized),
-               [&](const Candidate& c) { return !c.words.empty() && leaves_gyros(c.triad, free); });
+               [&](const Candidate& c) { return !c.unit.words.empty() && leaves_gyros(c.triad, free); });
   std::erase_if(found, [&](const Candidate& c) {
-    return (c.words.empty() || !leaves_gyros(c.triad, free)) &&
+    return (c.unit.words.empty() || !leaves_gyros(c.triad, free)) &&
            std::any_of(sized.begin(), sized.end(),
                        [&c](const Candidate& other) { return overlap(c.triad, other.triad); });
   });
   // A magnetometer that was made one long has the size of a g, and none of 9.8 m/s^2.
-  keep([&](const Candidate& c) { return c.words.find("m/s") != std::string::npos && leaves_gyros(c.triad, free); });
+  keep([&](const Candidate& c) { return c.unit.metres && leaves_gyros(c.triad, free); });
   const auto best = std::min_element(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
-    return a.words.empty() == b.words.empty() ? a.size.scatter < b.size.scatter : b.words.empty();
+    return a.unit.words.empty() == b.unit.words.empty() ? a.size.scatter < b.size.scatter : b.unit.words.empty();
   });
   if (best == found.end()) {
     return std::nullopt;
   }
   constexpr double rests = 0.02;  // rad
-  GravityColumns chosen{best->triad, best->size.scatter, found.size(), best->words, best->size.turned > rests};
-  return chosen;
+  return GravityColumns{best->triad, best->size.scatter, found.size(), best->unit.words, best->size.turned > rests};
 }
 
 }  // namespace selfcal::import

@@ -73,6 +73,12 @@ int remoteness_of_clock(std::string_view name) {
   return is_one_of(words, {"server", "host", "pc", "system", "received", "recv", "arrival", "logging"}) ? 2 : 1;
 }
 
+void nearest_clock_first(const std::vector<std::string>& names, std::vector<std::size_t>& times) {
+  std::stable_sort(times.begin(), times.end(), [&names](std::size_t a, std::size_t b) {
+    return remoteness_of_clock(names[a]) < remoteness_of_clock(names[b]);
+  });
+}
+
 std::vector<std::size_t> times_by_name(const std::vector<std::string>& names, const std::vector<NamedColumn>& named) {
   std::vector<std::size_t> times;
   for (std::size_t k = 0; k < named.size(); ++k) {
@@ -80,9 +86,7 @@ std::vector<std::size_t> times_by_name(const std::vector<std::string>& names, co
       times.push_back(k);
     }
   }
-  std::stable_sort(times.begin(), times.end(), [&names](std::size_t a, std::size_t b) {
-    return remoteness_of_clock(names[a]) < remoteness_of_clock(names[b]);
-  });
+  nearest_clock_first(names, times);
   return times;
 }
 

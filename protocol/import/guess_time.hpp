@@ -22,7 +22,10 @@ std::string counter_words(std::string_view head);  // behind the title of a colu
 // How far from the sensor a clock stands by its name: 0 its own, 1 nobody says, 2 that of the computer that wrote the row down.
 int remoteness_of_clock(std::string_view name);
 
-// Columns that are called times: the sensor's own before that of a computer that took a row over behind it.
+// Times by the names of their columns: the sensor's own clock before that of a computer that took a row over behind it.
+void nearest_clock_first(const std::vector<std::string>& names, std::vector<std::size_t>& times);
+
+// Columns that are called times, the nearest clock first.
 std::vector<std::size_t> times_by_name(const std::vector<std::string>& names, const std::vector<NamedColumn>& named);
 
 // 0 of a unit that is none of time, or none.

@@ -81,9 +81,7 @@ Expected<TimedRows> read_with_time(const import::ColumnSource& source, std::vect
   if (times.empty()) {
     return source.read(request).map([](import::ColumnData data) { return TimedRows{std::move(data), 0, {}}; });
   }
-  std::stable_sort(times.begin(), times.end(), [&source](std::size_t a, std::size_t b) {
-    return import::remoteness_of_clock(source.names()[a]) < import::remoteness_of_clock(source.names()[b]);
-  });
+  import::nearest_clock_first(source.names(), times);
   std::optional<Expected<TimedRows>> first;
   for (const std::size_t candidate : times) {
     if (!holds_stamps(source, candidate) && candidate != times.back()) {
