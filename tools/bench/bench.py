@@ -178,15 +178,15 @@ class Bench:
         return seen
 
     def wait_for_end(self, run, timeout=300.0):
-        """The run's document. The first and the last are asked with `selfcal show`; those between them of the service itself."""
+        """The run's document, as `selfcal show` has it in the beginning and in the end; between, the service itself is asked."""
         end = time.monotonic() + timeout
-        while (document := self.document(run))["exit_status"] is None:
-            while document["exit_status"] is None:
-                if time.monotonic() > end:
-                    raise RuntimeError(f"run {run} has not ended within {timeout:g} s; state {document['state']}")
-                time.sleep(0.1)
-                document = self.document_of_service(run) or self.document(run)
-        return document
+        document = self.document(run)
+        while document["exit_status"] is None:
+            if time.monotonic() > end:
+                raise RuntimeError(f"run {run} has not ended within {timeout:g} s; state {document['state']}")
+            time.sleep(0.1)
+            document = self.document_of_service(run) or self.document(run)
+        return self.document(run)
 
     def document_of_service(self, run):
         """None where the service does not answer."""
