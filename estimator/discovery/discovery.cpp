@@ -193,8 +193,8 @@ class LawSearch::Search {
     if (ahead < 0.0) {
       state_ = laws_first;
       integrated_out_ = beside_laws;
-      residual_
-          .put_back();  // what may stand in a law's place is asked of the recording without the other way's processes
+      // What may stand in a law's place is asked of the recording without the other way's processes.
+      residual_.put_back();
       settle();
     }
   }

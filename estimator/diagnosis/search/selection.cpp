@@ -160,8 +160,9 @@ std::vector<const Effect*> equivalents(const Evidence& evidence, const std::vect
       continue;
     }
     const GroupTest test = test_group(evidence, columns_of(rival), others);
-    const bool contains = test.delta_chi2 > own.delta_chi2 - contained_gain && test.log_p < contained_share * own.log_p;
-    if (test.log_p < own.log_p + class_log_odds || contains) {
+    const bool only_longer =
+        test.delta_chi2 > own.delta_chi2 - contained_gain && test.log_p < contained_share * own.log_p;
+    if (test.log_p < own.log_p + class_log_odds || only_longer) {
       all.push_back(rival.effect);
     }
   }
