@@ -1,6 +1,8 @@
 #include "sim_ins/base_motion.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 #include "estimator/geometry/units.hpp"
@@ -34,12 +36,53 @@ void add(Derivatives& sum, const std::vector<Settling>& settlings, double t) {
   }
 }
 
+constexpr std::size_t degree = 5;
+using Weights = std::array<double, degree + 1>;
+
+// Weights of the coefficients from `degree` before a knot to the knot, `u` of a step behind it (de Boor 1978), of each degree up to the fifth;
+// coefficient k counts from knot k on.
+std::array<Weights, degree + 1> weights_at(double u) {
+  std::array<Weights, degree + 1> w{};
+  w[0][0] = 1.0;
+  for (std::size_t d = 1; d <= degree; ++d) {
+    for (std::size_t j = 0; j <= d; ++j) {
+      const double before = j > 0 ? w[d - 1][j - 1] : 0.0, behind = j < d ? w[d - 1][j] : 0.0;
+      const auto whole = static_cast<double>(d), at = static_cast<double>(j);
+      w[d][j] = ((u + whole - at) * before + (at + 1.0 - u) * behind) / whole;
+    }
+  }
+  return w;
+}
+
+void add(Derivatives& sum, const std::vector<NoiseSpline>& splines, double t) {
+  constexpr std::ptrdiff_t centre = 3;
+  for (const NoiseSpline& s : splines) {
+    const double at = t / s.step_s, knot = std::floor(at), rate = 1.0 / s.step_s;
+    const std::array<Weights, degree + 1> w = weights_at(at - knot);
+    const auto n = static_cast<std::ptrdiff_t>(s.coefficients.size());
+    // Derivatives are differences of the coefficients with the weights of one degree less.
+    const auto weight = [&w](std::size_t d, std::size_t j, std::size_t less) {
+      return j >= less && j - less <= d ? w[d][j - less] : 0.0;
+    };
+    for (std::size_t j = 0; j <= degree; ++j) {
+      const std::ptrdiff_t k = static_cast<std::ptrdiff_t>(knot) - static_cast<std::ptrdiff_t>(degree) +
+                               static_cast<std::ptrdiff_t>(j) + centre;
+      const double c = s.coefficients[static_cast<std::size_t>((k % n + n) % n)];
+      sum.value += c * w[degree][j];
+      sum.first += c * rate * (weight(degree - 1, j, 1) - weight(degree - 1, j, 0));
+      sum.second +=
+          c * rate * rate * (weight(degree - 2, j, 2) - 2.0 * weight(degree - 2, j, 1) + weight(degree - 2, j, 0));
+    }
+  }
+}
+
 }  // namespace
 
 bool BaseMotion::still() const {
   return roll.empty() && pitch.empty() && yaw.empty() && surge.empty() && heave.empty() && sway.empty() &&
          settling_roll.empty() && settling_pitch.empty() && settling_surge.empty() && settling_heave.empty() &&
-         settling_sway.empty();
+         settling_sway.empty() && noise_roll.empty() && noise_pitch.empty() && noise_surge.empty() &&
+         noise_sway.empty();
 }
 
 BaseMotion moored_base_motion() {
@@ -63,15 +106,19 @@ BaseState base_state(const BaseMotion& motion, const Attitude& mean, double t) {
   Derivatives roll, pitch, yaw, surge, heave, sway;
   add(roll, motion.roll, t);
   add(roll, motion.settling_roll, t);
+  add(roll, motion.noise_roll, t);
   add(pitch, motion.pitch, t);
   add(pitch, motion.settling_pitch, t);
+  add(pitch, motion.noise_pitch, t);
   add(yaw, motion.yaw, t);
   add(surge, motion.surge, t);
   add(surge, motion.settling_surge, t);
+  add(surge, motion.noise_surge, t);
   add(heave, motion.heave, t);
   add(heave, motion.settling_heave, t);
   add(sway, motion.sway, t);
   add(sway, motion.settling_sway, t);
+  add(sway, motion.noise_sway, t);
   state.attitude.roll += roll.value;
   state.attitude.pitch += pitch.value;
   state.attitude.heading += yaw.value;

@@ -19,12 +19,19 @@ struct Settling {
   double tau_s = 1.0;
 };
 
+// A spline of the fifth degree: the sum of its coefficients times the spline about k step_s, which repeats after the last one.
+struct NoiseSpline {
+  double step_s = 1.0;
+  std::vector<double> coefficients;  // rad or m; six and more
+};
+
 // Axes: roll, pitch, yaw of the vehicle, yaw adding to the heading (clockwise from north); surge forward and sway
 // right along the mean heading, heave up, both level.
 struct BaseMotion {
   std::vector<Sine> roll, pitch, yaw;
   std::vector<Sine> surge, heave, sway;
   std::vector<Settling> settling_roll, settling_pitch, settling_surge, settling_heave, settling_sway;
+  std::vector<NoiseSpline> noise_roll, noise_pitch, noise_surge, noise_sway;
 
   bool still() const;
 };

@@ -103,6 +103,12 @@ Expected<ImuSimulator> ImuSimulator::create(const SimConfig& config, GimbalMotio
     add_base_effect(base, effect);
   }
   for (const NoiseSpectrum& spectrum : physics.spectra) {
+    constexpr double most = 0x1p23;  // half a gigabyte to draw
+    if (const double samples = repeats_after(spectrum, config.sample_rate_hz); samples > most) {
+      return fail(ErrorKind::bad_input,
+                  fmt::format("physics: the loudness of a spectrum makes {:.3g} samples, at most {:.3g} are drawn",
+                              samples, most));
+    }
     if (of_base(spectrum)) {
       add_tilt(spectrum, seed, base);
     }

@@ -61,6 +61,10 @@ struct ConcealedPhysics {
 //   unit = "deg/h/sqrt(Hz)"              # ug/sqrt(Hz) for accel_*, arcsec/sqrt(Hz) for base_*
 //   edges_hz = [0.0, 0.1, 50.0]
 //   density = [2.0, 1.5]
+//   [[spectrum.loudness]]                # may be left out: bands, rising, of noise that is loud at times
+//   below_hz = 2.5                       # from the band before
+//   step_s = 1.0
+//   power = [0.5, 3.0, 0.5]              # over the table's, the first at the start
 // Unknown id or key, wrong type, non-finite value: bad_input naming file, line and key.
 [[nodiscard]] Expected<ConcealedPhysics> read_physics(const std::string& path);
 [[nodiscard]] Expected<ConcealedPhysics> parse_physics(const std::string& text, const std::string& name);

@@ -133,6 +133,31 @@ constexpr std::array<ChannelName, 8> channels = {{{"gyro_x", "deg/h/sqrt(Hz)", u
                                                   {"base_roll", "arcsec/sqrt(Hz)", units::arcsecond},
                                                   {"base_pitch", "arcsec/sqrt(Hz)", units::arcsecond}}};
 
+void read_loudness(TomlTable& table, NoiseSpectrum& spectrum) {
+  constexpr double fastest_hz = 1e6, least_step_s = 0.01, most_step_s = 1e5, most = 1e9;
+  constexpr std::size_t most_powers = 1'000'000, most_bands = 32;
+  BandLoudness loudness;
+  table.number("below_hz", loudness.below_hz, 0.0, fastest_hz);
+  table.number("step_s", loudness.step_s, least_step_s, most_step_s);
+  table.numbers("power", loudness.power, 0.0, most);
+  const double before = spectrum.loudness.empty() ? 0.0 : spectrum.loudness.back().below_hz;
+  if (!(loudness.below_hz > before)) {
+    return table.refuse("below_hz", fmt::format("{} Hz is not above {} Hz", loudness.below_hz, before));
+  }
+  if (loudness.power.empty() || loudness.power.size() > most_powers) {
+    return table.refuse("power", fmt::format("{} values where 1 to {} are taken", loudness.power.size(), most_powers));
+  }
+  constexpr double longest_s = 1e5;
+  if (loudness.step_s * static_cast<double>(loudness.power.size()) > longest_s) {
+    return table.refuse("power", fmt::format("{} values every {} s are longer than {} s", loudness.power.size(),
+                                             loudness.step_s, longest_s));
+  }
+  if (spectrum.loudness.size() == most_bands) {
+    return table.refuse("below_hz", fmt::format("more than {} bands", most_bands));
+  }
+  spectrum.loudness.push_back(std::move(loudness));
+}
+
 void read_spectrum(TomlTable& table, ConcealedPhysics& physics) {
   NoiseSpectrum spectrum;
   std::string channel, unit;
@@ -151,8 +176,13 @@ void read_spectrum(TomlTable& table, ConcealedPhysics& physics) {
   }
   if (found - channels.begin() >= static_cast<std::ptrdiff_t>(NoiseSpectrum::Channel::base_roll)) {
     constexpr double farthest_m = 1000.0;
-    table.number("above_m", spectrum.above_m, -farthest_m, farthest_m);
+    table.number_or_numbers("above_m", spectrum.above_m, spectrum.density.size(), -farthest_m, farthest_m);
+    if (!spectrum.above_m.empty() && spectrum.above_m.size() != spectrum.density.size()) {
+      return table.refuse("above_m", fmt::format("{} heights where there are {} densities", spectrum.above_m.size(),
+                                                 spectrum.density.size()));
+    }
   }
+  table.tables("loudness", [&](TomlTable& band) { read_loudness(band, spectrum); });
   if (spectrum.density.empty() || spectrum.edges_hz.size() != spectrum.density.size() + 1) {
     return table.refuse("edges_hz", fmt::format("{} edges where {} densities need one more", spectrum.edges_hz.size(),
                                                 spectrum.density.size()));

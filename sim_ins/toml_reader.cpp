@@ -109,6 +109,17 @@ void TomlTable::text(std::string_view key, std::string& value) {
   }
 }
 
+void TomlTable::number_or_numbers(std::string_view key, std::vector<double>& values, std::size_t count, double low,
+                                  double high) {
+  const toml::node* node = table_.get(key);
+  if (node == nullptr || !node->is_number()) {
+    return numbers(key, values, low, high);
+  }
+  double one = 0.0;
+  number(key, one, low, high);
+  values.assign(count, one);
+}
+
 void TomlTable::boolean(std::string_view key, bool& value) {
   const toml::node* node = asked(key);
   if (node == nullptr) {

@@ -28,6 +28,8 @@ class TomlTable {
   void integer(std::string_view key, std::uint64_t& value, std::uint64_t low, std::uint64_t high);
   void text(std::string_view key, std::string& value);
   void numbers(std::string_view key, std::vector<double>& values, double low, double high);
+  // One number stands for `count` of them.
+  void number_or_numbers(std::string_view key, std::vector<double>& values, std::size_t count, double low, double high);
   void boolean(std::string_view key, bool& value);
   // Calls `read` with the sub-table, or with each table of the array of tables, where the key is present.
   void table(std::string_view key, const std::function<void(TomlTable&)>& read);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -102,7 +103,7 @@ TEST(NoiseSpectrum, OfTheBaseAreSinesOfItsDensity) {
   const NoiseSpectrum table{NoiseSpectrum::Channel::base_roll, {0.001, 0.002, 0.01}, {5.0, 1.0}};
   double below = 0.0, above = 0.0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    for (const Sine& sine : sines_of(table, seed)) {
+    for (const auto& [sine, above_m] : sines_of(table, seed)) {
       const double hz = 1.0 / sine.period_s;
       ASSERT_TRUE(hz >= 0.001 && hz <= 0.01);
       (hz < 0.002 ? below : above) += 0.5 * sine.amplitude * sine.amplitude / 50.0;
@@ -145,14 +146,14 @@ TEST(NoiseSpectrum, TiltIsOneMotionForBothTriads) {
 
 // Bow up moves what stands above the axis back: the force is g angle - above_m d2(angle)/dt2, at 1 Hz less by 39.5 * above_m / 9.8.
 TEST(NoiseSpectrum, TiltAboutAnAxisBelowMovesTheSensors) {
-  NoiseSpectrum table{NoiseSpectrum::Channel::base_pitch, {0.9, 1.1}, {1e-4}};
-  table.above_m = 1.5;
+  NoiseSpectrum table{NoiseSpectrum::Channel::base_pitch, {0.9, 1.1, 1.2}, {1e-4, 1e-4}, {1.5, -0.5}};
   BaseMotion base;
   add_tilt(table, 3, base);
   ASSERT_EQ(base.pitch.size(), base.surge.size());
   EXPECT_TRUE(base.roll.empty() && base.sway.empty());
   for (std::size_t k = 0; k < base.pitch.size(); ++k) {
-    EXPECT_DOUBLE_EQ(base.surge[k].amplitude, -1.5 * base.pitch[k].amplitude);
+    const double above_m = base.pitch[k].period_s > 1.0 / 1.1 ? 1.5 : -0.5;
+    EXPECT_DOUBLE_EQ(base.surge[k].amplitude, -above_m * base.pitch[k].amplitude);
     EXPECT_DOUBLE_EQ(base.surge[k].period_s, base.pitch[k].period_s);
     EXPECT_DOUBLE_EQ(base.surge[k].phase, base.pitch[k].phase);
   }
@@ -160,6 +161,60 @@ TEST(NoiseSpectrum, TiltAboutAnAxisBelowMovesTheSensors) {
   add_tilt(table, 3, base);
   ASSERT_EQ(base.roll.size(), base.sway.size());
   EXPECT_DOUBLE_EQ(base.sway[0].amplitude, 1.5 * base.roll[0].amplitude);
+}
+
+// Half of the time 1.9 of the power below 4 Hz, 0.1 in the other half; a quarter of a decade beside the edge both are their own.
+NoiseSpectrum loud_in_its_first_half(NoiseSpectrum::Channel channel, std::vector<double> edges_hz, double half_s) {
+  NoiseSpectrum table{channel, std::move(edges_hz), {3.0}};
+  table.loudness = {{4.0, 0.5 * half_s, {1.9, 1.9, 0.1, 0.1}}};
+  return table;
+}
+
+// 16384 samples each; the loudness goes over between the second and the third of its four times.
+TEST(NoiseSpectrum, IsAsLoudAsEachTimeSays) {
+  constexpr std::size_t half = 32768;
+  SpectrumNoise noise(loud_in_its_first_half(NoiseSpectrum::Channel::gyro_z, {0.0, 50.0}, half / rate_hz), rate_hz, 7);
+  std::vector<double> first(half / 2), between(half / 2), last(half);
+  for (std::vector<double>* part : {&first, &between, &last}) {
+    std::generate(part->begin(), part->end(), [&] { return noise.next(); });
+  }
+  // 164 s: 410 and 328 bins of 0.5 to 3 Hz, half of them independent: 7 and 5 %. Above 6 Hz 7200 and more.
+  EXPECT_NEAR(measured(first, 0.5, 2.8) / (9.0 * 1.9), 1.0, 0.3);
+  EXPECT_NEAR(measured(last, 0.5, 2.8) / (9.0 * 0.1), 1.0, 0.25);
+  EXPECT_NEAR(measured(first, 6.0, 49.0) / 9.0, 1.0, 0.08);
+  EXPECT_NEAR(measured(last, 6.0, 49.0) / 9.0, 1.0, 0.06);
+  // It repeats after the whole loudness.
+  SpectrumNoise again(loud_in_its_first_half(NoiseSpectrum::Channel::gyro_z, {0.0, 50.0}, half / rate_hz), rate_hz, 7);
+  EXPECT_DOUBLE_EQ(again.next(), noise.next());
+}
+
+// Tilt by a spline: its rate and acceleration are its derivatives, what it moves the sensors by follows from the height at the frequency,
+// and it is loud when it should be. Density 3 rad/sqrt(Hz) from 0.4 to 0.5 Hz.
+TEST(NoiseSpectrum, ATiltThatIsLoudAtTimesIsOneMotion) {
+  constexpr double half_s = 2000.0, above_m = 0.7;
+  NoiseSpectrum table = loud_in_its_first_half(NoiseSpectrum::Channel::base_pitch, {0.4, 0.5}, half_s);
+  table.above_m = {above_m};
+  EXPECT_DOUBLE_EQ(repeats_after(table, rate_hz), 16384.0);  // 4000 s of 8 x 0.5 Hz
+  BaseMotion base;
+  add_tilt(table, 3, base);
+  const auto at = [&](double t) { return base_state(base, {}, t); };
+  double loud = 0.0, quiet = 0.0;
+  for (double t = 100.0; t < 800.0; t += 0.37) {
+    constexpr double step_s = 1e-3;
+    const BaseState before = at(t - step_s), now = at(t), behind = at(t + step_s);
+    // Of the third and fourth derivatives, with 3.1 rad/s: below 1e-5 of the rate and the acceleration.
+    EXPECT_NEAR(now.attitude_rate.pitch, (behind.attitude.pitch - before.attitude.pitch) / (2.0 * step_s), 1e-4);
+    EXPECT_NEAR(now.a_n.x(), (behind.v_n.x() - before.v_n.x()) / (2.0 * step_s), 1e-3);
+    EXPECT_NEAR(now.p_n.x(), -above_m * now.attitude.pitch, 1e-9);
+    loud += now.attitude.pitch * now.attitude.pitch * 0.37 / 700.0;
+  }
+  for (double t = 2600.0; t < 3900.0; t += 0.37) {
+    const double pitch = at(t).attitude.pitch;
+    quiet += pitch * pitch * 0.37 / 1300.0;
+  }
+  // 0.1 Hz and 700 s: 70 independent squares, 12 %; 130, 9 %.
+  EXPECT_NEAR(loud / (9.0 * 0.1 * 1.9), 1.0, 0.5);
+  EXPECT_NEAR(quiet / (9.0 * 0.1 * 0.1), 1.0, 0.4);
 }
 
 TEST(NoiseSpectrum, FilesNameWhatIsWrong) {
@@ -176,8 +231,33 @@ TEST(NoiseSpectrum, FilesNameWhatIsWrong) {
   EXPECT_THAT(message(gyro + "edges_hz=[0, 1]\ndensity=[-2]\n"), HasSubstr("p.toml:5: spectrum[0].density"));
   EXPECT_THAT(message(gyro + "edges_hz=[0, 1]\ndensity=['a']\n"), HasSubstr("not an array of numbers"));
   EXPECT_THAT(message(gyro + "edges_hz=7\ndensity=[1]\n"), HasSubstr("edges_hz: not an array of numbers"));
+  const std::string base = "channel='base_roll'\nunit='arcsec/sqrt(Hz)'\nedges_hz=[0, 1, 2]\ndensity=[2, 3]\n";
+  EXPECT_EQ(message(base + "above_m=0.5\n"), "accepted");
+  EXPECT_EQ(message(base + "above_m=[0.5, 0.6]\n"), "accepted");
+  EXPECT_THAT(message(base + "above_m=[0.5]\n"), HasSubstr("1 heights where there are 2 densities"));
+  EXPECT_THAT(message(base + "above_m='high'\n"), HasSubstr("p.toml:6: spectrum[0].above_m"));
+  EXPECT_THAT(message(gyro + "edges_hz=[0, 1]\ndensity=[2]\nabove_m=1\n"), HasSubstr("above_m"));
+  const std::string loud = gyro + "edges_hz=[0, 1]\ndensity=[2]\n[[spectrum.loudness]]\n";
+  EXPECT_EQ(message(loud + "below_hz=1\nstep_s=2\npower=[1, 0]\n"), "accepted");
+  EXPECT_THAT(message(loud + "step_s=2\npower=[1]\n"), HasSubstr("0 Hz is not above 0 Hz"));
+  EXPECT_THAT(message(loud + "below_hz=1\nstep_s=2\npower=[]\n"), HasSubstr("0 values where"));
+  EXPECT_THAT(message(loud + "below_hz=1\nstep_s=2\npower=[-1]\n"), HasSubstr("spectrum[0].loudness[0].power"));
+  EXPECT_THAT(message(loud + "below_hz=1\nstep_s=0\npower=[1]\n"), HasSubstr("spectrum[0].loudness[0].step_s"));
+  EXPECT_THAT(message(loud + "below_hz=1\nstep_s=90000\npower=[1, 1]\n"), HasSubstr("are longer than 100000 s"));
   EXPECT_THAT(message(gyro + "edges_hz=[0, 1]\ndensity=[2]\n[[spectrum]]\n" + gyro + "edges_hz=[0, 1]\ndensity=[2]\n"),
               HasSubstr("gyro_x has a spectrum already"));
+}
+
+// A day at a megahertz is not drawn.
+TEST(NoiseSpectrum, ALoudnessThatIsTooLongIsRefused) {
+  const auto physics = parse_physics(
+      "[[spectrum]]\nchannel='base_roll'\nunit='arcsec/sqrt(Hz)'\nedges_hz=[0, 1000000]\n"
+      "density=[1]\n[[spectrum.loudness]]\nbelow_hz=1\nstep_s=50000\npower=[1, 2]\n",
+      "p");
+  ASSERT_TRUE(physics);
+  const auto simulated = simulate({}, {{{0.0, 0.0}}, {10.0}, 5.0}, 5, *physics);
+  ASSERT_FALSE(simulated);
+  EXPECT_THAT(simulated.error().message, HasSubstr("the loudness of a spectrum makes"));
 }
 
 }  // namespace
