@@ -152,8 +152,21 @@ double accel_count(const Diagnosis& d, const diagnosis::AssumedNoise& assumed) {
   return d.calibration.accel_quantum > 0.0 ? d.calibration.accel_quantum : finest_count * assumed.accel_quantum;
 }
 
+std::string loudness_text(const std::vector<diagnosis::BandLoudness>& bands) {
+  std::string text;
+  for (const diagnosis::BandLoudness& band : bands) {
+    std::string powers;
+    for (const double power : band.power) {
+      powers += fmt::format("{}{:.3g}", powers.empty() ? "" : ", ", power);
+    }
+    text += "[[spectrum.loudness]]\n" + key_value("below_hz", band.below_hz) + key_value("step_s", band.step_s) +
+            fmt::format("power = [{}]\n", powers);
+  }
+  return text;
+}
+
 std::string spectrum_text(std::string_view channel, std::string_view unit, double si_per_unit,
-                          const diagnosis::DensityTable& table) {
+                          const diagnosis::DensityTable& table, const std::string& more = {}) {
   std::string edges, densities;
   for (const double hz : table.edges_hz) {
     edges += fmt::format("{}{:.6g}", edges.empty() ? "" : ", ", hz);
@@ -165,12 +178,17 @@ std::string spectrum_text(std::string_view channel, std::string_view unit, doubl
                                : fmt::format(
                                      "\n[[spectrum]]\nchannel = \"{}\"\nunit = \"{}\"\nedges_hz = [{}]\n"
                                      "density = [{}]\n",
-                                     channel, unit, edges, densities);
+                                     channel, unit, edges, densities) +
+                                     more + loudness_text(table.loudness);
 }
 
 std::string tilt_text(std::string_view channel, const diagnosis::TiltSpectrum& tilt) {
-  const std::string text = spectrum_text(channel, "arcsec/sqrt(Hz)", units::arcsecond, tilt.table);
-  return text.empty() ? text : text + key_value("above_m", tilt.above_m);
+  std::string heights;
+  for (const double above_m : tilt.above_m) {
+    heights += fmt::format("{}{:.4g}", heights.empty() ? "" : ", ", above_m);
+  }
+  return spectrum_text(channel, "arcsec/sqrt(Hz)", units::arcsecond, tilt.table,
+                       fmt::format("above_m = [{}]\n", heights));
 }
 
 // A phase of its own each, spread by the golden section: no two lines start alike.

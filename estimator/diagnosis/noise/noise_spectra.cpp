@@ -8,24 +8,14 @@
 #include <unsupported/Eigen/FFT>
 #include <utility>
 
+#include "estimator/diagnosis/noise/tilting_base.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
 using Complex = std::complex<double>;
-// Gyros, accelerometers, and the angle about either tilt axis that the gyros integrate to.
-constexpr Eigen::Index channels = 8, first_angle = 6;
-using Line = Eigen::Matrix<Complex, channels, 1>;
-using Density = Eigen::Matrix<Complex, channels, channels>;  // cross-spectra
-
-// Rates about, and specific force across: what a tilt of the base makes of both. Force: angle times g.
-struct TiltAxis {
-  Vector3 about, across;
-};
-struct Base {
-  double g = 0.0;
-  bool level = false;            // x of b, within 11 deg
-  std::array<TiltAxis, 2> axes;  // roll, pitch
-};
+using Line = Eigen::Matrix<Complex, tilt_channels, 1>;
+using Density = Eigen::Matrix<Complex, tilt_channels, tilt_channels>;  // cross-spectra
 
 struct Stretch {
   std::size_t first, last;  // samples [first, last)
@@ -60,50 +50,13 @@ struct Bin {
   Density density;
 };
 
-using Piece = Eigen::Matrix<double, channels, Eigen::Dynamic>;
-
-// Slope of a row over its samples.
-double slope_of(const Piece& piece, Eigen::Index row) {
-  const auto n = static_cast<double>(piece.cols());
-  const Eigen::RowVectorXd time = Eigen::RowVectorXd::LinSpaced(piece.cols(), -0.5 * (n - 1.0), 0.5 * (n - 1.0));
-  return piece.row(row).dot(time) / (n * (n * n - 1.0) / 12.0);
-}
-
-// Increments and angles of n samples, less their means. A gyro's constant drift is no tilt: the angles have the slope of the force.
-Piece piece_of(const ImuData& data, const Base& base, std::size_t at, std::size_t n) {
-  Piece piece(channels, static_cast<Eigen::Index>(n));
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto column = static_cast<Eigen::Index>(i);
-    piece.col(column).head<3>() = Vector3(data.delta_theta[at + i].data());
-    piece.col(column).segment<3>(3) = Vector3(data.delta_v[at + i].data());
-  }
-  piece.topRows<first_angle>().colwise() -= piece.topRows<first_angle>().rowwise().mean().eval();
-  for (std::size_t k = 0; k < base.axes.size(); ++k) {
-    const Eigen::RowVectorXd rate = base.axes[k].about.transpose() * piece.topRows<3>(),
-                             force = base.axes[k].across.transpose() * piece.middleRows<3>(3);
-    const Eigen::Index row = first_angle + static_cast<Eigen::Index>(k);
-    double angle = 0.0;
-    for (Eigen::Index i = 0; i < piece.cols(); ++i) {
-      piece(row, i) = angle + 0.5 * rate(i);  // in the middle of the sample, where the force is
-      angle += rate(i);
-    }
-    Piece both = Piece::Zero(channels, piece.cols());
-    both.row(0) = force * data.sample_rate_hz / base.g;
-    const double less = slope_of(piece, row) - slope_of(both, 0);
-    for (Eigen::Index i = 0; i < piece.cols(); ++i) {
-      piece(row, i) -= less * static_cast<double>(i);
-    }
-    piece.row(row).array() -= piece.row(row).mean();
-  }
-  return piece;
-}
-
-Eigen::Matrix<Complex, channels, Eigen::Dynamic> transformed(const Piece& piece, const Eigen::RowVectorXd& window) {
-  Eigen::Matrix<Complex, channels, Eigen::Dynamic> lines(channels, piece.cols());
+Eigen::Matrix<Complex, tilt_channels, Eigen::Dynamic> transformed(const Piece& piece,
+                                                                  const Eigen::RowVectorXd& window) {
+  Eigen::Matrix<Complex, tilt_channels, Eigen::Dynamic> lines(tilt_channels, piece.cols());
   Eigen::FFT<double> fft;
   std::vector<double> row(static_cast<std::size_t>(piece.cols()));
   std::vector<Complex> line;
-  for (Eigen::Index k = 0; k < channels; ++k) {
+  for (Eigen::Index k = 0; k < tilt_channels; ++k) {
     Eigen::Map<Eigen::RowVectorXd>(row.data(), piece.cols()) = piece.row(k).cwiseProduct(window);
     fft.fwd(line, row);
     lines.row(k) = Eigen::Map<const Eigen::RowVectorXcd>(line.data(), piece.cols());
@@ -131,7 +84,8 @@ std::vector<Bin> spectra_of(const ImuData& data, const Base& base, const std::ve
   for (const Stretch& stretch : stretches) {
     const double before = pieces;
     for (std::size_t at = stretch.first; at + n <= stretch.last; at += (n + 1) / 2) {
-      const Eigen::Matrix<Complex, channels, Eigen::Dynamic> lines = transformed(piece_of(data, base, at, n), hann);
+      const Eigen::Matrix<Complex, tilt_channels, Eigen::Dynamic> lines =
+          transformed(piece_of(data, base, at, n), hann);
       for (std::size_t k = first; k < last; ++k) {
         const Line line = lines.col(static_cast<Eigen::Index>(k));
         bins[k - first].density += scale * line * line.adjoint();
@@ -244,7 +198,8 @@ struct TiltBin {
 };
 struct Tilt {
   std::vector<TiltBin> bins;  // from the lowest on
-  double above_m = 0.0;       // sensors above the axis that the base turns about
+  double below_hz = 0.0;      // where they end
+  TiltSpectrum spectrum;
 };
 
 // Angle phi and horizontal force over g, in each bin. About an axis h below the sensors the force is g phi - h d2(phi)/dt2, so that
@@ -280,6 +235,63 @@ double unlike_at(const std::vector<Together>& all, std::size_t k) {
   return cross > 0.0 ? 1.0 - cross * cross / (angle * force) : 1.0;
 }
 
+// Least squares for gain and h of all bins. Noise of the gyros makes a gain of the angle too small, noise of the force that of its inverse:
+// where both are far apart, h is not known, and none is taken.
+double height_of(const std::vector<Together>& all, const std::vector<double>& weight) {
+  constexpr double apart = 0.25;
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d along = Eigen::Matrix2d::Zero();
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    const Eigen::Vector2d column(1.0, all[k].u);
+    square += weight[k] * all[k].angle * column * column.transpose();
+    along.col(0) += weight[k] * all[k].cross * column;
+    along.col(1) += weight[k] * all[k].angle * all[k].force / all[k].cross * column;
+  }
+  const Eigen::Matrix2d both = square.ldlt().solve(along);
+  return std::abs(both(1, 1) - both(1, 0)) < apart * std::abs(both(1, 0)) ? both(1, 0) : 0.0;
+}
+
+// The same of the bins [first, last): force less angle against angle times w^2/g. nullopt: worse known than 20 cm.
+std::optional<double> height_between(const std::vector<Bin>& bins, const std::vector<Together>& all, std::size_t first,
+                                     std::size_t last) {
+  constexpr double well_known_m = 0.2, apart = 0.25;
+  double information = 0.0, low = 0.0, high = 0.0;
+  for (std::size_t k = first; k < last; ++k) {
+    const Together& t = all[k];
+    const double beside = std::max(1e-6 * t.force, t.force - t.cross * t.cross / t.angle);
+    const double one = bins[k].freedom * t.u * t.u * t.angle / beside;
+    information += one;
+    low += one * (t.cross / t.angle - 1.0) / t.u;
+    high += one * (t.force / t.cross - 1.0) / t.u;
+  }
+  const bool known = information * well_known_m * well_known_m > 1.0 && std::abs(high - low) < apart * std::abs(low);
+  return known ? std::optional(low / information) : std::nullopt;
+}
+
+// A vehicle rocks on its springs about another axis at each frequency. Bands of the table of which that is not known take the next one above
+// or else below, and that of all where there is none.
+std::vector<double> heights_of(const std::vector<Bin>& bins, const std::vector<Together>& all,
+                               const std::vector<double>& weight, const DensityTable& table) {
+  std::vector<std::optional<double>> known;
+  std::size_t first = 0;
+  for (std::size_t band = 0; band < table.density.size(); ++band) {
+    std::size_t last = first;
+    while (last < weight.size() && bins[last].low_hz < table.edges_hz[band + 1]) {
+      ++last;
+    }
+    known.push_back(height_between(bins, all, first, last));
+    first = last;
+  }
+  const auto top = std::find_if(known.rbegin(), known.rend(), [](const auto& h) { return h.has_value(); });
+  double above = top != known.rend() ? **top : height_of(all, weight);
+  std::vector<double> heights(known.size());
+  for (std::size_t band = known.size(); band-- > 0;) {
+    above = known[band].value_or(above);
+    heights[band] = above;
+  }
+  return heights;
+}
+
 Tilt tilt_of(const std::vector<Bin>& bins, const Base& base, double rate_hz, std::size_t axis) {
   const std::vector<Together> all = together_of(bins, base, rate_hz, axis);
   constexpr double most_unlike = 0.3, least_unlike = 1e-6, clear = 0.1;
@@ -293,46 +305,23 @@ Tilt tilt_of(const std::vector<Bin>& bins, const Base& base, double rate_hz, std
   if (weight.size() < enough) {
     return tilt;
   }
-  // Least squares for gain and h. Noise of the gyros makes a gain of the angle too small, noise of the force that of its inverse:
-  // where both are far apart, h is not known.
-  constexpr double apart = 0.25;
-  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
-  Eigen::Matrix2d along = Eigen::Matrix2d::Zero();
+  tilt.below_hz = bins[weight.size() - 1].high_hz;
+  std::vector<Value> values;
   for (std::size_t k = 0; k < weight.size(); ++k) {
-    const Eigen::Vector2d column(1.0, all[k].u);
-    square += weight[k] * all[k].angle * column * column.transpose();
-    along.col(0) += weight[k] * all[k].cross * column;
-    along.col(1) += weight[k] * all[k].angle * all[k].force / all[k].cross * column;
+    values.push_back({bins[k].low_hz, bins[k].high_hz, bins[k].freedom, all[k].angle});
   }
-  const Eigen::Matrix2d both = square.ldlt().solve(along);
-  const bool known = std::abs(both(1, 1) - both(1, 0)) < apart * std::abs(both(1, 0));
-  const Eigen::Vector2d fitted = known ? Eigen::Vector2d(both.col(0)) : Eigen::Vector2d(1.0, 0.0);
-  tilt.above_m = fitted(1);
+  tilt.spectrum.table = table_of(values);
+  tilt.spectrum.above_m = heights_of(bins, all, weight, tilt.spectrum.table);
+  std::size_t band = 0;
   for (std::size_t k = 0; k < weight.size(); ++k) {
-    const double gain = fitted(0) + fitted(1) * all[k].u;
+    while (bins[k].low_hz >= tilt.spectrum.table.edges_hz[band + 1]) {
+      ++band;
+    }
+    const double gain = 1.0 + tilt.spectrum.above_m[band] * all[k].u;
     const double beside = all[k].force - 2.0 * gain * all[k].cross + gain * gain * all[k].angle;
     tilt.bins.push_back({all[k].angle, base.g * base.g * beside});
   }
   return tilt;
-}
-
-TiltSpectrum tilt_spectrum(const std::vector<Bin>& bins, const Tilt& tilt) {
-  std::vector<Value> values;
-  for (std::size_t k = 0; k < tilt.bins.size(); ++k) {
-    values.push_back({bins[k].low_hz, bins[k].high_hz, bins[k].freedom, tilt.bins[k].density});
-  }
-  return {table_of(values), tilt.above_m};
-}
-
-Base base_of(const ImuData& data, const Stretch& stretch) {
-  Vector3 f = Vector3::Zero();
-  for (std::size_t i = stretch.first; i < stretch.last; ++i) {
-    f += Vector3(data.delta_v[i].data()) * data.sample_rate_hz / static_cast<double>(stretch.size());
-  }
-  // x of b made level, and across it. A turn by a small angle about a changes f by -a x f.
-  const Vector3 up = f.normalized(), forward = (Vector3::UnitX() - up.x() * up).normalized(), level = up.cross(forward);
-  constexpr double sine_of_11_deg = 0.2;
-  return {f.norm(), std::abs(up.x()) < sine_of_11_deg, {{{forward, level}, {level, -forward}}}};
 }
 
 // Of one sensor axis: what is neither tilt nor its count.
@@ -363,6 +352,64 @@ DensityTable sensor_table(const std::vector<Bin>& bins, const Base& base, const 
   return table_of(values);
 }
 
+// Of the band that holds a frequency; 0 outside the table.
+double at(const DensityTable& table, const std::vector<double>& values, double hz) {
+  const auto above = std::upper_bound(table.edges_hz.begin(), table.edges_hz.end(), hz);
+  const bool inside = above != table.edges_hz.begin() && above != table.edges_hz.end();
+  return inside ? values[static_cast<std::size_t>(above - table.edges_hz.begin()) - 1] : 0.0;
+}
+
+// Loudness of each table, from all of the recording: what stands in it, over its density.
+void add_loudness(const ImuData& data, const Base& base, const std::array<Tilt, 2>& tilt, NoiseSpectra& spectra) {
+  const std::size_t n = quick_length(data.size());
+  std::vector<std::vector<Complex>> lines;
+  {
+    const Piece whole = piece_of(data, base, 0, n);
+    std::vector<double> series(n);
+    for (Eigen::Index k = 0; k < tilt_channels; ++k) {
+      // Sensors as rates.
+      const double scale = k < first_angle ? data.sample_rate_hz : 1.0;
+      Eigen::Map<Eigen::RowVectorXd>(series.data(), whole.cols()) = scale * whole.row(k);
+      lines.push_back(mirrored_lines(series));
+    }
+  }
+  const double line_hz = 0.5 * data.sample_rate_hz / static_cast<double>(n);
+  const auto loudness = [&](const DensityTable& table, const auto& value_at) {
+    std::vector<Complex> whitened(n + 1, 0.0);
+    for (std::size_t k = 1; k < n; ++k) {
+      const double hz = static_cast<double>(k) * line_hz, density = at(table, table.density, hz);
+      whitened[k] = density > 0.0 ? value_at(k, hz) / density : 0.0;
+    }
+    return loudness_of_bands(whitened, data.sample_rate_hz);
+  };
+  const auto triad = [&](std::size_t first, std::size_t k) {
+    return Eigen::Vector3cd(lines[first][k], lines[first + 1][k], lines[first + 2][k]);
+  };
+  for (std::size_t axis = 0; axis < first_angle; ++axis) {
+    const std::size_t first = axis < 3 ? 0 : 3;
+    DensityTable& table = spectra.sensors[axis];
+    table.loudness = loudness(table, [&](std::size_t k, double hz) {
+      const Eigen::Vector3cd all = triad(first, k);
+      Complex own = all(static_cast<Eigen::Index>(axis % 3));
+      for (std::size_t a = 0; a < tilt.size(); ++a) {
+        const Vector3& felt = axis < 3 ? base.axes[a].about : base.axes[a].across;
+        if (hz < tilt[a].below_hz) {
+          const double w = 2.0 * std::numbers::pi * hz,
+                       above_m = at(tilt[a].spectrum.table, tilt[a].spectrum.above_m, hz);
+          const Complex of_tilt =
+              axis < 3 ? felt.cast<Complex>().dot(all) : (base.g + w * w * above_m) * lines[first_angle + a][k];
+          own -= felt(static_cast<Eigen::Index>(axis % 3)) * of_tilt;
+        }
+      }
+      return own;
+    });
+  }
+  for (std::size_t a = 0; a < tilt.size(); ++a) {
+    DensityTable& table = (a == 0 ? spectra.roll : spectra.pitch).table;
+    table.loudness = loudness(table, [&](std::size_t k, double) { return lines[first_angle + a][k]; });
+  }
+}
+
 }  // namespace
 
 std::optional<NoiseSpectra> noise_spectra(const ImuData& data, const std::vector<Segment>& segments,
@@ -371,7 +418,7 @@ std::optional<NoiseSpectra> noise_spectra(const ImuData& data, const std::vector
   if (stretches.empty()) {
     return std::nullopt;
   }
-  const Base base = base_of(data, stretches.front());
+  const Base base = base_of(data, stretches.front().first, stretches.front().last);
   const bool parked = std::none_of(segments.begin(), segments.end(), [](const Segment& s) { return s.rotation; });
   CoherentLines coherent =
       parked ? CoherentLines{{}, CorrectedRecording(data)} : coherent_lines(data, as_segments(stretches));
@@ -385,12 +432,15 @@ std::optional<NoiseSpectra> noise_spectra(const ImuData& data, const std::vector
   if (parked && base.level) {
     for (std::size_t axis = 0; axis < tilt.size(); ++axis) {
       tilt[axis] = tilt_of(bins, base, data.sample_rate_hz, axis);
-      (axis == 0 ? spectra.roll : spectra.pitch) = tilt_spectrum(bins, tilt[axis]);
+      (axis == 0 ? spectra.roll : spectra.pitch) = tilt[axis].spectrum;
     }
   }
   for (Eigen::Index axis = 0; axis < first_angle; ++axis) {
     spectra.sensors[static_cast<std::size_t>(axis)] =
         sensor_table(bins, base, tilt, axis, axis < 3 ? gyro_quantum : accel_quantum, data.sample_rate_hz);
+  }
+  if (parked) {
+    add_loudness(coherent.without.data(), base, tilt, spectra);
   }
   return spectra;
 }

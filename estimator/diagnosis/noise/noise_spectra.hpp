@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/diagnosis/noise/band_loudness.hpp"
 #include "estimator/diagnosis/noise/coherent_lines.hpp"
 #include "estimator/models/imu_data.hpp"
 #include "estimator/models/segments.hpp"
@@ -15,11 +16,13 @@ namespace selfcal::diagnosis {
 struct DensityTable {
   std::vector<double> edges_hz;  // one more than densities
   std::vector<double> density;
+  std::vector<BandLoudness> loudness = {};  // where nothing turned: empty where it is steady
 };
 
 struct TiltSpectrum {
-  DensityTable table;    // rad/sqrt(Hz)
-  double above_m = 0.0;  // the sensors above the axis that the base turns about
+  DensityTable table;  // rad/sqrt(Hz)
+  std::vector<double>
+      above_m;  // of each density: the sensors above the axis that the base turns about at these frequencies
 };
 
 struct NoiseSpectra {
