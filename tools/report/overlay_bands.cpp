@@ -60,6 +60,21 @@ double mean_of(const std::vector<Part>& parts) {
   return all.count > 0.0 ? all.sum / all.count : 0.0;
 }
 
+double variance_of_mean(const std::vector<Part>& parts) {
+  constexpr std::size_t enough = 8;
+  if (parts.size() < enough) {
+    return 0.0;
+  }
+  const double mean = mean_of(parts);
+  double square = 0.0, count = 0.0;
+  for (const Part& p : parts) {
+    square += (p.sum - mean * p.count) * (p.sum - mean * p.count);
+    count += p.count;
+  }
+  const auto n = static_cast<double>(parts.size());
+  return square / (count * count) * n / (n - 1.0);
+}
+
 double scatter_of(const std::vector<Part>& recording, const std::vector<Part>& simulation) {
   constexpr std::size_t enough = 8;
   const double a = mean_of(recording), b = mean_of(simulation);

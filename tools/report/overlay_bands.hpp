@@ -21,6 +21,9 @@ double mean_of(const std::vector<Part>& parts);
 // Variance of the logarithm of the ratio of both means, from how the difference scatters from dwell to dwell: a quantum makes lines that
 // depend on the attitude, which no chi-squared knows. 0 where the parts are not pairs or fewer than eight.
 double scatter_of(const std::vector<Part>& recording, const std::vector<Part>& simulation);
+// Variance of sum over count of these parts, from how each part differs from the whole: noise that is loud at times, or that remembers for
+// less than a part lasts, scatters by more than noise of one variance would. 0 where there are fewer than eight parts.
+double variance_of_mean(const std::vector<Part>& parts);
 // Estimates with these variances.
 OverlayPoint difference_point(double x, double recording, double simulation, double variance);
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/diagnosis/noise/loudness.hpp"
 #include "estimator/diagnosis/noise/noise_check.hpp"
 #include "estimator/diagnosis/noise/velocity_noise.hpp"
 #include "estimator/diagnosis/regression/linear_model.hpp"
@@ -71,6 +72,12 @@ bool in_noise_of_beats(PassInput& input) {
          diagnosis::fit_velocity_noise_and_point(input, check, segments);
 }
 
+// What shook the recording shakes no simulation, but one that is drawn as loud as the recording was at each time.
+bool simulated_loudness(const ImuData& simulation) {
+  constexpr double interval_s = 1.0;
+  return diagnosis::changes_its_loudness(diagnosis::loudness_of(simulation, find_segments(simulation), interval_s));
+}
+
 // Where nothing turned the 24 are open and the heading is hardly known: the simulation's calibration may have walked anywhere (once 1e11 of the
 // innovations' square). An amended simulation stands as the recording does, with perfect sensors: about that point, if it is the likelier.
 PassInput likelier(const PassInput& simulation, const PassInput& recording) {
@@ -110,6 +117,23 @@ double inflation(const std::vector<double>& r, double power) {
   return sum;
 }
 
+constexpr auto part_size = static_cast<std::size_t>(block_s);
+
+// Products at lag k of each minute's innovations with those k later, over their squares.
+std::vector<Part> parts_of_correlation(const std::vector<double>& x, std::size_t k) {
+  std::vector<Part> parts(x.size() / part_size);
+  double mean = 0.0;
+  for (const double v : x) {
+    mean += v / static_cast<double>(x.size());
+  }
+  for (std::size_t i = 0; i < parts.size() * part_size; ++i) {
+    Part& part = parts[i / part_size];
+    part.sum += i + k < x.size() ? (x[i] - mean) * (x[i + k] - mean) : 0.0;
+    part.count += (x[i] - mean) * (x[i] - mean);
+  }
+  return parts;
+}
+
 OverlayCurve autocorrelation(const Innovations& a, const Innovations& b, std::size_t axis) {
   OverlayCurve curve{OverlayKind::innovations,
                      std::string("correlation-") + axis_names[axis],
@@ -124,11 +148,27 @@ OverlayCurve autocorrelation(const Innovations& a, const Innovations& b, std::si
   const std::vector<double> r = common(a.correlation[axis], b.correlation[axis], n);
   for (std::size_t k = 1; k <= std::min(most_lags, n / 10); ++k) {
     const double one = bartlett(r, k);
-    curve.points.push_back(
-        difference_point(static_cast<double>(k), a.correlation[axis][k], b.correlation[axis][k],
-                         one / static_cast<double>(a.time_s.size()) + one / static_cast<double>(b.time_s.size())));
+    const auto variance = [&](const Innovations& all) {
+      return std::max(one / static_cast<double>(all.time_s.size()),
+                      variance_of_mean(parts_of_correlation(all.value[axis], k)));
+    };
+    curve.points.push_back(difference_point(static_cast<double>(k), a.correlation[axis][k], b.correlation[axis][k],
+                                            variance(a) + variance(b)));
   }
   return curve;
+}
+
+// Squares of a minute's innovations, in pieces of six seconds: of bursts there are fewer than of innovations.
+std::vector<Part> squares_of(const Innovations& all, std::size_t first) {
+  constexpr std::size_t piece = 6;
+  std::vector<Part> parts(part_size / piece);
+  for (std::size_t i = 0; i < parts.size() * piece; ++i) {
+    for (const std::vector<double>& value : all.value) {
+      parts[i / piece].sum += value[first + i] * value[first + i];
+      parts[i / piece].count += 1.0;
+    }
+  }
+  return parts;
 }
 
 // Mean squares of a minute's innovations, each minute of the recording beside the same of the simulation.
@@ -140,18 +180,12 @@ OverlayCurve sizes(const Innovations& a, const Innovations& b) {
   for (std::size_t axis = 0; axis < axes; ++axis) {
     shared += inflation(common(a.correlation[axis], b.correlation[axis], n), 2.0) / axes;
   }
-  const auto block = static_cast<std::size_t>(block_s);
-  for (std::size_t first = 0; first + block <= n; first += block) {
-    double own = 0.0, other = 0.0;
-    for (std::size_t axis = 0; axis < axes; ++axis) {
-      for (std::size_t i = first; i < first + block; ++i) {
-        own += a.value[axis][i] * a.value[axis][i];
-        other += b.value[axis][i] * b.value[axis][i];
-      }
-    }
-    const double count = static_cast<double>(axes * block);
-    curve.points.push_back(
-        ratio_point(a.time_s[first + block / 2], own / count, other / count, count / shared, count / shared));
+  for (std::size_t first = 0; first + part_size <= n; first += part_size) {
+    const std::vector<Part> own = squares_of(a, first), other = squares_of(b, first);
+    const double size = mean_of(own), simulated = mean_of(other);
+    const double scatter = variance_of_mean(own) / (size * size) + variance_of_mean(other) / (simulated * simulated);
+    const double freedom = static_cast<double>(axes * part_size) / shared;
+    curve.points.push_back(ratio_point(a.time_s[first + part_size / 2], size, simulated, freedom, freedom, scatter));
   }
   return curve;
 }
@@ -169,32 +203,42 @@ OverlayCurve histogram(const Innovations& a, const Innovations& b) {
                      "1",
                      false,
                      {}};
-  std::array<double, bins> own{}, other{};
-  double n_own = 0.0, n_other = 0.0, shared = 0.0;
-  const auto count = [&](const Innovations& all, std::array<double, bins>& into, double& n) {
+  // Minute by minute, the last one longer.
+  std::array<std::vector<Part>, bins> own, other;
+  double shared = 0.0;
+  const auto count = [&](const Innovations& all, std::array<std::vector<Part>, bins>& into) {
+    const std::size_t minutes = std::max<std::size_t>(1, all.time_s.size() / part_size);
+    into.fill(std::vector<Part>(minutes));
     for (const std::vector<double>& values : all.value) {
-      for (const double v : values) {
-        const double at = std::clamp((v + farthest) / width, 0.0, static_cast<double>(bins) - 0.5);
-        into[static_cast<std::size_t>(at)] += 1.0;
-        n += 1.0;
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        const double at = std::clamp((values[i] + farthest) / width, 0.0, static_cast<double>(bins) - 0.5);
+        const std::size_t minute = std::min(minutes - 1, i / part_size);
+        into.at(static_cast<std::size_t>(at))[minute].sum += 1.0;
+        for (std::vector<Part>& bin : into) {
+          bin[minute].count += 1.0;
+        }
       }
     }
   };
-  count(a, own, n_own);
-  count(b, other, n_other);
+  count(a, own);
+  count(b, other);
+  const auto n_own = static_cast<double>(axes * a.time_s.size()), n_other = static_cast<double>(axes * b.time_s.size());
   for (std::size_t axis = 0; axis < axes; ++axis) {
     const std::size_t n = std::min(a.time_s.size(), b.time_s.size());
     shared += inflation(common(a.correlation[axis], b.correlation[axis], n), 1.0) / axes;
   }
   constexpr double enough = 10.0;
   for (std::size_t k = 0; k < bins; ++k) {
-    if (own[k] + other[k] < 2.0 * enough) {
+    const double share = mean_of(own.at(k)), simulated = mean_of(other.at(k));
+    const double p = (share * n_own + simulated * n_other) / (n_own + n_other);
+    if (p * (n_own + n_other) < 2.0 * enough) {
       continue;
     }
-    const double p = (own[k] + other[k]) / (n_own + n_other);
-    curve.points.push_back(difference_point(width * (static_cast<double>(k) + 0.5) - farthest, own[k] / n_own,
-                                            other[k] / n_other,
-                                            shared * p * (1.0 - p) * (1.0 / n_own + 1.0 / n_other)));
+    const auto variance = [&](const std::vector<Part>& parts, double n) {
+      return std::max(shared * p * (1.0 - p) / n, variance_of_mean(parts));
+    };
+    curve.points.push_back(difference_point(width * (static_cast<double>(k) + 0.5) - farthest, share, simulated,
+                                            variance(own.at(k), n_own) + variance(other.at(k), n_other)));
   }
   return curve;
 }
@@ -207,13 +251,16 @@ std::vector<OverlayCurve> overlay_innovations(const ImuData& recording, const Ca
   const bool of_beats = in_noise_of_beats(own);
   PassInput other = diagnosis::forward_pass(simulation, of_simulation);
   other.noise = own.noise;
-  other.noise.shaken.clear();
+  const bool as_loud = simulated_loudness(simulation);
+  if (!as_loud) {
+    other.noise.shaken.clear();
+  }
   other.force = own.force;
   if (of_beats) {
     other.held = own.held;
     diagnosis::settle(other);
   } else {
-    other.noise.disturbed.clear();  // what shook the recording shakes no simulation
+    other.noise.disturbed = as_loud ? of_simulation.noise.disturbed : std::vector<Disturbance>{};
     other = likelier(other, own);
   }
   const Innovations a = innovations_of(own), b = innovations_of(other);

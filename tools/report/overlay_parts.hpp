@@ -24,11 +24,12 @@ struct Range {
 // Dwells without what gimbal and filter need to settle, and without stretches that were left out.
 std::vector<Range> quiet(const ImuData& data);
 
-// Dwells are the parts by which a quantity scatters; few long ones are cut into pieces.
+// Dwells are the parts by which a quantity scatters; few long ones are cut into pieces, short
+// enough that no burst is most of one.
 class Parts {
  public:
   explicit Parts(const std::vector<Range>& ranges)
-      : of_each_(ranges.empty() || ranges.size() >= few ? 1 : (2 * few + ranges.size() - 1) / ranges.size()),
+      : of_each_(ranges.empty() || ranges.size() >= few ? 1 : (most_pieces + ranges.size() - 1) / ranges.size()),
         parts_(of_each_ * ranges.size()) {}
   // `at`: sample in r, which is ranges[range].
   void add(std::size_t range, const Range& r, std::size_t at, double value) {
@@ -39,7 +40,7 @@ class Parts {
   const std::vector<Part>& all() const { return parts_; }
 
  private:
-  static constexpr std::size_t few = 8;
+  static constexpr std::size_t few = 8, most_pieces = 48;
   std::size_t of_each_;
   std::vector<Part> parts_;
 };
