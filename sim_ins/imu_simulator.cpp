@@ -55,11 +55,6 @@ void add_base_effect(BaseMotion& base, const PhysicsEffect& effect) {
   }
 }
 
-bool of_base(const NoiseSpectrum& spectrum) {
-  return spectrum.channel == NoiseSpectrum::Channel::base_roll ||
-         spectrum.channel == NoiseSpectrum::Channel::base_pitch;
-}
-
 Expected<void> check_effect(const PhysicsEffect& effect) {
   for (const EffectDescription& known : physics_effects()) {
     if (known.id == effect.id) {

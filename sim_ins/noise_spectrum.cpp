@@ -135,11 +135,6 @@ std::vector<double> series_of(Lines lines, double rate_hz, Gain gain) {
 
 constexpr double steps_a_period = 8.0;
 
-bool of_base(const NoiseSpectrum& spectrum) {
-  return spectrum.channel == NoiseSpectrum::Channel::base_roll ||
-         spectrum.channel == NoiseSpectrum::Channel::base_pitch;
-}
-
 struct TiltSplines {
   NoiseSpline tilt, moved;  // rad; m, to where the sensors are moved by a positive tilt
 };
@@ -163,6 +158,11 @@ TiltSplines splines_of(const NoiseSpectrum& spectrum, std::uint64_t seed) {
 }
 
 }  // namespace
+
+bool of_base(const NoiseSpectrum& spectrum) {
+  return spectrum.channel == NoiseSpectrum::Channel::base_roll ||
+         spectrum.channel == NoiseSpectrum::Channel::base_pitch;
+}
 
 double repeats_after(const NoiseSpectrum& spectrum, double rate_hz) {
   double longest_s = 0.0;

@@ -30,6 +30,8 @@ struct NoiseSpectrum {
   std::vector<BandLoudness> loudness = {};  // rising; empty: steady
 };
 
+bool of_base(const NoiseSpectrum& spectrum);
+
 // Samples that the noise of a sensor at `rate_hz`, or of the base, repeats after, where it has a loudness; else 0.
 double repeats_after(const NoiseSpectrum& spectrum, double rate_hz);
 

@@ -73,9 +73,18 @@ OverlayJudgement judge(OverlayKind kind, const std::vector<OverlayCurve>& curves
   return j;
 }
 
+double disturbed_seconds(const CalibrationResult& result) {
+  double sum = 0.0;
+  for (const Disturbance& d : result.noise.disturbed) {
+    sum += d.end_s - d.start_s;
+  }
+  return sum;
+}
+
 // Why innovations differ, where seconds of the recording were disturbed: they count for less in it, and a spectrum is the mean of all times.
-std::optional<std::string> spread_over_all_times(const std::vector<OverlayCurve>& curves, const ImuData& recording,
-                                                 const CalibrationResult& of_recording) {
+std::optional<std::string> larger_by_disturbances(const std::vector<OverlayCurve>& curves, const ImuData& recording,
+                                                  const CalibrationResult& of_recording,
+                                                  const CalibrationResult& of_simulation) {
   const std::vector<Segment> segments = find_segments(recording);
   const auto sizes = std::find_if(curves.begin(), curves.end(), [](const OverlayCurve& c) { return c.id == "sizes"; });
   if (sizes == curves.end() || of_recording.noise.disturbed.empty() ||
@@ -83,21 +92,24 @@ std::optional<std::string> spread_over_all_times(const std::vector<OverlayCurve>
     return std::nullopt;
   }
   std::vector<double> ratio;
-  double disturbed_s = 0.0;
   for (const OverlayPoint& p : sizes->points) {
     ratio.push_back(p.simulation / p.recording);
-  }
-  for (const Disturbance& d : of_recording.noise.disturbed) {
-    disturbed_s += d.end_s - d.start_s;
   }
   if (ratio.empty() || !(median(ratio) > 1.0)) {
     return std::nullopt;
   }
-  return fmt::format(
-      "{:.0f} s of the recording were disturbed and count for less; spectra spread what shook it over all times: in "
-      "the "
-      "middle minute the simulation's innovations have {:.1f} times the mean square",
-      disturbed_s, median(ratio));
+  const double own = disturbed_seconds(of_recording), other = disturbed_seconds(of_simulation);
+  const std::string counted =
+      other > 0.0 ? fmt::format(
+                        "{:.0f} s of the recording and {:.0f} s of the simulation were disturbed and count for "
+                        "less",
+                        own, other)
+                  : fmt::format(
+                        "{:.0f} s of the recording were disturbed and count for less; spectra spread what "
+                        "shook it over all times",
+                        own);
+  return fmt::format("{}: in the middle minute the simulation's innovations have {:.1f} times the mean square", counted,
+                     median(ratio));
 }
 
 }  // namespace
@@ -127,7 +139,7 @@ Overlay lay_over(const ImuData& recording, const CalibrationResult& of_recording
   for (int kind = 0; kind < overlay_kind_count; ++kind) {
     OverlayJudgement j = judge(static_cast<OverlayKind>(kind), overlay.curves);
     if (j.kind == OverlayKind::innovations && !j.agrees()) {
-      if (const auto why = spread_over_all_times(overlay.curves, recording, of_recording)) {
+      if (const auto why = larger_by_disturbances(overlay.curves, recording, of_recording, of_simulation)) {
         j.worst.push_back(*why);
       }
     }

@@ -11,15 +11,17 @@ constexpr double normal_95 = 1.959964;
 // Asymptotic series (Abramowitz and Stegun 6.3.18, 6.4.12); below 5 the recurrence leads there.
 double digamma_less_log(double x) {
   double sum = 0.0, y = x;
-  for (; y < 5.0; y += 1.0) {
+  while (y < 5.0) {
     sum -= 1.0 / y;
+    y += 1.0;
   }
   return sum + std::log(y) - std::log(x) - 1.0 / (2.0 * y) - 1.0 / (12.0 * y * y) + 1.0 / (120.0 * std::pow(y, 4));
 }
 double trigamma(double x) {
   double sum = 0.0, y = x;
-  for (; y < 5.0; y += 1.0) {
+  while (y < 5.0) {
     sum += 1.0 / (y * y);
+    y += 1.0;
   }
   return sum + 1.0 / y + 1.0 / (2.0 * y * y) + 1.0 / (6.0 * y * y * y) - 1.0 / (30.0 * std::pow(y, 5));
 }
