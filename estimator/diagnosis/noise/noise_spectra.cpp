@@ -439,7 +439,7 @@ std::optional<NoiseSpectra> noise_spectra(const ImuData& data, const std::vector
     spectra.sensors[static_cast<std::size_t>(axis)] =
         sensor_table(bins, base, tilt, axis, axis < 3 ? gyro_quantum : accel_quantum, data.sample_rate_hz);
   }
-  constexpr std::size_t most = 4'000'000;  // 11 h at 100 Hz: a simulation draws such noise at one time
+  constexpr std::size_t most = 2'000'000;  // 5.5 h at 100 Hz: a simulation draws such noise at one time
   if (parked && data.size() <= most) {
     add_loudness(coherent.without.data(), base, tilt, spectra);
   }

@@ -16,7 +16,7 @@ namespace selfcal::diagnosis {
 struct DensityTable {
   std::vector<double> edges_hz;  // one more than densities
   std::vector<double> density;
-  std::vector<BandLoudness> loudness = {};  // where nothing turned in 4e6 samples at most: empty where it is steady
+  std::vector<BandLoudness> loudness = {};  // where nothing turned in 2e6 samples at most: empty where it is steady
 };
 
 struct TiltSpectrum {
