@@ -136,7 +136,8 @@ std::vector<double> series_of(Lines lines, double rate_hz, Gain gain) {
 constexpr double steps_a_period = 8.0;
 
 struct TiltSplines {
-  NoiseSpline tilt, moved;  // rad; m, to where the sensors are moved by a positive tilt
+  NoiseSpline tilt;                  // rad
+  std::optional<NoiseSpline> moved;  // m, to where the sensors are moved by a positive tilt; none on the axis
 };
 
 // Splines of the fifth degree whose density is the table's: what their coefficients have is over the spline's own response. At eight steps
@@ -152,9 +153,13 @@ TiltSplines splines_of(const NoiseSpectrum& spectrum, std::uint64_t seed) {
   };
   const auto moved = [&](double hz) {
     const auto band = band_at(spectrum, hz);
-    return band && !spectrum.above_m.empty() ? spectrum.above_m[*band] * over_response(hz) : 0.0;
+    return band ? spectrum.above_m[*band] * over_response(hz) : 0.0;
   };
-  return {{1.0 / rate_hz, series_of(lines, rate_hz, over_response)}, {1.0 / rate_hz, series_of(lines, rate_hz, moved)}};
+  TiltSplines splines{{1.0 / rate_hz, series_of(lines, rate_hz, over_response)}, std::nullopt};
+  if (!spectrum.above_m.empty()) {
+    splines.moved = {1.0 / rate_hz, series_of(lines, rate_hz, moved)};
+  }
+  return splines;
 }
 
 }  // namespace
@@ -263,10 +268,12 @@ void add_tilt(const NoiseSpectrum& spectrum, std::uint64_t seed, BaseMotion& bas
   const double sense = roll ? 1.0 : -1.0;  // right side down moves what is above to the right, bow up moves it back
   if (!spectrum.loudness.empty()) {
     auto [tilt, moved] = splines_of(spectrum, seed);
-    for (double& m : moved.coefficients) {
-      m *= sense;
+    if (moved) {
+      for (double& m : moved->coefficients) {
+        m *= sense;
+      }
+      (roll ? base.noise_sway : base.noise_surge).push_back(std::move(*moved));
     }
-    (roll ? base.noise_sway : base.noise_surge).push_back(std::move(moved));
     (roll ? base.noise_roll : base.noise_pitch).push_back(std::move(tilt));
     return;
   }

@@ -7,6 +7,7 @@ namespace selfcal::report {
 namespace {
 
 constexpr double normal_95 = 1.959964;
+constexpr std::size_t enough = 8;  // parts whose scatter tells a variance
 
 // Asymptotic series (Abramowitz and Stegun 6.3.18, 6.4.12); below 5 the recurrence leads there.
 double digamma_less_log(double x) {
@@ -63,7 +64,6 @@ double mean_of(const std::vector<Part>& parts) {
 }
 
 double variance_of_mean(const std::vector<Part>& parts) {
-  constexpr std::size_t enough = 8;
   if (parts.size() < enough) {
     return 0.0;
   }
@@ -78,7 +78,6 @@ double variance_of_mean(const std::vector<Part>& parts) {
 }
 
 double scatter_of(const std::vector<Part>& recording, const std::vector<Part>& simulation) {
-  constexpr std::size_t enough = 8;
   const double a = mean_of(recording), b = mean_of(simulation);
   if (recording.size() != simulation.size() || recording.size() < enough || !(a > 0.0) || !(b > 0.0)) {
     return 0.0;

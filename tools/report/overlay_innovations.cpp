@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t axes = 3;
 constexpr std::size_t most_lags = 30;
-constexpr double block_s = 60.0;
+constexpr std::size_t part_size = 60;  // a minute
 constexpr std::array<const char*, axes> axis_names = {"north", "up", "east"};
 
 struct Innovations {
@@ -27,15 +27,23 @@ struct Innovations {
   std::array<std::vector<double>, axes> correlation;  // at lags 0, 1, ...
 };
 
-std::vector<double> correlations(const std::vector<double>& x, std::size_t lags) {
+std::vector<double> less_mean(std::vector<double> x) {
   double mean = 0.0;
   for (const double v : x) {
     mean += v / static_cast<double>(x.size());
   }
+  for (double& v : x) {
+    v -= mean;
+  }
+  return x;
+}
+
+std::vector<double> correlations(const std::vector<double>& values, std::size_t lags) {
+  const std::vector<double> x = less_mean(values);
   std::vector<double> r(lags + 1, 0.0);
   for (std::size_t k = 0; k <= lags; ++k) {
     for (std::size_t i = k; i < x.size(); ++i) {
-      r[k] += (x[i] - mean) * (x[i - k] - mean);
+      r[k] += x[i] * x[i - k];
     }
   }
   for (std::size_t k = lags + 1; k-- > 0;) {
@@ -117,19 +125,13 @@ double inflation(const std::vector<double>& r, double power) {
   return sum;
 }
 
-constexpr auto part_size = static_cast<std::size_t>(block_s);
-
-// Products at lag k of each minute's innovations with those k later, over their squares.
+// Products at lag k of each minute's innovations, less their mean, with those k later, over their squares.
 std::vector<Part> parts_of_correlation(const std::vector<double>& x, std::size_t k) {
   std::vector<Part> parts(x.size() / part_size);
-  double mean = 0.0;
-  for (const double v : x) {
-    mean += v / static_cast<double>(x.size());
-  }
   for (std::size_t i = 0; i < parts.size() * part_size; ++i) {
     Part& part = parts[i / part_size];
-    part.sum += i + k < x.size() ? (x[i] - mean) * (x[i + k] - mean) : 0.0;
-    part.count += (x[i] - mean) * (x[i] - mean);
+    part.sum += i + k < x.size() ? x[i] * x[i + k] : 0.0;
+    part.count += x[i] * x[i];
   }
   return parts;
 }
@@ -146,14 +148,14 @@ OverlayCurve autocorrelation(const Innovations& a, const Innovations& b, std::si
                      {}};
   const std::size_t n = std::min(a.time_s.size(), b.time_s.size());
   const std::vector<double> r = common(a.correlation[axis], b.correlation[axis], n);
+  const std::vector<double> of_a = less_mean(a.value[axis]), of_b = less_mean(b.value[axis]);
   for (std::size_t k = 1; k <= std::min(most_lags, n / 10); ++k) {
     const double one = bartlett(r, k);
-    const auto variance = [&](const Innovations& all) {
-      return std::max(one / static_cast<double>(all.time_s.size()),
-                      variance_of_mean(parts_of_correlation(all.value[axis], k)));
+    const auto variance = [&](const std::vector<double>& x) {
+      return std::max(one / static_cast<double>(x.size()), variance_of_mean(parts_of_correlation(x, k)));
     };
     curve.points.push_back(difference_point(static_cast<double>(k), a.correlation[axis][k], b.correlation[axis][k],
-                                            variance(a) + variance(b)));
+                                            variance(of_a) + variance(of_b)));
   }
   return curve;
 }

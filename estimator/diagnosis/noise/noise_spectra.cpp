@@ -192,15 +192,18 @@ DensityTable table_of(const std::vector<Value>& values) {
   return table;
 }
 
-// Where the gyros' angle is tilt of the base: its density, rad^2/Hz, and what the accelerometers feel beside it, (m/s^2)^2/Hz.
-struct TiltBin {
-  double density = 0.0, beside = 0.0;
-};
+// Of a base that tilts, and what the accelerometers feel beside it in each bin from the lowest to where it ends, (m/s^2)^2/Hz.
 struct Tilt {
-  std::vector<TiltBin> bins;  // from the lowest on
-  double below_hz = 0.0;      // where they end
   TiltSpectrum spectrum;
+  std::vector<double> beside;
 };
+
+// The band that holds a frequency; none outside the table.
+std::optional<std::size_t> band_at(const DensityTable& table, double hz) {
+  const auto above = std::upper_bound(table.edges_hz.begin(), table.edges_hz.end(), hz);
+  const bool inside = above != table.edges_hz.begin() && above != table.edges_hz.end();
+  return inside ? std::optional(static_cast<std::size_t>(above - table.edges_hz.begin()) - 1) : std::nullopt;
+}
 
 // Angle phi and horizontal force over g, in each bin. About an axis h below the sensors the force is g phi - h d2(phi)/dt2, so that
 // force = (1 + w^2 h/g) angle.
@@ -305,21 +308,17 @@ Tilt tilt_of(const std::vector<Bin>& bins, const Base& base, double rate_hz, std
   if (weight.size() < enough) {
     return tilt;
   }
-  tilt.below_hz = bins[weight.size() - 1].high_hz;
   std::vector<Value> values;
   for (std::size_t k = 0; k < weight.size(); ++k) {
     values.push_back({bins[k].low_hz, bins[k].high_hz, bins[k].freedom, all[k].angle});
   }
   tilt.spectrum.table = table_of(values);
   tilt.spectrum.above_m = heights_of(bins, all, weight, tilt.spectrum.table);
-  std::size_t band = 0;
   for (std::size_t k = 0; k < weight.size(); ++k) {
-    while (bins[k].low_hz >= tilt.spectrum.table.edges_hz[band + 1]) {
-      ++band;
-    }
-    const double gain = 1.0 + tilt.spectrum.above_m[band] * all[k].u;
+    const double above_m = tilt.spectrum.above_m.at(band_at(tilt.spectrum.table, bins[k].low_hz).value());
+    const double gain = 1.0 + above_m * all[k].u;
     const double beside = all[k].force - 2.0 * gain * all[k].cross + gain * gain * all[k].angle;
-    tilt.bins.push_back({all[k].angle, base.g * base.g * beside});
+    tilt.beside.push_back(base.g * base.g * beside);
   }
   return tilt;
 }
@@ -334,11 +333,11 @@ DensityTable sensor_table(const std::vector<Bin>& bins, const Base& base, const 
     Vector3 kept = Vector3::Unit(axis % 3);
     double own = 0.0;
     for (std::size_t a = 0; a < tilt.size(); ++a) {
-      if (k < tilt[a].bins.size()) {
+      if (k < tilt[a].beside.size()) {
         const Vector3& felt = axis < 3 ? base.axes[a].about : base.axes[a].across;
         const double along = felt(axis % 3);
         kept -= along * felt;
-        own += axis < 3 ? 0.0 : along * along * tilt[a].bins[k].beside;
+        own += axis < 3 ? 0.0 : along * along * tilt[a].beside[k];
       }
     }
     Line line = Line::Zero();
@@ -350,13 +349,6 @@ DensityTable sensor_table(const std::vector<Bin>& bins, const Base& base, const 
     values.push_back({bins[k].low_hz, bins[k].high_hz, bins[k].freedom, std::max(0.0, own - counted)});
   }
   return table_of(values);
-}
-
-// Of the band that holds a frequency; 0 outside the table.
-double at(const DensityTable& table, const std::vector<double>& values, double hz) {
-  const auto above = std::upper_bound(table.edges_hz.begin(), table.edges_hz.end(), hz);
-  const bool inside = above != table.edges_hz.begin() && above != table.edges_hz.end();
-  return inside ? values[static_cast<std::size_t>(above - table.edges_hz.begin()) - 1] : 0.0;
 }
 
 // Loudness of each table, from all of the recording: what stands in it, over its density.
@@ -377,8 +369,9 @@ void add_loudness(const ImuData& data, const Base& base, const std::array<Tilt, 
   const auto loudness = [&](const DensityTable& table, const auto& value_at) {
     std::vector<Complex> whitened(n + 1, 0.0);
     for (std::size_t k = 1; k < n; ++k) {
-      const double hz = static_cast<double>(k) * line_hz, density = at(table, table.density, hz);
-      whitened[k] = density > 0.0 ? value_at(k, hz) / density : 0.0;
+      const double hz = static_cast<double>(k) * line_hz;
+      const auto band = band_at(table, hz);
+      whitened[k] = band && table.density[*band] > 0.0 ? value_at(k, hz) / table.density[*band] : 0.0;
     }
     return loudness_of_bands(whitened, data.sample_rate_hz);
   };
@@ -393,9 +386,8 @@ void add_loudness(const ImuData& data, const Base& base, const std::array<Tilt, 
       Complex own = all(static_cast<Eigen::Index>(axis % 3));
       for (std::size_t a = 0; a < tilt.size(); ++a) {
         const Vector3& felt = axis < 3 ? base.axes[a].about : base.axes[a].across;
-        if (hz < tilt[a].below_hz) {
-          const double w = 2.0 * std::numbers::pi * hz,
-                       above_m = at(tilt[a].spectrum.table, tilt[a].spectrum.above_m, hz);
+        if (const auto band = band_at(tilt[a].spectrum.table, hz)) {
+          const double w = 2.0 * std::numbers::pi * hz, above_m = tilt[a].spectrum.above_m[*band];
           const Complex of_tilt =
               axis < 3 ? felt.cast<Complex>().dot(all) : (base.g + w * w * above_m) * lines[first_angle + a][k];
           own -= felt(static_cast<Eigen::Index>(axis % 3)) * of_tilt;
