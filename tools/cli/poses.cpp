@@ -19,7 +19,7 @@
 namespace selfcal::cli {
 namespace {
 
-constexpr WholeRange known_columns{1, 1000};
+constexpr WholeRange known_columns{1, 1000}, column_or_none{0, 1000};
 
 struct PosesArguments {
   std::vector<std::string> files;
@@ -29,7 +29,7 @@ struct PosesArguments {
   double false_alarm_rate = 0.01;
   bool json = false, details = false;
   std::string only, gyro_columns, accelerometer_columns;
-  std::optional<std::uint64_t> angle_column, temperature_column;
+  std::optional<std::uint64_t> angle_column, rate_column, temperature_column;
   AttitudeChoice attitude;
 };
 
@@ -43,6 +43,8 @@ RawColumns raw_columns(const PosesArguments& arguments) {
   columns.gyros = arguments.gyro_columns;
   columns.accelerometers = arguments.accelerometer_columns;
   columns.angle = arguments.angle_file.empty() ? static_cast<std::size_t>(arguments.angle_column.value_or(0)) : 0;
+  columns.turn_rate = static_cast<std::size_t>(arguments.rate_column.value_or(0));
+  columns.table_by_names = arguments.angle_file.empty() && !arguments.angle_column && !arguments.rate_column;
   columns.temperature = static_cast<std::size_t>(arguments.temperature_column.value_or(0));
   return columns;
 }
@@ -52,10 +54,10 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
   if (arguments.files.empty()) {
     return fail(ErrorKind::usage, "FILE: a log or a recording is needed");
   }
-  const bool of_columns = !arguments.only.empty() || arguments.angle_column || arguments.temperature_column ||
-                          !arguments.gyros.empty() || !arguments.angle_file.empty() || arguments.rate_hz ||
-                          !arguments.gyro_columns.empty() || !arguments.accelerometer_columns.empty() ||
-                          arguments.latitude_deg || arguments.height_m;
+  const bool of_columns = !arguments.only.empty() || arguments.angle_column || arguments.rate_column ||
+                          arguments.temperature_column || !arguments.gyros.empty() || !arguments.angle_file.empty() ||
+                          arguments.rate_hz || !arguments.gyro_columns.empty() ||
+                          !arguments.accelerometer_columns.empty() || arguments.latitude_deg || arguments.height_m;
   if (is_recording && (of_columns || arguments.files.size() > 1)) {
     return fail(ErrorKind::usage,
                 fmt::format("{}: a recording is given alone: --only, --gyros, --rate, --latitude, --height and columns "
@@ -64,6 +66,10 @@ Expected<void> check_arguments(const PosesArguments& arguments, bool is_recordin
   }
   if (!arguments.gyros.empty() && (arguments.files.size() > 1 || !arguments.only.empty())) {
     return fail(ErrorKind::usage, "--gyros: with one FILE of accelerometers");
+  }
+  if (arguments.rate_column && (arguments.angle_column || !arguments.angle_file.empty())) {
+    return fail(ErrorKind::usage,
+                "--rate-column: with --angle-column or --angle-file one of both would be left unread");
   }
   if (!arguments.angle_file.empty() && (arguments.files.size() > 1 || arguments.rate_hz)) {
     return fail(ErrorKind::usage, "--angle-file: with one FILE that holds its times");
@@ -187,8 +193,11 @@ CommandRun configure(Options& options) {
   options.number("--rate", arguments->rate_hz, range::sample_rate, "rows a second, of a log without a time");
   options.number("--latitude", arguments->latitude_deg, range::latitude, "of the place, deg: gravity, Earth's rate");
   options.number("--height", arguments->height_m, range::height, "of the place, m");
-  options.whole("--angle-column", arguments->angle_column, known_columns,
-                "the CSV's column, from 1, that holds the angle of a table with one axis, deg");
+  options.whole(
+      "--angle-column", arguments->angle_column, column_or_none,
+      "the CSV's column, from 1, that holds the angle of a table with one axis, deg; 0: none, whatever names say");
+  options.whole("--rate-column", arguments->rate_column, column_or_none,
+                "the CSV's column, from 1, that holds the rate of a table with one axis, deg/s; 0 likewise");
   options.text("--angle-file", arguments->angle_file,
                "the table's own log with its time and its angle, of which --angle-column then says the column");
   options.whole("--temperature-column", arguments->temperature_column, known_columns,

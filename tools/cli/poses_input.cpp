@@ -24,6 +24,7 @@
 #include "tools/cli/log_temperature.hpp"
 #include "tools/cli/log_time.hpp"
 #include "tools/cli/log_units.hpp"
+#include "tools/cli/read_out_columns.hpp"
 
 namespace selfcal::cli {
 
@@ -235,7 +236,14 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
     request.columns.push_back(column - 1);
     return request.columns.size() - 1;
   };
-  const std::size_t angle = columns.angle > 0 ? ask(columns.angle) : 0;
+  const Expected<ReadOutColumns> table = read_out_columns(**source, named, *layout, columns, path);
+  if (!table) {
+    return tl::unexpected(table.error());
+  }
+  std::vector<std::size_t> turned;
+  for (const ReadOutColumn& axis : table->axes) {
+    turned.push_back(ask(axis.column + 1));
+  }
   const std::size_t thermal = columns.temperature > 0 ? columns.temperature : named_temperature(named);
   const std::size_t temperature = thermal > 0 ? ask(thermal) : 0;
   const std::size_t counter = columns.rate_hz ? named_counter(named) : 0;
@@ -264,7 +272,6 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   if (counter > 0) {
     take_lost_rows(rows->data.values[counted], (*source)->title(counter - 1), *columns.rate_hz, log);
   }
-  const double angle_unit = columns.angle > 0 ? unit_of_angle(named[columns.angle - 1]) : 0.0;
   log.gyro_si = columns.raw_gyros ? 0.0 : unit_of(named, layout->gyro, import::Quantity::angular_rate);
   log.accel_si = unit_of(named, layout->accel, import::Quantity::acceleration);
   std::vector<std::size_t> full;
@@ -280,6 +287,7 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
   }
   log.notes = and_also(and_also(log.notes, (*source)->put_together()), rows->notes);
   log.notes = and_also(and_also(log.notes, layout->notes), layout_words(*layout, rows->time, unit, columns));
+  log.notes = and_also(log.notes, table->notes);
   const std::vector<std::vector<double>>& values = rows->data.values;
   if (layout->only_axis >= 0) {
     input.gyro_axes = {layout->only_axis == 0, layout->only_axis == 1, layout->only_axis == 2};
@@ -295,10 +303,11 @@ Expected<OneLog> read_log(const std::string& path, const RawColumns& columns) {
     }
     input.gyro.push_back(rate);
     input.accel.push_back(force);
-    if (columns.angle > 0) {
-      input.outer.push_back(values[angle][i] * angle_unit);
-      input.inner.push_back(0.0);
-    }
+  }
+  if (!turned.empty()) {
+    input.outer = read_out_angles(table->axes.front(), values[turned.front()], input.time_s);
+    input.inner = turned.size() > 1 ? read_out_angles(table->axes[1], values[turned[1]], input.time_s)
+                                    : std::vector<double>(input.outer.size(), 0.0);
   }
   if (thermal > 0) {
     LogTemperature taken =
@@ -377,7 +386,8 @@ Expected<OneLog> read_all(const RawFiles& files, const RawColumns& columns) {
   if (!files.gyros.empty()) {
     RawColumns own = columns;
     own.sensors = Sensors::gyros;
-    own.angle = own.temperature = 0;
+    own.angle = own.turn_rate = own.temperature = 0;
+    own.table_by_names = false;
     Expected<OneLog> gyro = read_log(files.gyros, own);
     if (gyro && columns.rate_hz && gyro->input.time_s.size() != log->input.time_s.size()) {
       return fail(ErrorKind::bad_input,
@@ -393,7 +403,8 @@ Expected<OneLog> read_all(const RawFiles& files, const RawColumns& columns) {
       return tl::unexpected(next.error());
     }
     if (next->input.sensors != log->input.sensors || next->gyro_si != log->gyro_si || next->accel_si != log->accel_si ||
-        next->input.temperature_c.empty() != log->input.temperature_c.empty() || next->input.time_s.empty()) {
+        next->input.temperature_c.empty() != log->input.temperature_c.empty() ||
+        next->input.outer.empty() != log->input.outer.empty() || next->input.time_s.empty()) {
       return fail(ErrorKind::bad_input,
                   fmt::format("{}: its columns are others than those of {}", files.poses[k], files.poses.front()));
     }

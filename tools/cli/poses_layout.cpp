@@ -321,10 +321,9 @@ std::string left_alone(const import::ColumnSource& source, const std::vector<Nam
 
 Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::vector<NamedColumn>& named,
                                  const RawColumns& columns, const std::string& file) {
-  const std::size_t told = std::max(columns.angle, columns.temperature);
-  if (named.size() < told) {
-    return fail(ErrorKind::bad_input,
-                fmt::format("{}: {}: {} columns, {} are needed", file, source.form(), named.size(), told));
+  if (named.size() < columns.temperature) {
+    return fail(ErrorKind::bad_input, fmt::format("{}: {}: {} columns, {} are needed", file, source.form(),
+                                                  named.size(), columns.temperature));
   }
   if (const std::string mixed = source.mixed_rows(); !mixed.empty()) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", file, mixed));

@@ -16,7 +16,9 @@ namespace selfcal::cli {
 struct RawColumns {
   std::optional<diagnosis::Sensors> sensors;  // none: both, or the triad that alone has a name
   std::optional<double> rate_hz;              // of its rows; no column is a time then
-  std::size_t angle = 0;                      // its column, from 1, in deg; 0: none
+  std::size_t angle = 0;                      // a table's angle: its column, from 1; 0: none is told
+  std::size_t turn_rate = 0;                  // a table's rate, likewise
+  bool table_by_names = true;                 // where neither is told, as names call them
   std::size_t temperature = 0;                // its column, from 1, in degC; 0: none
   bool raw_gyros = false;                     // the caller knows their unit: as they are
   std::string gyros, accelerometers;          // their columns as an option lists them; empty: by their names
