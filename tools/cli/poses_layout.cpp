@@ -239,7 +239,7 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
   if (some_named && sensors != Sensors::gyros) {
     return no_triad;
   }
-  Expected<PoseLayout> layout = plain_layout(source, sensors, columns, file);
+  Expected<PoseLayout> layout = plain_layout(source, named, sensors, columns, file);
   if (layout && layout->only_axis >= 0) {
     layout->only_axis = std::max(0, named[layout->gyro.front()].axis);
   }

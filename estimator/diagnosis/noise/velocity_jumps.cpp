@@ -181,7 +181,7 @@ class Opening {
   // Whether those in turns are as many as those elsewhere make likely: an effect stands in turns alone. Somebody who gets in knocks several
   // times within seconds: what follows within `one_s` is one disturbance, where it began.
   bool likely_in_turns(const std::vector<VelocityJump>& found) const {
-    constexpr std::size_t enough = 2;
+    constexpr std::size_t enough = 1;
     constexpr double chance = 0.05, one_s = 15.0;
     std::vector<VelocityJump> all = opened_;
     all.insert(all.end(), found.begin(), found.end());
