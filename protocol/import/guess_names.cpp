@@ -64,6 +64,8 @@ std::string unit_at_end(Words& words) {
       {{"deg", "per", "h"}, "deg/h"},
       {{"deg", "sec"}, "deg/s"},
       {{"rad", "sec"}, "rad/s"},
+      {{"deg", "per", "sec"}, "deg/s"},
+      {{"rad", "per", "sec"}, "rad/s"},
   };
   for (const Ending& ending : endings) {
     if (words.size() > ending.words.size() &&
@@ -107,8 +109,8 @@ int take_axis(Words& words) {
     }
   }
   static constexpr std::string_view stems[] = {
-      "g",  "w",  "a",   "f", "acc", "accel",  "gyr",  "gyro", "gyr0", "dv",    "dth",  "da", "om", "omega",
-      "fb", "wb", "wib", "m", "mag", "dtheta", "dvel", "dang", "fib",  "force", "rate", "v",  "vel"};
+      "g",     "w",  "a",  "f",   "ac", "acc", "accel",  "gyr",  "gyro", "gyr0", "dv",    "dth",  "da", "om",
+      "omega", "fb", "wb", "wib", "m",  "mag", "dtheta", "dvel", "dang", "fib",  "force", "rate", "v",  "vel"};
   for (std::string& word : words) {
     const std::size_t axis = word.empty() ? std::string_view::npos : letters.find(word.back());
     const std::string_view stem = std::string_view(word).substr(0, word.empty() ? 0 : word.size() - 1);
@@ -142,6 +144,11 @@ Role triad_role(const Words& w) {
   if (is_one_of(w, {"bias"})) {
     return Role::other;
   }
+  // Betaflight's controllers, axisF[0]; what a body or a table is told to do.
+  if ((is_one_of(w, {"axis"}) && is_one_of(w, {"p", "i", "d", "f", "s"})) ||
+      is_one_of(w, {"cmd", "command", "setpoint", "table", "turntable"})) {
+    return Role::other;
+  }
   // What readings scatter by is no reading.
   if (holds(w, {"std", "stdev", "sigma", "deviation", "variance"}) || is_one_of(w, {"sd", "rms", "var"})) {
     return Role::other;
@@ -156,10 +163,10 @@ Role triad_role(const Words& w) {
       (inc && (holds(w, {"theta", "angle"}) || is_one_of(w, {"ang"}))) ||
       (holds(w, {"ang"}) && holds(w, {"rate", "vel"}));
   const bool pushed = holds(w, {"acc", "force", "beschl"});  // "accel_g_x": its g is a unit
-  if (turned || (!pushed && is_one_of(w, {"g", "w", "wb", "wib", "om", "rate", "rot", "dth", "da"}))) {
+  if (turned || (!pushed && is_one_of(w, {"g", "gy", "w", "wb", "wib", "om", "rate", "rot", "dth", "da"}))) {
     return Role::gyro;
   }
-  if (pushed || is_one_of(w, {"a", "f", "fb", "fib", "dv", "dvel"}) ||
+  if (pushed || is_one_of(w, {"a", "ac", "f", "fb", "fib", "dv", "dvel"}) ||
       (inc && (holds(w, {"vel"}) || is_one_of(w, {"v"})))) {
     return Role::accelerometer;
   }

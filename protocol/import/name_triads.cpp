@@ -29,7 +29,8 @@ struct Direction {
   int along = -1, sign = 1;
 };
 Direction direction_of(const Words& words) {
-  static constexpr std::array<std::tuple<std::string_view, int, int>, 15> known{{{"fwd", 0, 1},
+  static constexpr std::array<std::tuple<std::string_view, int, int>, 16> known{{{"fwd", 0, 1},
+                                                                                 {"inline", 0, 1},
                                                                                  {"forward", 0, 1},
                                                                                  {"front", 0, 1},
                                                                                  {"long", 0, 1},
@@ -81,8 +82,8 @@ std::optional<std::size_t> raw_one_of(const std::vector<std::string>& names,
   };
   std::vector<std::size_t> raw, plain;
   for (std::size_t k = 0; k < triads.size(); ++k) {
-    const auto as_raw = called(
-        triads[k], {"raw", "uncal", "uncalibrated", "unc", "uncomp", "uncompensated", "unfiltered", "uncorrected"});
+    const auto as_raw = called(triads[k], {"raw", "uncal", "uncalibrated", "unc", "uncomp", "uncompensated", "unfilt",
+                                           "unfiltered", "uncorrected"});
     const auto as_done = called(triads[k], {"cal", "calib", "calibrated", "comp", "compensated", "corr", "corrected",
                                             "filt", "filtered", "lpf", "smooth", "smoothed"});
     constexpr std::ptrdiff_t all = 3;

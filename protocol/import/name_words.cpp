@@ -6,6 +6,7 @@ namespace selfcal::import {
 namespace {
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool is_capital(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -18,12 +19,16 @@ Words words_of(std::string_view name) {
   }
   Words words(1);
   char before = ' ';
-  for (const char c : name) {
-    const bool capital = c >= 'A' && c <= 'Z' && before >= 'a' && before <= 'z';
+  for (std::size_t k = 0; k < name.size(); ++k) {
+    const char c = name[k];
+    const bool capital = is_capital(c) && before >= 'a' && before <= 'z';
+    // "AccelXMps2": an axis, and a unit.
+    const bool behind_axis = is_capital(c) && before >= 'X' && before <= 'Z' && words.back().size() == 1 &&
+                             k + 1 < name.size() && is_letter(name[k + 1]) && !is_capital(name[k + 1]);
     if (!is_letter(c) && !is_digit(c)) {
       words.emplace_back();
     } else {
-      if (capital) {
+      if (capital || behind_axis) {
         words.emplace_back();
       }
       words.back() += lower(c);
@@ -31,6 +36,13 @@ Words words_of(std::string_view name) {
     before = c;
   }
   std::erase(words, std::string());
+  // "UnCompGyroX" says "uncomp".
+  for (std::size_t k = 0; k + 1 < words.size(); ++k) {
+    if (words[k] == "un") {
+      words[k] += words[k + 1];
+      words.erase(words.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+    }
+  }
   return words;
 }
 

@@ -88,15 +88,15 @@ std::vector<std::size_t> columns_from(std::size_t first, std::size_t count) {
   return columns;
 }
 
-// Columns that are called a time; else the first one, where it is nothing else.
+// Columns that are called a time; without one those of which no name says what they are, for one that rises.
 void add_times(const std::vector<NamedColumn>& named, PoseLayout& layout) {
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k].role == Role::time) {
       layout.times.push_back(k);
     }
   }
-  // Then any of which no name says that it is something else: the first whose stamps rise.
-  for (std::size_t k = 0; k < named.size(); ++k) {
+  const bool called = !layout.times.empty();
+  for (std::size_t k = 0; k < named.size() && !called; ++k) {
     if (named[k].role == Role::unknown && named[k].axis < 0) {
       layout.times.push_back(k);
     }
