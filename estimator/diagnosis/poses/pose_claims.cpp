@@ -102,6 +102,12 @@ double turns_beside_gravity(const PoseInput& input) {
 }  // namespace
 
 std::string no_readings(const PoseInput& input) {
+  const auto never_changes = [](const std::vector<std::array<double, 3>>& series) {
+    return std::all_of(series.begin(), series.end(), [&](const auto& row) { return row == series.front(); });
+  };
+  if (never_changes(input.gyro) && never_changes(input.accel)) {
+    return "all axes stand at one value throughout: no readings of a sensor";
+  }
   if (input.sensors == Sensors::gyros || input.accel.size() < 3) {
     return {};
   }

@@ -164,6 +164,8 @@ Regression regress(const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
   const Eigen::VectorXd e = y - X * scaled;
   const Eigen::MatrixXd Q = Eigen::MatrixXd(qr.householderQ()).leftCols(r.rank);
   r.square = e.squaredNorm();
+  constexpr double share = 1e-24;
+  r.rounding = share * y.squaredNorm();
   const Eigen::ArrayXd leverage = Q.rowwise().squaredNorm();
   r.held_out_rms = std::sqrt((e.array() / (1.0 - leverage).max(1e-9)).square().mean());
   const double variance = r.square / static_cast<double>(std::max<Eigen::Index>(1, y.size() - r.rank));
@@ -255,7 +257,7 @@ Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 double log_p_of(const Regression& without, const Regression& with, Eigen::Index n) {
   const auto more = static_cast<double>(with.rank - without.rank);
   const auto left = static_cast<double>(n - with.rank);
-  if (more < 1.0 || left < 1.0) {
+  if (more < 1.0 || left < 1.0 || without.square <= without.rounding) {
     return 0.0;
   }
   return log_f_tail((without.square - with.square) / more / (with.square / left), more, left);

@@ -10,14 +10,15 @@
 namespace selfcal::diagnosis {
 
 struct Regression {
-  double square = 0.0;
+  double square = 0.0;    // of what is left
+  double rounding = 0.0;  // of `square`: as much is left of equal numbers
   Eigen::Index rank = 0;
   double held_out_rms = 0.0;  // e / (1 - h)
   Eigen::VectorXd value, sigma;
 };
 Regression regress(const Eigen::MatrixXd& X, const Eigen::VectorXd& y);
 Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
-// F test of the columns that `with` adds.
+// F test of the columns that `with` adds; 0 where rounding alone is left without them.
 double log_p_of(const Regression& without, const Regression& with, Eigen::Index n);
 
 // y = X b + random walk + white: whitens X and y by the walk of greatest restricted likelihood.

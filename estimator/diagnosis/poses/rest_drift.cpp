@@ -240,7 +240,9 @@ void judge_drift(const RestBlocks& blocks, double alpha, std::vector<RestAxis>& 
     const Eigen::VectorXd means = (constants.transpose() * y).cwiseQuotient(constants.colwise().sum().transpose());
     axis.mean = means(0);
     readings.push_back(table.columns.cols());
-    table.append(y - constants * means);
+    constexpr double rounding = 1e-12;  // what a mean of equal numbers is off by is no noise
+    const Eigen::VectorXd left = y - constants * means;
+    table.append(left.norm() > rounding * y.norm() ? left : Eigen::VectorXd::Zero(y.size()));
   }
   const SlowNoise noise(blocks.times, table.columns);
   for (std::size_t k = 0; k < axes.size(); ++k) {
