@@ -4,17 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "protocol/import/full_words.hpp"
 #include "protocol/import/guess_orientation.hpp"
 #include "protocol/import/guess_roles.hpp"
 #include "protocol/import/guess_table.hpp"
-#include "protocol/import/guess_time.hpp"
+#include "protocol/import/guess_time_axis.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/psins.hpp"
-#include "protocol/import/time_axis.hpp"
 #include "protocol/import/time_steps.hpp"
 
 namespace selfcal::import {
@@ -91,68 +91,16 @@ class Guesser {
   }
 
   void guess_time() {
-    ImportMap& map = guess_.map;
-    if (!roles_.time) {
-      const std::optional<double> rate =
-          psins_ ? std::optional<double>(1.0 / psins_->interval_s) : known_.sample_rate_hz;
-      map.sample_rate_hz = rate;
-      if (rate) {
-        interval_s_ = 1.0 / *rate;
-        return say("time",
-                   fmt::format("no column of it; {} Hz {}", *rate, psins_ ? "from the file's header" : "as given"));
-      }
-      return doubt("time",
-                   "no column increases evenly: the sample rate is not known: " + rate_words(source_.preamble()));
+    const std::optional<double> of_header =
+        psins_ ? std::optional<double>(1.0 / psins_->interval_s) : std::optional<double>();
+    TimeGuess time = guess_time_axis(source_, roles_, named_, of_header, known_.sample_rate_hz);
+    if (roles_.time) {
+      time.map.column = reference(*roles_.time);
     }
-    const std::size_t column = *roles_.time;
-    map.time.column = reference(column);
-    const double interval = static_cast<double>(1.0L / static_cast<long double>(rate_of(roles_.stamps, 1.0L).rate_hz));
-    const bool xsens = source_.names()[column].find("SampleTimeFine") != std::string::npos;
-    const std::vector<std::string> units = xsens ? xsens_time_units(interval) : time_units_of(roles_.stamps, interval);
-    const std::string& claimed = named_[column].unit;
-    if (roles_.time_is_date) {
-      map.time.unit = "date";
-    } else if (find_unit(claimed) && find_unit(claimed)->quantity == Quantity::time) {
-      map.time.unit = claimed;
-      const bool long_unit = claimed == "min" || claimed == "h" || claimed == "d";
-      if (!long_unit && std::find(units.begin(), units.end(), claimed) == units.end()) {
-        doubt("time.unit", fmt::format("{} by its name; that would make {:.6g} Hz", claimed,
-                                       1.0 / (interval * find_unit(claimed)->si)));
-      }
-    } else if (const std::string& other = named_[column].other_unit; !other.empty()) {
-      map.time.unit = units.empty() ? map.time.unit : units.front();
-      doubt("time.unit", fmt::format("nobody says how long one of its {} is", other));
-    } else if (units.empty()) {
-      doubt("time.unit", fmt::format("intervals of {:.6g}: no unit makes a sample rate of that", interval));
-    } else {
-      map.time.unit = units.front();
-      if (units.size() > 1) {
-        doubt("time.unit", fmt::format("intervals of {:.6g}: {} or {}", interval, units[0], units[1]));
-      }
-    }
-    const double si = roles_.time_is_date ? 1.0 : find_unit(map.time.unit)->si;
-    const RateOfStamps rate = rate_of(roles_.stamps, static_cast<long double>(si));
-    map.sample_rate_hz = is_doubted("time.unit") ? std::nullopt : std::optional(rate.rate_hz);  // by what is settled
-    interval_s_ = 1.0 / rate.rate_hz;
-    say("time.unit", fmt::format("{}: {} Hz; intervals vary by {:.2g} % rms{}", map.time.unit, rate.rate_hz,
-                                 rate.jitter < 1e-9 ? 0.0 : 100.0 * rate.jitter,
-                                 rate.gaps > 0 ? fmt::format(", {} gaps", rate.gaps) : ""));
-    if (!roles_.clock_words.empty()) {
-      say("time.column", roles_.clock_words);
-    }
-    say("time.stamp", "a time is taken to be the end of its sample's interval");
-    // A recording counts from its start.
-    const double first_s = static_cast<double>(roles_.stamps.front()) * si;
-    if (first_s < -*interval_s_ || first_s > 2.5 * *interval_s_) {
-      map.time.origin_first = true;
-      const std::string first = roles_.time_is_date
-                                    ? date_words(roles_.stamps.front())
-                                    : fmt::format("{} {}", static_cast<double>(roles_.stamps.front()), map.time.unit);
-      say("time.origin", fmt::format("the first time, {}, is taken to be one interval after the start", first));
-    }
-    if (known_.sample_rate_hz && std::abs(*known_.sample_rate_hz / rate.rate_hz - 1.0) > 1e-3) {
-      doubt("time.unit", fmt::format("the times make {} Hz, {} Hz is given", rate.rate_hz, *known_.sample_rate_hz));
-    }
+    guess_.map.time = std::move(time.map);
+    guess_.map.sample_rate_hz = time.sample_rate_hz;
+    interval_s_ = time.interval_s;
+    std::move(time.remarks.begin(), time.remarks.end(), std::back_inserter(guess_.remarks));
   }
 
   void guess_incomplete() {
