@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 namespace selfcal::import {
@@ -50,12 +51,60 @@ bool leaves_gyros(const Triad& triad, const std::vector<Triad>& free) {
   });
 }
 
+// The least noise of three columns over the largest: of one sensor nearly 1.
+double likeness(const Values& values, const Triad& triad) {
+  double least = HUGE_VAL, most = 0.0;
+  for (const std::size_t k : triad) {
+    const double noise = row_noise(values[k]);
+    least = std::min(least, noise);
+    most = std::max(most, noise);
+  }
+  return most > 0.0 ? least / most : 0.0;
+}
+
+// Whether the size of three columns has next to none of the noise that they have: somebody has divided them by it.
+bool is_direction(const Values& values, const Triad& triad) {
+  constexpr double none = 0.03;
+  std::vector<double> size(values[triad[0]].size());
+  double most = 0.0;
+  for (std::size_t row = 0; row < size.size(); ++row) {
+    size[row] = std::hypot(values[triad[0]][row], values[triad[1]][row], values[triad[2]][row]);
+  }
+  for (const std::size_t k : triad) {
+    most = std::max(most, row_noise(values[k]));
+  }
+  return row_noise(size) < none * most;
+}
+
 bool overlap(const Triad& a, const Triad& b) { return a.front() <= b.back() && b.front() <= a.back(); }
 
 }  // namespace
 
+double row_noise(const std::vector<double>& values) {
+  double square = 0.0;
+  for (std::size_t k = 2; k < values.size(); ++k) {
+    square += std::pow(values[k] - 2.0 * values[k - 1] + values[k - 2], 2);
+  }
+  return values.size() < 3 ? 0.0 : std::sqrt(square / (6.0 * static_cast<double>(values.size() - 2)));
+}
+
 bool is_constant(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [&values](double v) { return v == values.front(); });
+}
+
+Triad nearest_zero(const Values& values, const std::vector<Triad>& free) {
+  const auto off_zero = [&values](const Triad& triad) {
+    double most = 0.0;
+    for (const std::size_t k : triad) {
+      const double noise = row_noise(values[k]);
+      const double mean =
+          std::accumulate(values[k].begin(), values[k].end(), 0.0) / static_cast<double>(values[k].size());
+      most = std::max(most, noise > 0.0 ? std::abs(mean) / noise : HUGE_VAL);
+    }
+    return most;
+  };
+  return *std::min_element(free.begin(), free.end(),
+                           [&](const Triad& a, const Triad& b) { return off_zero(a) < off_zero(b); });
 }
 
 std::optional<SizeOfTriad> size_of_triad(const Values& values, const Triad& triad, std::size_t samples) {
@@ -114,14 +163,20 @@ std::optional<GravityColumns> gravity_columns(const Values& values, const std::v
   });
   // A magnetometer that was made one long has the size of a g, and none of 9.8 m/s^2.
   keep([&](const Candidate& c) { return c.unit.metres && leaves_gyros(c.triad, free); });
-  const auto best = std::min_element(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
-    return a.unit.words.empty() == b.unit.words.empty() ? a.size.scatter < b.size.scatter : b.unit.words.empty();
+  constexpr double rests = 0.02;  // rad
+  const bool at_rest =
+      std::none_of(found.begin(), found.end(), [](const Candidate& c) { return c.size.turned > rests; });
+  const auto best = std::min_element(found.begin(), found.end(), [&](const Candidate& a, const Candidate& b) {
+    return a.unit.words.empty() != b.unit.words.empty() ? b.unit.words.empty()
+           : at_rest                                    ? likeness(values, a.triad) > likeness(values, b.triad)
+                                                        : a.size.scatter < b.size.scatter;
   });
   if (best == found.end()) {
     return std::nullopt;
   }
-  constexpr double rests = 0.02;  // rad
-  return GravityColumns{best->triad, best->size.scatter, found.size(), best->unit.words, best->size.turned > rests};
+  return GravityColumns{
+      best->triad,      best->size.scatter,        found.size(),
+      best->unit.words, best->size.turned > rests, best->size.turned > rests && is_direction(values, best->triad)};
 }
 
 }  // namespace selfcal::import

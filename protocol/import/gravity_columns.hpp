@@ -25,15 +25,22 @@ std::optional<SizeOfTriad> size_of_triad(const Values& values, const Triad& tria
 struct GravityColumns {
   Triad triad{};
   double scatter = 0.0;
-  std::size_t alike = 0;  // sets that may be accelerometers as well, this one among them
-  std::string words;      // what it is that its size is; empty: of no unit that is known
-  bool moves = false;     // their direction changes, so that gyros are to be seen beside them
+  std::size_t alike = 0;      // sets that may be accelerometers as well, this one among them
+  std::string words;          // what it is that its size is; empty: of no unit that is known
+  bool moves = false;         // their direction changes, so that gyros are to be seen beside them
+  bool is_direction = false;  // their size has no noise
 };
-// The likeliest of FREE. INTERVALS_S: those that the time may mean, by which increments of a velocity have gravity's size. Of sets of a constant
+// Root of the mean square of the second differences from row to row, as of white noise.
+double row_noise(const std::vector<double>& values);
+
+// The likeliest of FREE, of those at rest that whose columns are most alike in noise. INTERVALS_S: those that the time may mean, by which increments of a velocity have gravity's size. Of sets of a constant
 // size one that has gravity's own, and beside which three columns for gyros are left, is taken before others; those that share a column with it are
 // none.
 std::optional<GravityColumns> gravity_columns(const Values& values, const std::vector<Triad>& free, std::size_t samples,
                                               const std::vector<double>& intervals_s);
+
+// Of FREE, which is not empty, that which stands nearest to zero beside its noise, none of its columns still: what gyros at rest do.
+Triad nearest_zero(const Values& values, const std::vector<Triad>& free);
 
 // Whether a column has one value throughout.
 bool is_constant(const std::vector<double>& values);

@@ -14,6 +14,7 @@
 #include "protocol/import/guess_time_axis.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/incomplete_rows.hpp"
+#include "protocol/import/name_triads.hpp"
 #include "protocol/import/psins.hpp"
 #include "protocol/import/time_steps.hpp"
 
@@ -40,7 +41,8 @@ class Guesser {
     if (std::string words = continue_full_columns(source_, named_, values_); !words.empty()) {
       say("columns", std::move(words));
     }
-    roles_ = assign_roles(source_, named_, values_, lost_.rows, psins_.has_value(), guess_.remarks);
+    roles_ = assign_roles(source_, named_, values_, lost_.rows, psins_.has_value(), known_.sample_rate_hz.has_value(),
+                          guess_.remarks);
     guess_site();
     guess_time();
     guess_incomplete();
@@ -168,8 +170,8 @@ class Guesser {
     }
     set_axes(orientation.gyro, map.gyro);
     set_axes(orientation.accelerometer, map.accelerometer);
-    guess_gyro_unit(orientation);
     guess_accelerometer_unit();
+    guess_gyro_unit(orientation);
   }
 
   // Counts around a middle: the sphere through gravity's directions has its centre there.
@@ -185,15 +187,15 @@ class Guesser {
       return;
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      guess_.map.accelerometer.zero[k] = std::round((*zero)[static_cast<int>(k)]);
+      guess_.map.accelerometer.zero[k] = std::round((*zero)[static_cast<int>(k)]) + 0.0;  // no -0
       for (double& value : values_[(*roles_.accelerometer)[k]]) {
         value -= guess_.map.accelerometer.zero[k];
       }
     }
-    doubt(
-        "accelerometer.zero",
-        fmt::format("counts {:.0f}, {:.0f}, {:.0f} mean no force: the centre of gravity's directions; biases are in it",
-                    (*zero)[0], (*zero)[1], (*zero)[2]));
+    doubt("accelerometer.zero",
+          fmt::format(
+              "counts {:.0f}, {:.0f}, {:.0f} mean no force: the centre of gravity's directions; biases are in it",
+              guess_.map.accelerometer.zero[0], guess_.map.accelerometer.zero[1], guess_.map.accelerometer.zero[2]));
   }
 
   void set_psins() {
@@ -284,12 +286,15 @@ class Guesser {
     const UnitClaim said = claim(*roles_.gyro, "gyro.unit");
     const auto claimed = find_unit(said.unit);
     if (!orientation.rad_per_sample || !interval_s_) {
-      gyro.unit = claimed ? std::string(claimed->name) : said.increments ? "rad" : "rad/s";
+      const bool increments = said.increments || (!claimed && guess_.map.accelerometer.increments);
+      gyro.unit = claimed ? std::string(claimed->name) : increments ? "rad" : "rad/s";
       gyro.increments = find_unit(gyro.unit)->quantity == Quantity::angle;
       const char* why = !interval_s_ ? "the sample rate is not known" : "no turn that shows it";
       // "gyro_rad" of PX4 is a rate, other people's are increments.
       const bool angle = claimed && gyro.increments && !said.increments;
-      why = angle ? "increments, or so much a second; no turn shows which" : why;
+      why = angle                            ? "increments, or so much a second; no turn shows which"
+            : increments && !said.increments ? "increments, as the accelerometers'; no turn that shows it"
+                                             : why;
       return claimed && interval_s_ && !angle
                  ? say("gyro.unit", fmt::format("{} by its name; {}", gyro.unit, why))
                  : doubt("gyro.unit",
@@ -372,6 +377,11 @@ class Guesser {
                                rates->unit, size));
     }
     accel.unit = said.increments ? "m/s" : "m/s^2";
+    if (!said.increments && says_no_gravity(source_.names()[roles_.accelerometer->front()])) {
+      return doubt("accelerometer.unit",
+                   fmt::format("{}: gravity is not in it by its name, and the usual force is {:.5g}",
+                               source_.title(roles_.accelerometer->front()), size));
+    }
     const double scale = 9.80665 * (said.increments ? interval : 1.0) / size;
     accel.scale = {scale, scale, scale};
     doubt("accelerometer.unit",

@@ -5,14 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
-#include <limits>
+#include <iterator>
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/gravity_columns.hpp"
 #include "protocol/import/guess_axes.hpp"
 #include "protocol/import/guess_time.hpp"
+#include "protocol/import/guess_time_column.hpp"
 #include "protocol/import/guess_units.hpp"
-#include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/name_words.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
@@ -27,8 +27,14 @@ bool all_finite(const std::vector<double>& values) {
 class Assigner {
  public:
   Assigner(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
-           const std::vector<bool>& lost, std::vector<Remark>& remarks)
-      : source_(source), named_(named), values_(values), lost_(lost), remarks_(remarks), used_(values.size(), false) {
+           const std::vector<bool>& lost, bool rate_is_given, std::vector<Remark>& remarks)
+      : source_(source),
+        named_(named),
+        values_(values),
+        lost_(lost),
+        rate_is_given_(rate_is_given),
+        remarks_(remarks),
+        used_(values.size(), false) {
     for (std::size_t k = 0; k < values.size(); ++k) {
       used_[k] = !all_finite(values[k]);  // of no use
     }
@@ -68,76 +74,18 @@ class Assigner {
     taken_.push_back(column);
   }
 
-  bool try_time(std::size_t column) {
-    ColumnRequest request;
-    request.tolerant = true;
-    request.stamp = column;
-    request.most_rows = lost_.size();
-    for (const bool date : {false, true}) {
-      request.stamp_is_date = date;
-      Expected<ColumnData> data = source_.read(request);
-      if (data) {
-        leave_out(lost_, *data);
-        roles_.clock_words = continue_full_clocks(data->stamps);
-        roles_.clock_words += put_in_order(data->stamps);  // values of a few late rows judge no worse where they are
-      }
-      if (data && rises_evenly(data->stamps)) {
-        roles_.time = column;
-        roles_.time_is_date = date;
-        roles_.stamps = data->stamps;
-        take(column);
-        return true;
-      }
-      if (data && !date &&
-          std::all_of(values_[column].begin(), values_[column].end(), [](double v) { return std::isfinite(v); })) {
-        break;
-      }
-    }
-    return false;
-  }
-
-  // Another column that is called a time, and runs at another rate than the one that was taken.
-  void doubt_rivals(const std::vector<std::size_t>& times) {
-    const NamedColumn& taken = named_[*roles_.time];
-    const double unit = roles_.time_is_date ? 1.0 : seconds_of_unit(taken.unit);
-    for (const std::size_t k : times) {
-      const bool comparable = k != *roles_.time && taken.other_unit.empty() && named_[k].other_unit.empty();
-      const auto faster = comparable && all_finite(values_[k])
-                              ? other_rate(roles_.stamps, unit, values_[k], seconds_of_unit(named_[k].unit))
-                              : std::nullopt;
-      if (faster) {
-        return doubt("time.column", fmt::format("{} runs {:.3g} times as fast as {}: which is the sensors' clock?",
-                                                source_.title(k), *faster, source_.title(*roles_.time)));
-      }
-    }
-  }
-
   void find_time() {
-    std::string named_but;
-    const std::vector<std::size_t> times = times_by_name(source_.names(), named_);
-    for (const std::size_t k : times) {
-      if (try_time(k)) {
-        say("time.column", fmt::format("{}, by its name; it increases evenly", source_.title(k)));
-        return doubt_rivals(times);
-      }
-      named_but = fmt::format("{} is named so, but {}", source_.title(k), why_uneven(values_[k]));
+    FoundTime found = find_time_column(source_, named_, values_, lost_, rate_is_given_);
+    std::move(found.remarks.begin(), found.remarks.end(), std::back_inserter(remarks_));
+    roles_.clock_words = std::move(found.clock_words);
+    if (found.column) {
+      roles_.time = found.column;
+      roles_.time_is_date = found.is_date;
+      roles_.stamps = std::move(found.stamps);
+      take(*found.column);
     }
-    // A column that rises by 1 is a counter as well as a time.
-    for (const bool counters : {false, true}) {
-      for (std::size_t k = 0; k < named_.size(); ++k) {
-        const bool free = named_[k].role == Role::unknown || named_[k].role == Role::other ||
-                          (counters && named_[k].role == Role::counter);
-        const bool rises_by_1 = values_[k].size() > 1 && values_[k][1] - values_[k][0] == 1.0;
-        if (free && rises_by_1 == counters && (!used_[k] || !std::isfinite(values_[k].front())) && try_time(k)) {
-          const std::string told =
-              source_.title(k) + (counters ? counter_words(source_.preamble()) : ": it increases evenly");
-          remarks_.push_back({"time.column", told, counters});
-          return;
-        }
-      }
-    }
-    if (!named_but.empty()) {
-      doubt("time.column", named_but);
+    for (std::size_t k = 0; k < values_.size() && rate_is_given_; ++k) {
+      used_[k] = used_[k] || counts_by_one({values_[k].begin(), values_[k].end()});
     }
   }
 
@@ -270,6 +218,10 @@ class Assigner {
     }
     roles_.accelerometer = found->triad;
     accelerometers_to_show_ = found->moves;
+    if (found->is_direction) {
+      doubt("accelerometer.columns",
+            "their size has no noise: a direction, as a filter makes it of all sensors (a phone's \"gravity\")");
+    }
     if (found->alike > 1) {
       doubt("accelerometer.columns",
             fmt::format("{} sets of three columns side by side have a constant size, as gravity has", found->alike));
@@ -330,8 +282,7 @@ class Assigner {
       say("gyro.columns", fmt::format("columns {} to {}: they explain {:.0f} % of how the specific force turns",
                                       roles_.gyro->front() + 1, roles_.gyro->back() + 1, 100.0 * best));
     } else if (!free.empty()) {
-      const auto first = std::find_if(free.begin(), free.end(), [this](const Triad& t) { return varies(t); });
-      roles_.gyro = first == free.end() ? free.front() : *first;
+      roles_.gyro = nearest_zero(values_, free);
       doubt("gyro.columns", fmt::format("columns {} to {}: three that are free; nothing shows that they are gyros",
                                         roles_.gyro->front() + 1, roles_.gyro->back() + 1));
       if (accelerometers_to_show_) {
@@ -466,6 +417,7 @@ class Assigner {
   const std::vector<NamedColumn>& named_;
   const Values& values_;
   const std::vector<bool>& lost_;
+  bool rate_is_given_;
   std::vector<Remark>& remarks_;
   std::vector<bool> used_;
   std::vector<std::size_t> taken_;
@@ -484,14 +436,14 @@ TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3
 }
 
 Roles assign_roles(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
-                   const std::vector<bool>& lost, bool by_format, std::vector<Remark>& remarks) {
+                   const std::vector<bool>& lost, bool by_format, bool rate_is_given, std::vector<Remark>& remarks) {
   if (by_format) {
     Roles roles;
     roles.gyro = {0, 1, 2};
     roles.accelerometer = {3, 4, 5};
     return roles;
   }
-  return Assigner(source, named, values, lost, remarks).assign();
+  return Assigner(source, named, values, lost, rate_is_given, remarks).assign();
 }
 
 }  // namespace selfcal::import

@@ -32,8 +32,8 @@ struct Roles {
 TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3>& columns);
 
 // BY_FORMAT: the file's format says that the first six columns are gyros and accelerometers. Adds to REMARKS what was assumed and doubted.
-// LOST: the rows of the file that VALUES is without.
+// LOST: the rows of the file that VALUES is without. RATE_IS_GIVEN: a column that no name calls a time is none, be it that it rises.
 Roles assign_roles(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
-                   const std::vector<bool>& lost, bool by_format, std::vector<Remark>& remarks);
+                   const std::vector<bool>& lost, bool by_format, bool rate_is_given, std::vector<Remark>& remarks);
 
 }  // namespace selfcal::import

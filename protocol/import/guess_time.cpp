@@ -67,7 +67,7 @@ std::string counter_words(std::string_view head) {
 
 int remoteness_of_clock(std::string_view name) {
   const Words words = words_of(name);
-  if (holds(words, {"header", "device", "sensor"})) {
+  if (holds(words, {"header", "device", "sensor"}) || is_one_of(words, {"imu"})) {
     return 0;
   }
   return is_one_of(words, {"server", "host", "pc", "system", "received", "recv", "arrival", "logging"}) ? 2 : 1;

@@ -102,11 +102,13 @@ std::optional<std::size_t> raw_one_of(const std::vector<std::string>& names,
   return one_plain ? std::optional(plain.front()) : std::nullopt;
 }
 
+bool says_no_gravity(const std::string& name) { return holds(words_of(name), {"linear", "linacc", "user"}); }
+
 void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all) {
   std::vector<bool> plain(all.size(), false), linear(all.size(), false);
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (all[k].role == Role::accelerometer) {
-      linear[k] = holds(words_of(names[k]), {"linear", "linacc", "user"});
+      linear[k] = says_no_gravity(names[k]);
       plain[k] = !linear[k];
     }
   }

@@ -8,6 +8,9 @@
 
 namespace selfcal::import {
 
+// "userAcceleration", "linear acceleration": of a phone without gravity.
+bool says_no_gravity(const std::string& name);
+
 // A phone's "linear acceleration" and "user acceleration" beside its accelerometers are without gravity; alone ROS calls accelerometers so.
 void leave_out_linear(const std::vector<std::string>& names, std::vector<NamedColumn>& all);
 

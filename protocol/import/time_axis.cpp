@@ -43,6 +43,25 @@ double shortest_near(double value, double tolerance) {
   return value;
 }
 
+// Whether rows are missing before stamp k: those behind it stand half an interval later beside those before it than they would. A row that was
+// late alone, as a computer writes it down, is followed by short intervals.
+bool is_gap(const std::vector<long double>& stamps, std::size_t k, long double typical) {
+  if (stamps[k] - stamps[k - 1] <= gap_intervals * typical) {
+    return false;
+  }
+  constexpr std::size_t around = 10;
+  const auto place = [&](std::size_t first, std::size_t last) {
+    std::vector<long double> off;
+    for (std::size_t i = first; i < last; ++i) {
+      off.push_back(stamps[i] - typical * static_cast<long double>(i));
+    }
+    std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
+    return off[off.size() / 2];
+  };
+  const std::size_t before = k - std::min(k, around), behind = std::min(stamps.size(), k + around);
+  return place(k, behind) - place(before, k) > (gap_intervals - 1.0L) * typical;
+}
+
 }  // namespace
 
 RateOfStamps rate_of(const std::vector<long double>& stamps, long double seconds) {
@@ -58,7 +77,7 @@ RateOfStamps rate_of(const std::vector<long double>& stamps, long double seconds
   std::size_t count = 0;
   for (std::size_t k = 1; k < stamps.size(); ++k) {
     const long double interval = stamps[k] - stamps[k - 1];
-    if (interval > gap_intervals * typical) {
+    if (is_gap(stamps, k, typical)) {
       ++found.gaps;
     } else {
       span += interval;

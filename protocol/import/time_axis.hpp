@@ -14,7 +14,7 @@ struct RateOfStamps {
   double rate_hz = 0.0;
   double resolution_s = 0.0;  // of the stamps: what all intervals are multiples of, 0: not seen
   double jitter = 0.0;        // rms of the intervals about the nominal one, in parts of it
-  std::size_t gaps = 0;       // intervals of more than 1.5 nominal ones
+  std::size_t gaps = 0;       // intervals of more than 1.5 nominal ones that the next ones do not make up for
 };
 
 // Of increasing stamps, in their own unit times SECONDS: mean over all intervals that are no gaps, rounded to what the
