@@ -42,9 +42,8 @@ Columns numeric_columns(const import::ColumnSource& source, const std::vector<im
     request.most_rows = 100;
     const Expected<import::ColumnData> data = source.read(request);
     const auto finite = [](auto v) { return std::isfinite(v); };
-    const import::Role role = named[column].role;
     const bool other = column + 1 == told.angle || column + 1 == told.turn_rate || column + 1 == told.temperature ||
-                       role == import::Role::temperature || role == import::Role::other;
+                       named[column].role == import::Role::temperature;
     if (!other && (!data || std::any_of(data->values[0].begin(), data->values[0].end(), finite) ||
                    std::any_of(data->stamps.begin(), data->stamps.end(), finite))) {
       numeric.push_back(column);
