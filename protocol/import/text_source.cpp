@@ -8,8 +8,10 @@
 #include <cmath>
 #include <limits>
 
+#include "protocol/import/guess_names.hpp"
 #include "protocol/import/labelled_lines.hpp"
 #include "protocol/import/line_reader.hpp"
+#include "protocol/import/repeated_lines.hpp"
 #include "protocol/import/rows_in_turns.hpp"
 #include "protocol/toml_file/utf8.hpp"
 
@@ -339,7 +341,8 @@ std::string known_words(const std::vector<std::string_view>& lines) {
   if (begin == "{" || begin.starts_with("{\"")) {
     return "JSON that is no object a line: `jq -c '.NAME[]'` makes such lines of the array that is called NAME in it";
   }
-  if (std::any_of(lines.begin(), lines.end(), [](std::string_view l) { return l == "linear_acceleration:"; })) {
+  if (std::any_of(lines.begin(), lines.end(),
+                  [](std::string_view l) { return trimmed(l) == "linear_acceleration:"; })) {
     return "what `topic echo` prints: `rostopic echo -p` or `ros2 topic echo --csv` prints columns";
   }
   if (is_hex_dump(lines)) {
@@ -420,6 +423,14 @@ Expected<Form> judged_form(const std::filesystem::path& file) {
   return form;
 }
 
+// By the names of its columns, or by their count: six without names are two triads.
+bool holds_a_triad(const ColumnSource& source) {
+  constexpr std::size_t two_triads = 6;
+  const std::vector<NamedColumn> named = read_names(source.names(), source.units());
+  const auto names = [&named](Role role) { return !triads_by_name(named, role).all.empty(); };
+  return names(Role::gyro) || names(Role::accelerometer) || named.size() == two_triads;
+}
+
 }  // namespace
 
 std::string ColumnData::place(std::size_t row) const {
@@ -451,6 +462,12 @@ std::string ColumnSource::title(std::size_t column) const {
 Expected<std::unique_ptr<ColumnSource>> open_text(const std::filesystem::path& file,
                                                   const std::optional<TextDialect>& dialect) {
   Expected<Form> form = judged_form(file);
+  if (!form) {
+    Expected<std::unique_ptr<ColumnSource>> repeated = open_repeated_lines(file);
+    if (repeated && *repeated && holds_a_triad(**repeated)) {
+      return repeated;
+    }
+  }
   if (!form && !dialect) {
     return tl::unexpected(form.error());
   }
@@ -458,6 +475,12 @@ Expected<std::unique_ptr<ColumnSource>> open_text(const std::filesystem::path& f
                                              form ? std::move(form->labels) : std::nullopt);
   if (const auto head = source->read_head(); !head) {
     return tl::unexpected(head.error());
+  }
+  if (form && !source->mixed_rows().empty() && numbered_rows(*source).empty()) {  // words tell its rows apart
+    Expected<std::unique_ptr<ColumnSource>> repeated = open_repeated_lines(file);
+    if (repeated && *repeated && holds_a_triad(**repeated)) {
+      return repeated;
+    }
   }
   return source;
 }

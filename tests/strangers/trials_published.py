@@ -90,12 +90,41 @@ def labelled(operator, rng):
     answer = operator.run("poses", "cut.txt", *SITE)
     check(f"a cut line is told: {answer.stderr.strip()[-120:]}", answer.returncode > 1 and "line 3001" in answer.stderr or "left out" in answer.stderr)
     operator.refused("lines of several kinds", "poses", "two.txt")
-    operator.refused("topic echo", "poses", "echo.txt")
     operator.refused("bytes in hexadecimal", "poses", "bytes.txt")
     operator.refused("jq -c", "poses", "piece.json")
     operator.refused("jq -c", "poses", "pretty.json")
     operator.settled("objects.json", ("accelerometer.axes", "gyro.unit", "accelerometer.unit"))
     accelerometers(operator.diagnosed("objects.json"), a, 4e-5)
+
+
+def over_lines(operator, rng):
+    truth = labels.over_lines(operator.folder, rng)
+    for file in truth["files"]:
+        rate = [] if file in truth["timed"] else ["--rate", 100]
+        answer = operator.answer("poses", file, *SITE, *rate)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            p, raw = known[f"scale_{axis}"], known[f"scale_{axis}"]["unit"] == "raw/g"
+            true = truth["a"].matrix[k, k] * ((GRAVITY if file in truth["no_unit"] else GRAVITY / G0) if raw else 1.0) - (not raw)
+            near(f"{file}: scale {axis}", p["value"], p["sigma"], true, 6e-5 * (GRAVITY if raw else 1.0))
+        raw = answer["gyros"]["raw_unit_rad_s"] is not None
+        check("units by their words, three gyro scale factors", raw == (file in truth["raw"]) and gyro_scales(answer, truth["g"], 1.0 / DEG if raw else None) == 3)
+    operator.settled("echo.txt", ("accelerometer.axes",))
+    accelerometers(operator.diagnosed("echo.txt"), truth["a"], 6e-5)
+
+
+def registers(operator, rng):
+    truth = labels.registers(operator.folder, rng)
+    for name in truth["files"]:
+        answer = operator.answer("poses", f"{name}.txt", *SITE)
+        known = parameters(answer, "accelerometers")
+        for k, axis in enumerate("xyz"):
+            p = known[f"scale_{axis}"]
+            near(f"{name}: counts per g, {axis}", p["value"], p["sigma"], truth["a"].matrix[k, k] * 16384 * GRAVITY / G0, 0.6)
+        check("three gyro scale factors", gyro_scales(answer, truth["g"], 131.0 / DEG) == 3)
+        at_rest = operator.answer("poses", f"{name}_rest.txt", *SITE)["rest"]
+        means = {x["axis"]: x["mean"]["value"] for x in at_rest["axes"] if x["sensor"] == "accelerometer"}
+        check(f"{name} at rest: {means}", all(abs(means[x] - truth["level"][k]) < 60 for k, x in enumerate("xyz")))
 
 
 def lists(operator, rng):
@@ -182,4 +211,4 @@ def claims(operator, rng):
     accelerometers(operator.answer("poses", "coarse.csv", *SITE), truth["a"], 2e-4)
 
 
-TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, lists: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables, claims: claims_of_names}
+TRIALS = {positions: published, six_faces: published, head: published, table_log: published, labelled: labels, over_lines: labels, registers: labels, lists: labels, imported: None, silent: silent_gyros, hdf5: arrays, makers: makers_tables, claims: claims_of_names}
