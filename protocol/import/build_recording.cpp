@@ -10,6 +10,7 @@
 #include "protocol/import/full_words.hpp"
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/resample.hpp"
+#include "protocol/import/table_read_outs.hpp"
 #include "protocol/import/time_axis.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
@@ -115,8 +116,11 @@ std::vector<std::array<double, 3>> triad(const TriadMap& map, const std::array<s
   return all;
 }
 
-std::vector<double> read_out(const GimbalMap& map, std::size_t which, const std::vector<double>& raw) {
-  const double si = find_unit(map.unit).value_or(Unit{{}, Quantity::angle, 1.0}).si;
+std::vector<double> read_out(const GimbalMap& map, std::size_t which, const std::vector<double>& column,
+                             const std::vector<double>& time_s) {
+  const Unit unit = find_unit(map.unit).value_or(Unit{{}, Quantity::angle, 1.0});
+  const double si = unit.si;
+  const std::vector<double> raw = unit.quantity == Quantity::angular_rate ? angle_of_rate(column, time_s) : column;
   const double offset = map.offsets_deg[which] * units::degree;
   std::vector<double> angle(raw.size());
   for (std::size_t row = 0; row < raw.size(); ++row) {
@@ -130,8 +134,12 @@ void set_gimbal(const GimbalMap& map, const Places& places, const ColumnData& da
   Recording& recording = imported.recording;
   if (map.outer || map.inner) {
     const std::vector<double> none(data.rows, 0.0);  // of a table with one axis
-    recording.gimbal_outer_rad = map.outer ? read_out(map, 0, data.values[places.outer]) : none;
-    recording.gimbal_inner_rad = map.inner ? read_out(map, 1, data.values[places.inner]) : none;
+    recording.gimbal_outer_rad = map.outer ? read_out(map, 0, data.values[places.outer], recording.time_s) : none;
+    recording.gimbal_inner_rad = map.inner ? read_out(map, 1, data.values[places.inner], recording.time_s) : none;
+    const auto unit = find_unit(map.unit);
+    if (unit && unit->quantity == Quantity::angular_rate) {
+      imported.notes.emplace_back("gimbal: rates, added up from the first row on; where that stood nobody says");
+    }
     if (!map.outer || !map.inner) {
       imported.notes.push_back(
           fmt::format("one read-out: that of the {} axis is written as 0", map.outer ? "inner" : "outer"));

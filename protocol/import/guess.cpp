@@ -16,6 +16,7 @@
 #include "protocol/import/incomplete_rows.hpp"
 #include "protocol/import/name_triads.hpp"
 #include "protocol/import/psins.hpp"
+#include "protocol/import/table_read_outs.hpp"
 #include "protocol/import/time_steps.hpp"
 
 namespace selfcal::import {
@@ -232,13 +233,27 @@ class Guesser {
     }
   }
 
+  // Of the rows at the rate that was found, s; where none was, in rows.
+  std::vector<double> times() const {
+    std::vector<double> all(values_.front().size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      all[k] = static_cast<double>(k) * interval_s_.value_or(1.0);
+    }
+    return all;
+  }
+
   // Empty: no column of angles, or the gyros do not follow it.
   std::vector<Table> tables_of(const OrientationInput& input) {
     if (!roles_.angle || psins_) {
       return {};
     }
     const std::size_t gyro = roles_.gyro->front();
-    TableFit fit = fit_table(input.gyro, input.accelerometer, values_[*roles_.angle], named_[*roles_.angle].unit,
+    std::string claimed = named_[*roles_.angle].unit;
+    if (roles_.angle_is_rate) {
+      values_[*roles_.angle] = angle_of_rate(values_[*roles_.angle], times());
+      claimed = claimed.substr(0, claimed.find("/s"));
+    }
+    TableFit fit = fit_table(input.gyro, input.accelerometer, values_[*roles_.angle], claimed,
                              {named_[gyro].unit, named_[gyro].increment}, interval_s_);
     if (fit.ways.empty()) {
       doubt("gimbal", fit.good ? fmt::format("{}: the gyros show its turns, but not in the unit of their names",
@@ -258,11 +273,11 @@ class Guesser {
     const bool inner = along == 1;  // outer turns about z, inner about y
     (inner ? gimbal.inner : gimbal.outer) = reference(*roles_.angle);
     gimbal.signs[inner ? 1 : 0] = about(along) < 0.0 ? -1.0 : 1.0;
-    gimbal.unit = tables.front().unit;
+    gimbal.unit = tables.front().unit + (roles_.angle_is_rate ? "/s" : "");
     const std::string title = source_.title(*roles_.angle);
     say(inner ? "gimbal.inner" : "gimbal.outer",
-        fmt::format("{}, a table with one axis: its turns are {:.1f} % of what the gyros show{}, mostly about {}{}",
-                    title, 100.0 * axis.explained,
+        fmt::format("{}, {}a table with one axis: its turns are {:.1f} % of what the gyros show{}, mostly about {}{}",
+                    title, roles_.angle_is_rate ? "the rate, added up, of " : "", 100.0 * axis.explained,
                     axis.turns > 0 ? fmt::format(" in {} turns", axis.turns) : std::string(),
                     about(along) < 0.0 ? "-" : "", "xyz"[along]));
     say("gimbal", "one read-out: good for `selfcal poses`, not for the 24; that of the other axis is written as 0");

@@ -14,6 +14,7 @@
 #include "protocol/import/guess_time_column.hpp"
 #include "protocol/import/guess_units.hpp"
 #include "protocol/import/name_words.hpp"
+#include "protocol/import/table_read_outs.hpp"
 #include "protocol/import/time_steps.hpp"
 #include "protocol/import/units.hpp"
 
@@ -372,6 +373,21 @@ class Assigner {
            std::none_of(angles.begin(), angles.end(), [this](std::size_t k) { return is_read_out(k); });
   }
 
+  // The only free column that its name calls a table's rate.
+  std::optional<std::size_t> rate_of_a_table() const {
+    std::optional<std::size_t> found;
+    for (std::size_t k = 0; k < values_.size(); ++k) {
+      const bool taken = std::find(taken_.begin(), taken_.end(), k) != taken_.end();
+      if (!taken && all_finite(values_[k]) && table_read_out(named_[k], source_.names()[k]) == TableReadOut::rate) {
+        if (found) {
+          return std::nullopt;
+        }
+        found = k;
+      }
+    }
+    return roles_.gimbal ? std::nullopt : found;
+  }
+
   void tell_unused() {
     std::string rest;
     std::vector<std::size_t> angles;
@@ -393,17 +409,15 @@ class Assigner {
     } else if (is_attitude(angles)) {
       say("gimbal", fmt::format("{} and those beside it: an attitude that was computed, no read-outs",
                                 source_.title(angles.front())));
+    } else if (const std::optional<std::size_t> rate = rate_of_a_table(); rate && angles.empty()) {
+      roles_.angle = rate;
+      roles_.angle_of_a_table = roles_.angle_is_rate = true;
+      take(*rate);
     } else if (!angles.empty()) {
       doubt("gimbal", fmt::format("{}: angles by the name, but no two columns side by side fit gravity and the turns",
                                   source_.title(angles.front())));
     }
     for (std::size_t k = 0; k < values_.size(); ++k) {
-      if (is_free(k) && is_rate(k) && is_read_out(k) && !roles_.gimbal && !roles_.angle) {
-        say("gimbal",
-            fmt::format(
-                "{}: a table's rate, which no map takes; its running sum times the interval, as a column, is the angle",
-                source_.title(k)));
-      }
       if (is_free(k)) {
         rest += fmt::format("{}{}", rest.empty() ? "" : ", ", source_.title(k));
       }

@@ -26,6 +26,7 @@ struct Roles {
   bool gimbal_named = false;
   std::optional<std::size_t> angle;  // the only free column that its name calls an angle, where there is no pair
   bool angle_of_a_table = false;     // and its name says that it is a read-out, no attitude that somebody computed
+  bool angle_is_rate = false;        // how fast that turns
   std::vector<std::size_t> temperature;
 };
 

@@ -298,7 +298,7 @@ void read_time(Section& section, ImportMap& map) {
 void read_gimbal(Section& section, GimbalMap& gimbal) {
   gimbal.outer = section.column("outer");
   gimbal.inner = section.column("inner");
-  section.text("unit", gimbal.unit, {"deg", "rad", "arcsec", "mrad", "arcmin"});
+  section.text("unit", gimbal.unit, {"deg", "rad", "arcsec", "mrad", "arcmin", "deg/s", "rad/s", "rpm", "rev/s"});
   section.numbers("signs", gimbal.signs, false);
   section.numbers("offsets_deg", gimbal.offsets_deg, false);
   if (section.has("fixed_deg")) {

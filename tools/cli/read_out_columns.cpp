@@ -8,7 +8,7 @@
 
 #include "estimator/geometry/units.hpp"
 #include "protocol/import/guess_attitude.hpp"
-#include "protocol/import/table_names.hpp"
+#include "protocol/import/table_read_outs.hpp"
 #include "protocol/import/units.hpp"
 #include "tools/cli/log_units.hpp"
 
@@ -119,16 +119,8 @@ Expected<ReadOutColumns> read_out_columns(const import::ColumnSource& source, co
 
 std::vector<double> read_out_angles(const ReadOutColumn& axis, const std::vector<double>& values,
                                     const std::vector<double>& time_s) {
-  std::vector<double> angles(values.size());
-  double sum = 0.0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (axis.is_rate) {
-      sum += i > 0 ? 0.5 * (values[i] + values[i - 1]) * (time_s[i] - time_s[i - 1]) : 0.0;
-      angles[i] = axis.si * sum;
-    } else {
-      angles[i] = axis.si * values[i];
-    }
-  }
+  std::vector<double> angles = axis.is_rate ? import::angle_of_rate(values, time_s) : values;
+  std::for_each(angles.begin(), angles.end(), [si = axis.si](double& angle) { angle *= si; });
   return angles;
 }
 

@@ -107,9 +107,13 @@ TEST_F(GuessTable, ATablesRateBesideItsAngleIsNoSecondAngle) {
   EXPECT_THAT(guess.map.unsettled, Not(Contains("gimbal")));
 }
 
-TEST_F(GuessTable, ATablesRateAloneIsSaidToBeNoAngle) {
+TEST_F(GuessTable, ATablesRateAloneIsAddedUp) {
   const Guess guess = guess_of({.with_angle = false, .with_rate = true});
-  EXPECT_THAT(said(guess, "gimbal", false), HasSubstr("column 8 (table_rate_dps): a table's rate"));
+  ASSERT_TRUE(guess.map.gimbal.outer);
+  EXPECT_EQ(guess.map.gimbal.outer->name, "table_rate_dps");
+  EXPECT_EQ(guess.map.gimbal.unit, "deg/s");
+  EXPECT_THAT(said(guess, "gimbal.outer", false), HasSubstr("column 8 (table_rate_dps), the rate, added up, of a table"));
+  EXPECT_THAT(guess.map.unsettled, Not(Contains("gimbal")));
 }
 
 TEST_F(GuessTable, WhereATimeBeginsAnewIsSaid) {

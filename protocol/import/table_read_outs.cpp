@@ -1,4 +1,4 @@
-#include "protocol/import/table_names.hpp"
+#include "protocol/import/table_read_outs.hpp"
 
 #include "protocol/import/name_words.hpp"
 #include "protocol/import/units.hpp"
@@ -41,6 +41,14 @@ TableReadOut table_read_out(const NamedColumn& column, const std::string& name) 
                                                       : TableReadOut::none;
   }
   return says_rate(words) ? TableReadOut::rate : says_angle(words) ? TableReadOut::angle : TableReadOut::none;
+}
+
+std::vector<double> angle_of_rate(const std::vector<double>& rate, const std::vector<double>& time_s) {
+  std::vector<double> angle(rate.size(), 0.0);
+  for (std::size_t k = 1; k < rate.size(); ++k) {
+    angle[k] = angle[k - 1] + 0.5 * (rate[k] + rate[k - 1]) * (time_s[k] - time_s[k - 1]);
+  }
+  return angle;
 }
 
 }  // namespace selfcal::import
