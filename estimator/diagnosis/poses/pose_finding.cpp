@@ -398,9 +398,9 @@ std::vector<LeftOut> find_left_out(const PoseInput& input, const std::vector<Stu
 }
 
 std::vector<Clipping> find_clipping(const PoseInput& input) {
-  constexpr std::size_t least = 5;  // samples at the end, ...
-  constexpr double near = 0.01;     // ... and ten times as many as in the hundredth of the range before it
-  constexpr double at_rest = 0.5;   // what stands there for half of the time is no end of a range
+  // Values thin out towards an end that is none: there are more at the end of a range than in the hundredth before it, by more than chance.
+  constexpr double near = 0.01, sure = 3.0;
+  constexpr double at_rest = 0.5;  // what stands there for half of the time is no end of a range
   std::vector<Clipping> all;
   for (int k = 0; k < 6; ++k) {
     const Series& series = k < 3 ? input.gyro : input.accel;
@@ -424,8 +424,9 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
           ++before;
         }
       }
-      const bool clips =
-          there >= least && there > before && static_cast<double>(there) < at_rest * static_cast<double>(series.size());
+      const auto more = static_cast<double>(there) - static_cast<double>(before);
+      const bool clips = more > sure * std::sqrt(static_cast<double>(there + before)) &&
+                         static_cast<double>(there) < at_rest * static_cast<double>(series.size());
       if (clips) {
         const double from = input.time_s[first] - input.time_s.front(), to = input.time_s[last] - input.time_s.front();
         c.first_s = c.samples == 0 ? from : std::min(c.first_s, from);
