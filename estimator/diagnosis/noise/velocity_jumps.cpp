@@ -12,6 +12,8 @@ namespace {
 
 constexpr double before_turn_s = 2.0, behind_turn_s = 15.0;
 const double seen_log_p = std::log(1e-5);
+const double beside_log_p = std::log(1e-3);  // within `one_knock_s` of one that is known: people who get in knock more than once
+constexpr double one_knock_s = 5.0;
 
 struct Update {
   VectorX h, gain;  // [dynamic], [n]
@@ -95,15 +97,18 @@ double seconds_near_turns(const std::vector<Segment>& segments) {
   return sum;
 }
 
-// The largest of each neighbourhood that the noise would not make.
-std::vector<VelocityJump> seen(const std::vector<VelocityJump>& all) {
+// The largest of each neighbourhood that the noise would not make, beside those that are known.
+std::vector<VelocityJump> seen(const std::vector<VelocityJump>& all, const std::vector<VelocityJump>& known) {
   constexpr double apart_s = 10.0;  // by which the filter has settled behind one
   std::vector<VelocityJump> found;
   for (const VelocityJump& jump : all) {
     const bool largest = std::none_of(all.begin(), all.end(), [&](const VelocityJump& other) {
       return std::abs(other.start_s - jump.start_s) < apart_s && other.chi2 > jump.chi2;
     });
-    if (largest && log_chi_squared_tail(jump.chi2, 3.0) < seen_log_p) {
+    const bool beside = std::any_of(known.begin(), known.end(), [&](const VelocityJump& other) {
+      return std::abs(other.start_s - jump.start_s) < one_knock_s;
+    });
+    if (largest && log_chi_squared_tail(jump.chi2, 3.0) < (beside ? beside_log_p : seen_log_p)) {
       found.push_back(jump);
     }
   }
@@ -161,7 +166,7 @@ class Opening {
   bool open_some() {
     constexpr double most_share = 1.0 / 30.0;
     const std::vector<VelocityJump> all = jumps_by_interval(input_);
-    std::vector<VelocityJump> found = seen(all);
+    std::vector<VelocityJump> found = seen(all, opened_);
     const auto in_turns =
         std::partition(found.begin(), found.end(), [&](const VelocityJump& j) { return !near_turn(segments_, j); });
     if (in_turns != found.end() && !likely_in_turns(found)) {

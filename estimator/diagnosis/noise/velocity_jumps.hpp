@@ -21,7 +21,8 @@ struct VelocityJump {
 // Of every interval that was observed, as if it were the only one.
 std::vector<VelocityJump> jumps_by_interval(const PassInput& input);
 
-// Intervals in which the velocity jumps by more than the noise makes once in 10^5: there the filter's velocity is opened. In turns and up to
+// Intervals in which the velocity jumps by more than the noise makes once in 10^5, within 5 s of such a one once in 10^3: there the filter's
+// velocity is opened. In turns and up to
 // 15 s behind them only as many are believed as the rest of the dwells makes likely, for there effects are at home; what stands in
 // turns alone is none. More than one in 30 intervals are none either: noise of another kind. Chronological.
 // `opened`: that are open already, and among those returned.
