@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
+#include <span>
 #include <unsupported/Eigen/FFT>
+#include <utility>
 
 #include "estimator/diagnosis/noise/quantum_beat.hpp"
 #include "estimator/geometry/units.hpp"
@@ -125,16 +128,21 @@ std::vector<Line> steady_ones(const Eigen::VectorXd& rate, const std::vector<Lin
   return kept;
 }
 
+Vector3 mean_of(std::span<const std::array<double, 3>> increments, const Segment& s) {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t i = s.first; i < s.last; ++i) {
+    sum += Vector3(increments[i].data());
+  }
+  return sum / static_cast<double>(s.last - s.first);
+}
+
+Vector3 mean_force(const ImuData& data, const Segment& s) { return data.sample_rate_hz * mean_of(data.delta_v, s); }
+
 // [n x 3] What the base's tilt changes the specific force by, as the gyros turn gravity: -phi x f, phi their angle less its mean rate. A base
 // that tilts to and fro once in a dwell has a peak in each half too. Of the second order: 5 ug of 10 arcmin.
-Eigen::MatrixX3d force_of_tilt(const ImuData& data, const Segment& s) {
-  Vector3 turn = Vector3::Zero(), velocity = Vector3::Zero();
-  for (std::size_t i = s.first; i < s.last; ++i) {
-    turn += Vector3(data.delta_theta[i].data());
-    velocity += Vector3(data.delta_v[i].data());
-  }
+Eigen::MatrixX3d force_of_tilt(const ImuData& data, const Segment& s, const Vector3& force) {
+  const Vector3 mean = mean_of(data.delta_theta, s);
   const auto n = static_cast<Eigen::Index>(s.last - s.first);
-  const Vector3 mean = turn / static_cast<double>(n), force = velocity * data.sample_rate_hz / static_cast<double>(n);
   Eigen::MatrixX3d tilt(n, 3);
   Vector3 phi = Vector3::Zero();
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -143,6 +151,58 @@ Eigen::MatrixX3d force_of_tilt(const ImuData& data, const Segment& s) {
     phi += step;
   }
   return tilt;
+}
+
+// [n x 3] What the accelerometers read in a dwell beside mean and the tilt that the gyros tell, m/s^2.
+Eigen::MatrixX3d beside_tilt(const ImuData& data, const Segment& s, const Eigen::MatrixX3d& tilt) {
+  Eigen::MatrixX3d left(tilt.rows(), 3);
+  for (Eigen::Index i = 0; i < left.rows(); ++i) {
+    left.row(i) =
+        data.sample_rate_hz * Vector3(data.delta_v[s.first + static_cast<std::size_t>(i)].data()).transpose() -
+        tilt.row(i);
+  }
+  return left.rowwise() - left.colwise().mean();
+}
+
+// Amplitudes of three columns at a frequency, by Hann's weights.
+Eigen::RowVector3cd amplitudes_at(const Eigen::MatrixX3d& columns, double frequency_hz, double rate_hz) {
+  Eigen::RowVector3cd sum = Eigen::RowVector3cd::Zero();
+  const auto n = static_cast<double>(columns.rows());
+  for (Eigen::Index i = 0; i < columns.rows(); ++i) {
+    const double weight = 1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / n);
+    sum += weight * columns.row(i) *
+           std::polar(1.0, -2.0 * std::numbers::pi * frequency_hz * static_cast<double>(i) / rate_hz);
+  }
+  return 2.0 / n * sum;
+}
+
+// Whether the base turns as a gyro's line tells: gravity turns with it, so that beside the tilt that all of the gyros' rates make nothing of it is
+// left. A line of the gyro's own leaves the tilt that it does not make. What the accelerometers' noise hides is no base's.
+bool is_of_base(const Eigen::MatrixX3d& left, const Vector3& force, int gyro, const Line& line,
+                const Eigen::Vector2d& size, double rate_hz) {
+  // A rate of a cos + b sin is Re (a - ib) exp(iwt); its angle is that over iw, and tilts the force by force x angle.
+  const std::complex<double> rate(size(0), -size(1));
+  const double w = 2.0 * std::numbers::pi * line.frequency_hz;
+  const Eigen::RowVector3cd tilt =
+      (force.cross(Vector3::Unit(gyro)).cast<std::complex<double>>() * rate / std::complex<double>(0.0, w)).transpose();
+  const double duration_s = static_cast<double>(left.rows()) / rate_hz;
+  double noise = 0.0;  // square, beside the line
+  int bins = 0;
+  for (const int bin : {-5, -4, -3, 3, 4, 5}) {
+    const double frequency_hz = line.frequency_hz + bin / duration_s;
+    if (frequency_hz > 1.0 / duration_s) {
+      noise += amplitudes_at(left, frequency_hz, rate_hz).squaredNorm();
+      ++bins;
+    }
+  }
+  // Of the base's line 0, of the gyro's own -1. Noise has two phases and three axes.
+  constexpr double sure = 0.4;
+  if (bins == 0 || std::sqrt(noise / bins / 6.0) > sure * tilt.norm()) {
+    return false;
+  }
+  const double share =
+      tilt.conjugate().cwiseProduct(amplitudes_at(left, line.frequency_hz, rate_hz)).sum().real() / tilt.squaredNorm();
+  return share > -half_as_strong;
 }
 
 // What the sensors' quanta make of their rates in a dwell. The tilt that is taken out of the force holds the gyros' too.
@@ -176,6 +236,23 @@ class Beats {
   std::array<CountedRate, 6> axes_;
 };
 
+// Takes the lines that are the base's off LINES of a gyro's rate.
+void leave_out_base(const Eigen::MatrixX3d& left, const Vector3& force, int gyro, const Eigen::VectorXd& rate,
+                    double rate_hz, std::vector<Line>& lines) {
+  if (lines.empty()) {
+    return;
+  }
+  Eigen::VectorXd size;
+  fitted(rate, lines, rate_hz, size);
+  std::vector<Line> own;
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    if (!is_of_base(left, force, gyro, lines[k], size.segment<2>(static_cast<Eigen::Index>(2 * k)), rate_hz)) {
+      own.push_back(lines[k]);
+    }
+  }
+  lines = std::move(own);
+}
+
 void keep_strongest(std::vector<VibrationLine>& all, const VibrationLine& line, double resolution_hz) {
   const auto same = std::find_if(all.begin(), all.end(), [&](const VibrationLine& l) {
     return l.axis == line.axis && std::abs(l.frequency_hz - line.frequency_hz) < resolution_hz;
@@ -199,7 +276,8 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
     if (s.rotation || length < least_dwell_s) {
       continue;
     }
-    const Eigen::MatrixX3d tilt = force_of_tilt(data, s);
+    const Vector3 force = mean_force(data, s);
+    const Eigen::MatrixX3d tilt = force_of_tilt(data, s, force), left = beside_tilt(data, s, tilt);
     const Beats beats(data, s, quanta);
     const double searched = 6.0 * static_cast<double>(segments.size()) * highest_hz * length;
     for (int axis = 0; axis < 6; ++axis) {
@@ -212,7 +290,10 @@ std::vector<VibrationLine> subtract_dwell_lines(const ImuData& data, const std::
       if (axis >= 3) {
         rate -= tilt.col(axis - 3);
       }
-      const std::vector<Line> lines = steady_ones(rate, peaks(rate, fs, searched), fs);
+      std::vector<Line> lines = steady_ones(rate, peaks(rate, fs, searched), fs);
+      if (axis < 3) {
+        leave_out_base(left, force, axis, rate, fs, lines);
+      }
       if (lines.empty()) {
         continue;
       }

@@ -114,6 +114,44 @@ TEST(DwellLines, BaseThatTiltsToAndFroIsNoLine) {
   EXPECT_EQ(dwell.velocity, before);
 }
 
+// A base that rocks by 6 arcsec about y, and gyros with white noise of their integral; without `with_gravity` a line of the gyro's own.
+void rock(Dwell& dwell, bool with_gravity) {
+  constexpr double gravity = 9.8, tilt = 3e-5, angle_noise = 1e-6;
+  std::mt19937_64 engine(11);
+  std::normal_distribution<double> normal(0.0, angle_noise);
+  const auto angle = [](double t) { return tilt * std::sin(2.0 * std::numbers::pi * frequency_hz * t); };
+  double last = normal(engine);
+  for (std::size_t i = 0; i < dwell.data.size(); ++i) {
+    const double t = static_cast<double>(i) / rate_hz, now = normal(engine);
+    dwell.theta[i][1] = angle(t + 1.0 / rate_hz) - angle(t) + now - last;
+    dwell.velocity[i][0] += gravity / rate_hz;
+    dwell.velocity[i][2] += with_gravity ? gravity * angle(t + 0.5 / rate_hz) / rate_hz : 0.0;
+    last = now;
+  }
+  dwell.data.delta_theta = dwell.theta;
+  dwell.data.delta_v = dwell.velocity;
+}
+
+// Without its line the attitude would be another at the dwell's end.
+TEST(DwellLines, RockingWithWhichGravityTurnsIsTheBases) {
+  Dwell dwell(0.0);
+  rock(dwell, true);
+  const AngleVelocity before = dwell.theta;
+  for (const VibrationLine& line : subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity)) {
+    EXPECT_GE(line.axis, 3);
+  }
+  EXPECT_EQ(dwell.theta, before);
+}
+
+TEST(DwellLines, LineOfAGyroWithWhichGravityStandsStillIsTakenOut) {
+  Dwell dwell(0.0);
+  rock(dwell, false);
+  const auto lines = subtract_dwell_lines(dwell.data, dwell.segments, {}, dwell.theta, dwell.velocity);
+  ASSERT_FALSE(lines.empty());
+  EXPECT_EQ(lines.front().axis, 1);
+  EXPECT_NEAR(lines.front().frequency_hz, frequency_hz, 0.1 / length_s);
+}
+
 TEST(DwellLines, NoiseAloneIsLeftAlone) {
   Dwell dwell(0.0);
   const AngleVelocity before = dwell.velocity;
