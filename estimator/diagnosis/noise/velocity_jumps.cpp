@@ -12,7 +12,8 @@ namespace {
 
 constexpr double before_turn_s = 2.0, behind_turn_s = 15.0;
 const double seen_log_p = std::log(1e-5);
-const double beside_log_p = std::log(1e-3);  // within `one_knock_s` of one that is known: people who get in knock more than once
+const double beside_log_p =
+    std::log(1e-3);  // within `one_knock_s` of one that is known: people who get in knock more than once
 constexpr double one_knock_s = 5.0;
 
 struct Update {

@@ -112,7 +112,8 @@ TEST_F(GuessTable, ATablesRateAloneIsAddedUp) {
   ASSERT_TRUE(guess.map.gimbal.outer);
   EXPECT_EQ(guess.map.gimbal.outer->name, "table_rate_dps");
   EXPECT_EQ(guess.map.gimbal.unit, "deg/s");
-  EXPECT_THAT(said(guess, "gimbal.outer", false), HasSubstr("column 8 (table_rate_dps), the rate, added up, of a table"));
+  EXPECT_THAT(said(guess, "gimbal.outer", false),
+              HasSubstr("column 8 (table_rate_dps), the rate, added up, of a table"));
   EXPECT_THAT(guess.map.unsettled, Not(Contains("gimbal")));
 }
 
