@@ -1,7 +1,5 @@
 #include "estimator/diagnosis/noise/loudness.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -53,56 +51,6 @@ bool touches_turn(const std::vector<Segment>& segments, const Loudness& interval
   });
 }
 
-// Rates of the parts of intervals [first, last) of a turn, one below another.
-Eigen::Matrix<double, Eigen::Dynamic, 3> rates_in_turn(const ImuData& data, const std::vector<Stretch>& stretches,
-                                                       std::size_t first, std::size_t last) {
-  Eigen::Matrix<double, Eigen::Dynamic, 3> rates(static_cast<Eigen::Index>((last - first) * parts), 3);
-  for (std::size_t k = first; k < last; ++k) {
-    const std::array<Vector3, parts> of = rates_of(data, stretches[k]);
-    for (std::size_t part = 0; part < parts; ++part) {
-      rates.row(static_cast<Eigen::Index>((k - first) * parts + part)) = of[part].transpose();
-    }
-  }
-  return rates;
-}
-
-// Fills intervals [first, last) of a turn.
-void measure_turn(const ImuData& data, const std::vector<Stretch>& stretches, std::size_t first, std::size_t last,
-                  std::vector<Loudness>& all) {
-  const Eigen::Matrix<double, Eigen::Dynamic, 3> rates = rates_in_turn(data, stretches, first, last);
-  const Eigen::Index n = rates.rows();
-  constexpr Eigen::Index regressors = 4;
-  const Eigen::SelfAdjointEigenSolver<Matrix3> axes(Matrix3(rates.transpose() * rates));
-  const Eigen::VectorXd along = rates * axes.eigenvectors().col(2);
-  const Eigen::MatrixXd across = rates * axes.eigenvectors().leftCols<2>();
-  Eigen::MatrixXd X(n, regressors);
-  const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(n, -1.0, 1.0);
-  X << Eigen::VectorXd::Ones(n), t.matrix(), t.square().matrix(), along / along.norm();
-  const Eigen::MatrixXd left = across - X * X.colPivHouseholderQr().solve(across);
-  const double of_fit = static_cast<double>(n) / static_cast<double>(n - regressors);
-  for (std::size_t k = first; k < last; ++k) {
-    const auto row = static_cast<Eigen::Index>((k - first) * parts);
-    constexpr auto changes = static_cast<Eigen::Index>(parts - 1);
-    const Eigen::MatrixXd change = left.middleRows(row + 1, changes) - left.middleRows(row, changes);
-    all[k].power = of_fit * change.squaredNorm() / (2.0 * static_cast<double>(changes));
-  }
-}
-
-// Turns that last for some intervals, which tell by themselves.
-void measure_turns(const ImuData& data, const std::vector<Stretch>& stretches, std::vector<Loudness>& all) {
-  constexpr std::size_t fewest = 4;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    std::size_t end = k;
-    while (end < all.size() && all[end].in_turn && stretches[end].last - stretches[end].first >= 2 * parts) {
-      ++end;
-    }
-    if (end - k >= fewest) {
-      measure_turn(data, stretches, k, end, all);
-    }
-    k = std::max(k, end);
-  }
-}
-
 // Intervals that tell nothing by themselves (negative) are as loud as those on both sides.
 void fill_between(std::vector<Loudness>& all) {
   for (std::size_t k = 0; k < all.size(); ++k) {
@@ -124,7 +72,7 @@ void fill_between(std::vector<Loudness>& all) {
 double median_power(const std::vector<Loudness>& all) {
   std::vector<double> told;
   for (const Loudness& l : all) {
-    if (l.power >= 0.0 && !l.in_turn) {
+    if (l.power >= 0.0) {
       told.push_back(l.power);
     }
   }
@@ -136,23 +84,18 @@ double median_power(const std::vector<Loudness>& all) {
 std::vector<Loudness> loudness_of(const ImuData& data, const std::vector<Segment>& segments, double interval_s) {
   const double start_s = data.time_s.front() - 1.0 / data.sample_rate_hz;
   std::vector<Loudness> all;
-  std::vector<Stretch> stretches;
   Stretch s;
   for (std::size_t k = 0; s.last < data.size(); ++k) {
-    Loudness l{start_s + static_cast<double>(k) * interval_s, start_s + static_cast<double>(k + 1) * interval_s, -1.0,
-               false};
+    Loudness l{start_s + static_cast<double>(k) * interval_s, start_s + static_cast<double>(k + 1) * interval_s, -1.0};
     s.first = s.last;
     while (s.last < data.size() && data.time_s[s.last] < l.end_s + 0.5 / data.sample_rate_hz) {
       ++s.last;
     }
-    l.in_turn = touches_turn(segments, l);
-    if (s.last - s.first >= 2 * parts && !l.in_turn) {
+    if (s.last - s.first >= 2 * parts && !touches_turn(segments, l)) {
       l.power = square_of_changes(rates_of(data, s));
     }
     all.push_back(l);
-    stretches.push_back(s);
   }
-  measure_turns(data, stretches, all);
   const double usual = median_power(all);
   if (!(usual > 0.0)) {
     return {};
@@ -166,8 +109,7 @@ std::vector<Loudness> loudness_of(const ImuData& data, const std::vector<Segment
 
 bool changes_its_loudness(const std::vector<Loudness>& all) {
   constexpr double louder = 12.0, often = 0.01;
-  const auto loud =
-      std::count_if(all.begin(), all.end(), [](const Loudness& l) { return l.power > louder && !l.in_turn; });
+  const auto loud = std::count_if(all.begin(), all.end(), [](const Loudness& l) { return l.power > louder; });
   return static_cast<double>(loud) > often * static_cast<double>(all.size());
 }
 

@@ -11,16 +11,14 @@ namespace selfcal::diagnosis {
 
 struct Loudness {
   double start_s = 0.0, end_s = 0.0;
-  double power = 0.0;    // mean square of the changes, over the median of the recording
-  bool in_turn = false;  // by what the turn leaves across its axis
+  double power = 0.0;  // mean square of the changes, over the median of the recording
 };
 
-// Of every interval of `interval_s` from the beginning. A turn changes the rates by itself: there those across its axis tell, less what goes with the
-// rate of the turn (misalignment) and a parabola of time (the Earth's rate, g-sensitivity). Of a turn with few intervals it is the mean of those on
-// both sides. Empty: too short to tell.
+// Of every interval of `interval_s` from the beginning. A turn changes the rates by itself, were it by the Earth's rate alone: there it is the
+// mean of the intervals on both sides. Empty: too short to tell.
 std::vector<Loudness> loudness_of(const ImuData& data, const std::vector<Segment>& segments, double interval_s);
 
-// Whether it changes in dwells by more than noise of one density would make it: white noise does not come to 12 times its median once in 10^9.
+// Whether it changes by more than noise of one density would make it: white noise does not come to 12 times its median once in 10^9.
 bool changes_its_loudness(const std::vector<Loudness>& all);
 
 }  // namespace selfcal::diagnosis

@@ -2,10 +2,8 @@
 // recordings that are made here.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "estimator/diagnosis/noise/loudness.hpp"
 #include "estimator/diagnosis/noise/velocity_jumps.hpp"
@@ -82,57 +80,6 @@ TEST(DisturbedBase, QuietBaseHasOneDensity) {
   ASSERT_TRUE(f.fitted);
   EXPECT_TRUE(f.input.noise.shaken.empty());
   EXPECT_FALSE(changes_its_loudness(loudness_of(f.data, f.segments, 1.0)));
-}
-
-// A turn about an axis that is a milliradian off the sensor's, which begins and ends gently, in the Earth's rate; white noise of the angle; in one of
-// its seconds the base rocks.
-TEST(Loudness, OfASecondWithinATurnIsToldByWhatIsAcrossItsAxis) {
-  constexpr double rate_hz = 100.0, angle_noise = 1e-6, turn_from_s = 60.0, turn_to_s = 66.0, rocks_s = 62.0;
-  constexpr double rate_of_turn = 0.4, off_axis = 1e-3, earth = 7e-5, rocking = 2e-5;
-  std::mt19937_64 engine(3);
-  std::normal_distribution<double> normal(0.0, angle_noise);
-  std::vector<std::array<double, 3>> theta, velocity;
-  std::vector<double> time;
-  std::array<double, 3> last{};
-  double turned = 0.0;
-  for (int i = 0; i < 12600; ++i) {
-    const double t = (i + 0.5) / rate_hz, within = t - turn_from_s;
-    const bool turns = within > 0.0 && t < turn_to_s;
-    const double ramp = turns ? std::min({1.0, within, turn_to_s - t}) : 0.0, rate = rate_of_turn * ramp;
-    turned += rate / rate_hz;
-    const bool rocks = t > rocks_s && t < rocks_s + 1.0;
-    const double shake = rocks ? rocking * std::sin(2.0 * std::numbers::pi * 2.0 * t) * 2.0 * std::numbers::pi : 0.0;
-    const std::array<double, 3> of = {off_axis * rate + earth * std::cos(turned) + shake,
-                                      -off_axis * rate + earth * std::sin(turned), rate};
-    std::array<double, 3> row{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double now = normal(engine);
-      row[k] = of[k] / rate_hz + now - last[k];
-      last[k] = now;
-    }
-    theta.push_back(row);
-    velocity.push_back({0.0, 0.0, 9.8 / rate_hz});
-    time.push_back((i + 1) / rate_hz);
-  }
-  ImuData data;
-  data.sample_rate_hz = rate_hz;
-  data.time_s = time;
-  data.delta_theta = theta;
-  data.delta_v = velocity;
-  const std::vector<Segment> segments = {{false, 0, 6000, 0.0, turn_from_s, 0.0, 0.0},
-                                         {true, 6000, 6600, turn_from_s, turn_to_s, 0.0, 0.0},
-                                         {false, 6600, 12600, turn_to_s, 126.0, 0.0, 0.0}};
-  double loudest = 0.0;
-  for (const Loudness& l : loudness_of(data, segments, 1.0)) {
-    if (l.in_turn && std::abs(l.start_s - rocks_s) > 0.5) {
-      loudest = std::max(loudest, l.power);
-    } else if (l.in_turn) {
-      // Changes of 2e-5 * 4 pi rad/s from quarter to quarter of half a period, where noise makes 1e-6 * 25 Hz: a hundredfold and more.
-      EXPECT_GT(l.power, 30.0);
-    }
-  }
-  // Three changes of two axes: chi-squared of about four, of which 12 medians are once in 10^9.
-  EXPECT_LT(loudest, 12.0);
 }
 
 void jump(Recording& r, double t, std::size_t axis, double size) {
