@@ -222,9 +222,11 @@ void Diagnoser::decide(const RecordingContext& context, const SearchResult& foun
     d_.remaining_by = by.after;
   }
   write_down(found, judgement, d_);
-  // A fault of the data ends the diagnosis only where it explains what is seen: a name that the remainder rejects is none.
+  // A fault of the data ends the diagnosis only where it explains what is seen: a name that the remainder rejects is none, and beside names that
+  // explain more it is one of several accounts of what they leave.
+  constexpr double most_of_it = 0.5;
   for (const NamedTerm& term : found.named) {
-    if (term.effect->data_fault != nullptr && judgement.after.accepted) {
+    if (term.effect->data_fault != nullptr && judgement.after.accepted && term.delta_chi2 > most_of_it * found.misfit) {
       d_.model.clear();
       d_.findings.clear();
       d_.faults.push_back(fault_of(term, data_));
