@@ -17,6 +17,7 @@ namespace selfcal::import {
 namespace {
 
 constexpr std::size_t lines_to_judge = 2000, most_lines = 40, fewest_values = 3, most_values = 200;
+constexpr std::size_t longest_line = 4096;  // nobody reads more
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 bool is_letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
@@ -242,6 +243,9 @@ Expected<Text> first_lines(const std::filesystem::path& file) {
     if (trimmed(line).empty()) {
       apart = true;
       continue;
+    }
+    if (line.size() > longest_line) {
+      return Text{};
     }
     text.lines.emplace_back(line);
     text.skeletons.push_back(skeleton_of(line).text);

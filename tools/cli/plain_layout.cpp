@@ -146,9 +146,10 @@ std::optional<Six> six_of(const import::ColumnSource& source, const Columns& col
   }
   const std::optional<Six> last = arranged(3, next), between = arranged(4, size_of(data->values, 4));
   const auto change = [&data](std::size_t column) {
-    const std::vector<double>& values = data->values[column];
-    const double middle = import::median(values);
-    return middle != 0.0 ? deviation_of(values, middle) / std::abs(middle) : HUGE_VAL;
+    std::vector<double> values = data->values[column];
+    std::erase_if(values, [](double v) { return !std::isfinite(v); });
+    const double middle = values.empty() ? 0.0 : import::median(values);
+    return middle != 0.0 ? deviation_of(std::move(values), middle) / std::abs(middle) : HUGE_VAL;
   };
   return last && between ? (change(3) < change(6) ? between : last) : last ? last : between;
 }

@@ -108,11 +108,11 @@ Expected<ReadOutColumns> read_out_columns(const import::ColumnSource& source, co
     found.axes.push_back({column, rates, rates ? unit_of_rate(named[column]) : unit_of_angle(named[column])});
   }
   if (!axes.empty()) {
-    found.notes = fmt::format(
-        "by {} name{} {} a table's {}; {} 0 leaves {} alone", axes.size() > 1 ? "their" : "its",
-        axes.size() > 1 ? "s" : "", which + (axes.size() > 1 ? " are" : " is"),
-        rates ? (axes.size() > 1 ? "rates, added up" : "rate, added up") : (axes.size() > 1 ? "angles" : "angle"),
-        option, axes.size() > 1 ? "them" : "it");
+    const std::string what = rates ? "rate, added up" : "angle";
+    found.notes =
+        axes.size() == 1
+            ? fmt::format("by its name {} is a table's {}; {} 0 leaves it alone", which, what, option)
+            : fmt::format("by their names {} are a table's, {} of each; {} 0 leaves them alone", which, what, option);
   }
   return found;
 }
