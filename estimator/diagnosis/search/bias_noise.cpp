@@ -163,6 +163,12 @@ double fit_kinds(const SearchGround& ground, const Stage& stage, const NoiseLike
   return processes[i].delta_chi2;
 }
 
+// That noise makes as much in one of the places, corrected for their number.
+double log_p_of_places(const Stage& stage) {
+  const Map map = locate(stage.given_forms(), stage.model.map(), stage.model.first_map_column(), stage.columns());
+  return log_corrected(log_normal_tail(map.largest_sigma), std::max(1, map.tests));
+}
+
 }  // namespace
 
 int bias_of(int axis) { return axis < 3 ? parameter::gyro_drift + axis : parameter::accel_bias + axis - 3; }
@@ -233,15 +239,22 @@ std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& 
   if (!stage.hypothesis().noise.axes || ground.context.reference()) {
     return std::nullopt;
   }
-  const Map map = locate(stage.given_forms(), stage.model.map(), stage.model.first_map_column(), stage.columns());
-  const bool remains = log_corrected(log_normal_tail(map.largest_sigma), std::max(1, map.tests)) < std::log(rate) ||
-                       structure_left(stage).log_p() < std::log(rate);
+  const double seen = log_p_of_places(stage);
   const std::vector<std::vector<int>> open = open_axes(stage.hypothesis());
-  if (!remains || open.empty()) {
+  if (std::min(seen, structure_left(stage).log_p()) >= std::log(rate) || open.empty()) {
     return std::nullopt;
   }
-  return with_process(ground, stage, best_in_filter(ground, stage),
-                      {std::log(rate), 1.5 * static_cast<double>(open.size()), 0.0});
+  const std::vector<BiasProcess> found = best_in_filter(ground, stage);
+  std::optional<Stage> explained =
+      with_process(ground, stage, found, {std::log(rate), 1.5 * static_cast<double>(open.size()), 0.0});
+  constexpr double barely = 1e-5, likely = 0.2;
+  if (!explained && seen > std::log(barely)) {
+    explained = with_process(ground, stage, found, {std::log(likely), 1.0, 0.0});
+    if (explained && std::min(log_p_of_places(*explained), structure_left(*explained).log_p()) < std::log(rate)) {
+      return std::nullopt;
+    }
+  }
+  return explained;
 }
 
 double gain_of_process(const SearchGround& ground, const Stage& stage, std::size_t i) {

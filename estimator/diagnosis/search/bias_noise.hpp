@@ -28,7 +28,8 @@ std::optional<Stage> with_process(const SearchGround& ground, const Stage& stage
 std::vector<BiasProcess> best_in_filter(const SearchGround& ground, const Stage& stage);
 
 // Beside white noise of the accelerometers' integral, which hides from the columns of whole dwells what the filter sees inside them: where
-// something remains in dwells, rotations or times (1 %), with the process that explains most of it, if by chance one would in 1 %. That
+// something remains in dwells, rotations or times (1 %), with the process that explains most of it, if by chance one would in 1 %; where it is one
+// place that barely remains (10^-5 and more), in 20 %, if it leaves nothing: a sensor's slow noise is not of one strength throughout. That
 // something is there is not asked again: only what.
 std::optional<Stage> explain_remainder(const SearchGround& ground, const Stage& stage);
 
