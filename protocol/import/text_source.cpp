@@ -462,27 +462,23 @@ std::string ColumnSource::title(std::size_t column) const {
 Expected<std::unique_ptr<ColumnSource>> open_text(const std::filesystem::path& file,
                                                   const std::optional<TextDialect>& dialect) {
   Expected<Form> form = judged_form(file);
-  if (!form) {
-    Expected<std::unique_ptr<ColumnSource>> repeated = open_repeated_lines(file);
-    if (repeated && *repeated && holds_a_triad(**repeated)) {
-      return repeated;
+  std::unique_ptr<TextSource> table;
+  if (form || dialect) {
+    table = std::make_unique<TextSource>(file, dialect ? *dialect : form->dialect,
+                                         form ? std::move(form->labels) : std::nullopt);
+    if (const auto head = table->read_head(); !head) {
+      return tl::unexpected(head.error());
+    }
+    const bool words_tell_rows_apart = !table->mixed_rows().empty() && numbered_rows(*table).empty();
+    if (form && !words_tell_rows_apart) {
+      return table;
     }
   }
-  if (!form && !dialect) {
-    return tl::unexpected(form.error());
+  Expected<std::unique_ptr<ColumnSource>> repeated = open_repeated_lines(file);
+  if (repeated && *repeated && holds_a_triad(**repeated)) {
+    return repeated;
   }
-  auto source = std::make_unique<TextSource>(file, dialect ? *dialect : form->dialect,
-                                             form ? std::move(form->labels) : std::nullopt);
-  if (const auto head = source->read_head(); !head) {
-    return tl::unexpected(head.error());
-  }
-  if (form && !source->mixed_rows().empty() && numbered_rows(*source).empty()) {  // words tell its rows apart
-    Expected<std::unique_ptr<ColumnSource>> repeated = open_repeated_lines(file);
-    if (repeated && *repeated && holds_a_triad(**repeated)) {
-      return repeated;
-    }
-  }
-  return source;
+  return table ? Expected<std::unique_ptr<ColumnSource>>(std::move(table)) : tl::unexpected(form.error());
 }
 
 }  // namespace selfcal::import
