@@ -49,7 +49,7 @@ std::optional<long double> seconds_of(std::string_view& text) {
   return value;
 }
 
-// hh:mm:ss, and AM or PM behind it.
+// hh:mm:ss, and AM or PM behind it; mm:ss.fff, as spreadsheets show it.
 std::optional<long double> clock_of(std::string_view& text) {
   const auto hours = digits(text, 1, 2);
   if (!hours || !take(text, ':')) {
@@ -57,7 +57,17 @@ std::optional<long double> clock_of(std::string_view& text) {
   }
   const auto minutes = digits(text, 2, 2);
   constexpr int hours_a_day = 24, noon = 12, minutes_an_hour = 60, seconds_a_minute = 60;
-  if (!minutes || *hours > hours_a_day || *minutes >= minutes_an_hour || !take(text, ':')) {
+  if (!minutes || *minutes >= minutes_an_hour) {
+    return std::nullopt;
+  }
+  if (text.starts_with('.') || text.starts_with(',')) {
+    const std::string behind = fmt::format("0.{}", text.substr(1));
+    std::string_view rest = behind;
+    const auto part = seconds_of(rest);
+    text.remove_prefix(part ? text.size() - rest.size() : 0);
+    return part ? std::optional(static_cast<long double>(*hours * seconds_a_minute + *minutes) + *part) : std::nullopt;
+  }
+  if (*hours > hours_a_day || !take(text, ':')) {
     return std::nullopt;
   }
   const auto seconds = seconds_of(text);

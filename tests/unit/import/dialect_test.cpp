@@ -112,6 +112,10 @@ TEST(Dates, SecondsSince1970AndOffsets) {
   EXPECT_EQ(date_of("2024-02-29T00:00:01.5Z"), 1709164801.5L);
   EXPECT_EQ(date_of("2024-02-29 02:00:00+02:00"), 1709164800.0L);
   EXPECT_EQ(date_of("01:00:00"), 3600.0L);
+  EXPECT_EQ(date_of("01:02.5"), 62.5L);      // minutes and seconds, as spreadsheets show them
+  EXPECT_EQ(date_of("75:00,25"), 4500.25L);  // elapsed
+  EXPECT_EQ(date_of("01:75.5"), std::nullopt);
+  EXPECT_EQ(date_of("01:02"), std::nullopt);
   // date -u -d '2023-10-04 10:12:33' +%s
   for (const char* same : {"04-Oct-2023 10:12:33.125", "10/4/2023 10:12:33.125 AM", "4.10.2023 10:12:33,125",
                            "2023-10-04 10:12:33:125", "2023/10/04 10:12:33.125"}) {
