@@ -84,7 +84,7 @@ std::string take_unit_in(std::string& label) {
   if (word.ends_with("'s")) {
     word.resize(word.size() - 2);
   }
-  const std::string unit = known_unit(word);
+  std::string unit = known_unit(word);
   if (!unit.empty()) {
     label.erase(at, end - at);
   }
