@@ -94,6 +94,7 @@ Expected<ReadOutColumns> read_out_columns(const import::ColumnSource& source, co
     axes = columns_called(source, named, layout, TableReadOut::rate);
   }
   std::vector<std::string> titles;
+  titles.reserve(axes.size());
   for (const std::size_t column : axes) {
     titles.push_back(source.title(column));
   }
