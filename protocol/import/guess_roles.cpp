@@ -21,10 +21,6 @@
 namespace selfcal::import {
 namespace {
 
-bool all_finite(const std::vector<double>& values) {
-  return !values.empty() && std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
-
 class Assigner {
  public:
   Assigner(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,
@@ -440,6 +436,10 @@ class Assigner {
 };
 
 }  // namespace
+
+bool all_finite(const std::vector<double>& values) {
+  return !values.empty() && std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
 
 TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3>& columns) {
   TriadColumns triad;

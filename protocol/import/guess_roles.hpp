@@ -30,6 +30,9 @@ struct Roles {
   std::vector<std::size_t> temperature;
 };
 
+// Whether a column holds a number in every row, and a row.
+bool all_finite(const std::vector<double>& values);
+
 TriadColumns triad_columns(const Values& values, const std::array<std::size_t, 3>& columns);
 
 // BY_FORMAT: the file's format says that the first six columns are gyros and accelerometers. Adds to REMARKS what was assumed and doubted.

@@ -13,10 +13,6 @@
 namespace selfcal::import {
 namespace {
 
-bool all_finite(const std::vector<double>& values) {
-  return !values.empty() && std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
-
 class Finder {
  public:
   Finder(const ColumnSource& source, const std::vector<NamedColumn>& named, const Values& values,

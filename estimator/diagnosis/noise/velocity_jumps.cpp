@@ -187,7 +187,6 @@ class Opening {
   // Whether those in turns are as many as those elsewhere make likely: an effect stands in turns alone. Somebody who gets in knocks several
   // times within seconds: what follows within `one_s` is one disturbance, where it began.
   bool likely_in_turns(const std::vector<VelocityJump>& found) const {
-    constexpr std::size_t enough = 1;
     constexpr double chance = 0.05, one_s = 15.0;
     std::vector<VelocityJump> all = opened_;
     all.insert(all.end(), found.begin(), found.end());
@@ -200,7 +199,7 @@ class Opening {
       }
     }
     const double elsewhere_s = segments_.back().end_s - segments_.front().start_s - turns_s_;
-    return elsewhere >= enough && probability_of(there, turns_s_, elsewhere, elsewhere_s) > chance;
+    return elsewhere > 0 && probability_of(there, turns_s_, elsewhere, elsewhere_s) > chance;
   }
 
   PassInput& input_;
