@@ -126,13 +126,13 @@ std::string corrections_text(const Diagnosis& d, Detail detail) {
   const std::size_t shown = detail == Detail::full ? order.size() : std::min(most_values_in_brief, order.size());
   const std::size_t more = order.size() - shown;
   order.resize(shown);
-  std::string text = fmt::format("\ncorrected values of the 24:\n  {:<22}{:>11}{:>11}{:>9}  {:<7}{}\n", "", "without",
+  std::string text = fmt::format("\ncorrected values of the 24:\n  {:<22}{:>10} {:>10} {:>9}  {:<7}{}\n", "", "without",
                                  "corrected", "sigma", "unit", "moved by");
   for (const int k : order) {
     const SensorParameter& p = sensor_parameters[static_cast<std::size_t>(k)];
     const double sigma = d.sigma(k) / p.si_per_unit;
     const QuantityText after = quantity_text(d.value(k) / p.si_per_unit, sigma);
-    text += fmt::format("  {:<22}{:>11}{:>11}{:>9}  {:<7}{} sigma\n", p.name,
+    text += fmt::format("  {:<22}{:>10} {:>10} {:>9}  {:<7}{} sigma\n", p.name,
                         quantity_text(d.calibration.value(k) / p.si_per_unit, sigma).value, after.value, after.sigma,
                         p.unit, number_text(moved(k)));
   }

@@ -67,6 +67,15 @@ TEST(QuantumBeat, LinesOfCountsAreBeats) {
 
 TEST(QuantumBeat, WithoutAQuantumThereIsNone) { EXPECT_FALSE(beat_of_quantum({1.0, 0.0, 0.0, 100.0}, 5.0, 1e-9, 1.0)); }
 
+// However weak a line, harmonics without end are not looked at: beyond one for each band none is in a new one. Two are of a rate of half
+// a count a sample.
+TEST(QuantumBeat, TheWeakestLineIsAnsweredToo) {
+  constexpr double nothing = 1e-300, width_hz = 0.03;
+  EXPECT_TRUE(beat_of_quantum({0.5 * quantum * sample_rate_hz, 0.0, quantum, sample_rate_hz}, 50.0, nothing, width_hz));
+  EXPECT_FALSE(
+      beat_of_quantum({0.5 * quantum * sample_rate_hz, 0.0, quantum, sample_rate_hz}, 20.0, nothing, width_hz));
+}
+
 // A coarse quantum beside little noise on a turning gimbal: lines of the dwells are its own, but for one that is put in.
 NoiseCheck check_of(double line_mps2) {
   sim::SimConfig config;

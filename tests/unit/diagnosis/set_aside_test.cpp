@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -248,6 +249,16 @@ TEST(SetAsideWhole, NotTheGyrosOnAMooredBase) {
   Recording stuck = recording;
   stick(stuck);
   EXPECT_NE(SetAside(test::view_of(stuck)).refused().find("the base moves"), std::string::npos);
+}
+
+// A device that gives what it gave is no sensor; nothing is estimated of it, in whatever position it is said to be.
+TEST(SetAsideWhole, NoReadingsAreRefused) {
+  Recording recording = clean();
+  std::fill(recording.delta_theta_rad.begin(), recording.delta_theta_rad.end(), recording.delta_theta_rad.front());
+  std::fill(recording.delta_v_mps.begin(), recording.delta_v_mps.end(), recording.delta_v_mps.front());
+  const DiagnosisOutcome outcome = diagnose(test::view_of(recording), {}, {});
+  EXPECT_FALSE(outcome.diagnosis.has_value());
+  EXPECT_NE(outcome.failure.find("one value throughout"), std::string::npos) << outcome.failure;
 }
 
 // A triad in other axes is wrong all along, whatever else is.
