@@ -162,7 +162,7 @@ Expected<std::optional<BeyondAnswer>> look_beyond(const AmendmentRequest& reques
   if (!search || (taken.size() == 1 && !first.unexplained)) {
     return std::nullopt;
   }
-  const auto joint = fit_together(search->rest, search->found, stop);
+  const auto joint = fit_together(search->rest, search->found, first, stop);
   if (!joint) {
     return fail(ErrorKind::bad_input, fmt::format("run {}: {}", request.amends.run, joint.error()));
   }

@@ -20,7 +20,8 @@ Cause cause_of(const ImuData& data, const diagnosis::DiagnosisOptions& options,
   of_laws.stop = options.stop;
   of_laws.coloured = diagnosis.before.coloured;
   auto search = search_beyond({&recording, 1}, options, of_laws, diagnosis, Search::where_due, step);
-  if (search && *search && diagnosis.unexplained && fit_together((*search)->rest, (*search)->found, options.stop)) {
+  if (search && *search && diagnosis.unexplained &&
+      fit_together((*search)->rest, (*search)->found, diagnosis, options.stop)) {
     cause.beyond = std::move((*search)->found);
   }
   return cause;

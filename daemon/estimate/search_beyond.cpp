@@ -114,7 +114,9 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
   }
   discovery::LawSearch search(rest->recordings(), of_laws, progress);
   if (unit.size() == 1) {
-    auto both = discovery::names_beside_laws(unit.front().data, first, rest->recordings().front(), search.fitted(),
+    Diagnosis fitted = first;
+    discovery::fit_names(*rest, search.fitted(), fitted, of_laws.stop);
+    auto both = discovery::names_beside_laws(unit.front().data, fitted, rest->recordings().front(), search.fitted(),
                                              of_catalogue, of_laws, progress);
     if (both && (first.unexplained || (both->laws.processes.empty() && explains(&both->laws)))) {
       // Beside the names that stand now a law may be one more.
@@ -125,7 +127,7 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
       first = std::move(both->diagnosis);
       return BeyondSearch{std::move(both->rest), std::move(both->laws)};
     }
-    if (auto alone = discovery::laws_in_place_of_names(unit.front().data, first, rest->recordings().front(),
+    if (auto alone = discovery::laws_in_place_of_names(unit.front().data, fitted, rest->recordings().front(),
                                                        search.fitted(), of_laws, progress)) {
       replace_process(alone->diagnosis, alone->laws);
       if (alone->diagnosis.unexplained) {
@@ -133,7 +135,8 @@ tl::expected<std::optional<BeyondSearch>, std::string> search_beyond(
         return BeyondSearch{std::move(alone->rest), std::move(alone->laws)};
       }
     }
-    if (auto anew = discovery::named_anew(unit.front().data, first, search.fitted(), of_catalogue, of_laws, progress)) {
+    if (auto anew =
+            discovery::named_anew(unit.front().data, fitted, search.fitted(), of_catalogue, of_laws, progress)) {
       first = std::move(anew->diagnosis);
       return BeyondSearch{std::move(anew->rest), std::move(anew->laws)};
     }

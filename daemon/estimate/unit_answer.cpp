@@ -23,6 +23,7 @@ std::vector<discovery::DiagnosedRecording> recordings_of(std::span<const Diagnos
 
 tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const discovery::UnexplainedRest& rest,
                                                                            discovery::Discovery& found,
+                                                                           diagnosis::Diagnosis& first,
                                                                            const std::stop_token& stop) {
   const bool one = rest.recordings().size() == 1;
   if (one && (rest.taken_out().empty() || found.fit.terms.empty())) {
@@ -33,6 +34,9 @@ tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const
     return tl::unexpected(joint.error());
   }
   discovery::adopt(*joint, found);
+  if (found.processes.empty()) {
+    discovery::adopt(*joint, first);
+  }
   return std::move(*joint);
 }
 

@@ -39,9 +39,11 @@ struct Together {
 };
 
 // Named effects and the laws of `found` fitted together, with the 24 that the recordings share; `found` has its coefficients from there
-// afterwards. None for one recording that has not both. The failure is that of a calibration, or "stopped".
+// afterwards, and without a process beside them the names in `first` have theirs, the diagnosis of the first recording. None for one recording
+// that has not both. The failure is that of a calibration, or "stopped".
 tl::expected<std::optional<discovery::JointFit>, std::string> fit_together(const discovery::UnexplainedRest& rest,
                                                                            discovery::Discovery& found,
+                                                                           diagnosis::Diagnosis& first,
                                                                            const std::stop_token& stop = {});
 
 Together put_together(std::span<const DiagnosedFile> recordings, const discovery::UnexplainedRest& rest,

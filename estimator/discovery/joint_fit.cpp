@@ -4,9 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/diagnosis/search/judgement.hpp"
 #include "estimator/diagnosis/still_calibration.hpp"
 #include "estimator/discovery/common_coefficients.hpp"
 #include "estimator/discovery/law_motion.hpp"
+#include "estimator/statistics/distributions.hpp"
 
 namespace selfcal::discovery {
 namespace {
@@ -237,7 +239,8 @@ class Fitter {
         EffectTerm& term = effect.on[r];
         const Eigen::Index at = behind + places_[e][r], n = term.size.size();
         term.size = all.x.segment(at, n);
-        EffectFit one{r, term.size, all.covariance.diagonal().segment(at, n).cwiseMax(0.0).cwiseSqrt(), NAN, 0.0};
+        const Eigen::MatrixXd covariance = all.covariance.block(at, at, n, n);
+        EffectFit one{r, term.size, covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), covariance, NAN, 0.0};
         if (term.constant_free) {
           one.constant_sigma = term.constant * std::sqrt(std::max(0.0, all.covariance(at + n, at + n)));
         } else if (!std::isnan(known)) {
@@ -365,6 +368,29 @@ void adopt(const JointFit& joint, Discovery& found) {
   for (std::size_t r = 0; r < found.average.parameters.size(); ++r) {
     found.average.parameters[r] += joint.shared.parameters[r] - before.parameters[r];
     found.average.covariance[r] += joint.shared.covariance[r] - before.covariance[r];
+  }
+}
+
+void adopt(const JointFit& joint, diagnosis::Diagnosis& d) {
+  for (const FittedEffect& fitted : joint.effects) {
+    if (fitted.each.empty() || fitted.each.front().recording != 0) {
+      continue;
+    }
+    const EffectFit& fit = fitted.each.front();
+    for (diagnosis::ModelEffect& m : d.model) {
+      if (m.effect == fitted.effect) {
+        m.size = fit.size;
+        m.covariance = fit.covariance;
+        m.constant = fit.constant;
+      }
+    }
+    for (diagnosis::Finding& f : d.findings) {
+      if (f.source == fitted.effect) {
+        f.parameters = diagnosis::finding_parameters(*f.source, fit.size, fit.sigma, fit.constant, fit.constant_sigma);
+        f.log_p = fitted.log_p_none;
+        f.significance = sigma_from_log_p(f.log_p);
+      }
+    }
   }
 }
 

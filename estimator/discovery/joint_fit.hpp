@@ -34,6 +34,7 @@ struct UnitEffect {
 struct EffectFit {
   std::size_t recording = 0;
   Eigen::VectorXd size, sigma;  // [coefficients] in typical sizes
+  Eigen::MatrixXd covariance;   // [coefficients] of size
   double constant = NAN, constant_sigma = 0.0;
 };
 
@@ -90,5 +91,9 @@ tl::expected<JointFit, std::string> fit_jointly(std::span<const JointRecording> 
 // Coefficient and sigma of laws as the joint fit has them, in the place of those of a fit that took the effects and the 24 of
 // each recording by themselves. What sigma held beyond the linear fit it still holds. The 24 over the class follow.
 void adopt(const JointFit& joint, Discovery& found);
+
+// The names of the first recording, in `diagnosis`, likewise: their sizes were fitted while something stood in the place of the laws. Their
+// significance is then given the laws, and not corrected for what was tried.
+void adopt(const JointFit& joint, diagnosis::Diagnosis& diagnosis);
 
 }  // namespace selfcal::discovery

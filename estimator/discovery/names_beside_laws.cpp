@@ -165,14 +165,23 @@ class Together {
     if (!rest) {
       return std::nullopt;
     }
-    LawSearch search(rest->recordings(), of_laws_, progress_);
+    std::optional<LawSearch> search(std::in_place, rest->recordings(), of_laws_, progress_);
+    if (took_out_too_little(*rest, search->fitted(), named)) {
+      search.reset();
+      rest = UnexplainedRest::of({&recording, 1}, of_laws_.stop);
+      if (!rest) {
+        return std::nullopt;
+      }
+      search.emplace(rest->recordings(), of_laws_, progress_);
+    }
+    fit_names(*rest, search->fitted(), named, of_laws_.stop);
     const auto stands = [&](const Discovery& found) {
       return found.fit.terms.size() <= most_laws && cost_of(found, named.model) < most_cost;
     };
-    if (!stands(search.fitted())) {
+    if (!stands(search->fitted())) {
       return std::nullopt;
     }
-    Discovery laws = search.told();
+    Discovery laws = search->told();
     if ((laws.laws.empty() && laws.described.empty()) || !stands(laws)) {
       return std::nullopt;
     }
@@ -193,6 +202,35 @@ class Together {
   }
 
  private:
+  // Laws that are what a name makes, with a constant of its own, on an axis where a law stood in its place: then the name is fitted anew beside
+  // the others, in `named`, and the search is to be made again. The derivative by the constant, at a size of nothing, had left them.
+  bool took_out_too_little(const UnexplainedRest& rest, const Discovery& fitted, Diagnosis& named) const {
+    const FittedLaws all = FittedLaws::fitted(fitted.fit);
+    if (all.terms.empty() || !fitted.processes.empty() || rest.effects().empty()) {
+      return false;
+    }
+    constexpr double all_of_it = 0.98;
+    std::vector<bool> own(all.terms.size(), false);
+    for (std::size_t k = 0; k < own.size() && !of_laws_.stop.stop_requested(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      const CatalogueReach reach(rest.recordings().front(), {all.terms[k]}, all.coefficient.segment(row, 1),
+                                 of_laws_.stop);
+      own[k] = std::any_of(rest.effects().begin(), rest.effects().end(),
+                           [&](const UnitEffect& effect) { return reach.largest_share(*effect.effect) >= all_of_it; });
+    }
+    if (std::none_of(own.begin(), own.end(), [](bool is) { return is; })) {
+      return false;
+    }
+    const FittedLaws others = all.where([&](std::size_t k) { return !own[k]; });
+    const auto joint = rest.beside(others.terms, others.coefficient, of_laws_.stop);
+    if (!joint) {
+      return false;
+    }
+    adopt(*joint, named);
+    named.remainder.reset();  // it was of a name without this axis
+    return true;
+  }
+
   // Whether the names that stand and these are rejected, which are all that is left of what is.
   bool kept_of_rejected(Diagnosis& d, const std::vector<const diagnosis::Effect*>& beside) const {
     const auto wanted = [&](const diagnosis::Effect* effect) {
@@ -217,6 +255,16 @@ class Together {
 };
 
 }  // namespace
+
+void fit_names(const UnexplainedRest& rest, const Discovery& fitted, Diagnosis& diagnosis,
+               const std::stop_token& stop) {
+  if (rest.effects().empty() || fitted.fit.terms.empty() || !fitted.processes.empty()) {
+    return;
+  }
+  if (const auto joint = rest.beside(fitted.fit.terms, fitted.fit.coefficient, stop)) {
+    adopt(*joint, diagnosis);
+  }
+}
 
 std::optional<NamesBesideLaws> names_beside_laws(const ImuData& data, const Diagnosis& d, const UnitRecording& searched,
                                                  const Discovery& alone,

@@ -15,6 +15,11 @@ struct NamesBesideLaws {
   Discovery laws;                  // of that
 };
 
+// The names in `diagnosis`, taken out of `rest`, fitted anew beside the laws that were fitted to it. Nothing where there are no laws, or
+// processes beside them. What names and laws say is counted with these sizes: a name has none on an axis where a law stood in its place.
+void fit_names(const UnexplainedRest& rest, const Discovery& fitted, diagnosis::Diagnosis& diagnosis,
+               const std::stop_token& stop = {});
+
 // `alone`: what the search fitted on `searched`, the recording as it was calibrated, with nothing taken out. None where one law was
 // enough without a process, where no name stands, or where name and laws together say more than the laws alone. Names that the catalogue
 // rejects for what they leave are asked after those that it gives; then the two effects that with one of the laws explain the recording best,

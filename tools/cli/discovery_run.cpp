@@ -172,7 +172,7 @@ Expected<BeyondCatalogue> look_beyond(const DiscoveryArguments& arguments, std::
     return result;
   }
   result.found = std::move(search->found);
-  auto joint = fit_together(search->rest, *result.found);
+  auto joint = fit_together(search->rest, *result.found, first);
   if (!joint) {
     return fail(ErrorKind::bad_input, joint.error());
   }

@@ -55,6 +55,22 @@ Finding describe(const Suspect& suspect) {
   return f;
 }
 
+std::vector<FindingParameter> finding_parameters(const Effect& effect, const Eigen::VectorXd& size,
+                                                 const Eigen::VectorXd& sigma, double constant, double constant_sigma) {
+  std::vector<FindingParameter> parameters;
+  for (Eigen::Index k = 0; k < size.size(); ++k) {
+    const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
+    const double value = size(k) * p.typical;
+    parameters.push_back({p.name, p.unit, value, sigma(k) * p.typical, effect.physics_prefix + p.name, value});
+  }
+  if (!std::isnan(constant)) {
+    parameters.push_back({std::string(effect.constant.name), std::string(effect.constant.unit), constant,
+                          constant_sigma, std::string(effect.constant.physics_key),
+                          constant * effect.constant.physics_per_unit});
+  }
+  return parameters;
+}
+
 Finding describe(const NamedTerm& term, double rows) {
   const Effect& effect = *term.effect;
   Finding f;
@@ -63,17 +79,8 @@ Finding describe(const NamedTerm& term, double rows) {
   f.equation = effect.equation;
   f.excited = effect.excited;
   f.experiment = effect.experiment;
-  for (Eigen::Index k = 0; k < term.amplitude.size(); ++k) {
-    const EffectParameter& p = effect.parameters[static_cast<std::size_t>(k)];
-    const double value = term.amplitude(k) * p.typical;
-    f.parameters.push_back(
-        {p.name, p.unit, value, std::sqrt(term.covariance(k, k)) * p.typical, effect.physics_prefix + p.name, value});
-  }
-  if (!std::isnan(term.constant)) {
-    f.parameters.push_back({std::string(effect.constant.name), std::string(effect.constant.unit), term.constant,
-                            term.constant_sigma, std::string(effect.constant.physics_key),
-                            term.constant * effect.constant.physics_per_unit});
-  }
+  f.parameters = finding_parameters(effect, term.amplitude, term.covariance.diagonal().cwiseSqrt(), term.constant,
+                                    term.constant_sigma);
   f.equivalent = ids_of(term.equivalent);
   f.rivals = term.equivalent;
   for (const auto& [rival, p] : term.probability) {

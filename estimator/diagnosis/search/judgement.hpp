@@ -9,6 +9,10 @@
 
 namespace selfcal::diagnosis {
 
+// Sizes and their sigma in typical ones; the constant NaN: none.
+std::vector<FindingParameter> finding_parameters(const Effect& effect, const Eigen::VectorXd& size,
+                                                 const Eigen::VectorXd& sigma, double constant, double constant_sigma);
+
 Finding describe(const Suspect& suspect);
 Finding describe(const NamedTerm& term, double rows);
 Finding describe(const BiasProcess& process, double rows);

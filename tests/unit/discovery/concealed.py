@@ -32,10 +32,10 @@ def effect(name, **keys):
     return f'[[effect]]\nid = "{name}"\n' + "".join(f"{k} = {json.dumps(v)}\n" for k, v in keys.items())
 
 
-def answer(name, text, *arguments):
+def answer(name, text, *arguments, seed=23):
     """The document of a diagnosis of a recording in which the law is concealed."""
     (folder / f"{name}.toml").write_text(text)
-    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", "23", "-o", f"{name}.h5", "--truth", f"{name}.json")
+    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", str(seed), "-o", f"{name}.h5", "--truth", f"{name}.json")
     return json.loads(run("diagnose", f"{name}.h5", "--json", *arguments, statuses=(0, 1)))
 
 
@@ -53,4 +53,5 @@ def end():
 
 shutil.rmtree(folder, ignore_errors=True)
 folder.mkdir(parents=True)
-(folder / "sim.toml").write_text("sample_rate_hz = 50\n[attitude]\nroll_deg = 4\npitch_deg = 6\n[temperature]\nrecorded = false\n")
+STANDARD = "sample_rate_hz = 50\n[attitude]\nroll_deg = 4\npitch_deg = 6\n[temperature]\nrecorded = false\n"
+(folder / "sim.toml").write_text(STANDARD)
