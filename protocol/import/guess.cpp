@@ -335,17 +335,27 @@ class Guesser {
       }
       return;
     }
-    // Counts, or another unit than the name's.
+    // Counts, or another unit than the name's. Where the turns are near to one, its size is known, and what they differ by are the gyros' own
+    // scale factors.
     const auto other = gyro_unit(*orientation.rad_per_sample, *interval_s_, {{}, said.increments});
+    constexpr double near = 0.03;
+    if (claimed && other && other->rivals.empty() && other->off < near) {
+      gyro.unit = other->unit;
+      gyro.increments = other->increments;
+      return doubt("gyro.unit", fmt::format("{} by the name contradicts the turns, which show {} within {:.1f} %",
+                                            said.unit, other->unit, 100.0 * std::expm1(other->off)));
+    }
     gyro.increments = said.increments;
     gyro.unit = said.increments ? "rad" : "rad/s";
     const double scale = *orientation.rad_per_sample / (said.increments ? 1.0 : *interval_s_);
     gyro.scale = {scale, scale, scale};
     doubt("gyro.unit",
-          claimed ? fmt::format("{} by the name contradicts the turns{}", said.unit,
-                                other ? fmt::format(", which show {}", other->unit) : "")
-                  : fmt::format("counts: the turns show {:.4g} {} a count; the data sheet's value belongs here", scale,
-                                gyro.unit));
+          claimed
+              ? fmt::format("{} by the name contradicts the turns; by these a number is {:.4g} {}, and scale factors "
+                            "that all gyros share do not show",
+                            said.unit, scale, gyro.unit)
+              : fmt::format("counts: the turns show {:.4g} {} a count; the data sheet's value belongs here", scale,
+                            gyro.unit));
   }
 
   void guess_accelerometer_unit() {

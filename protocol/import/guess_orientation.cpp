@@ -218,6 +218,16 @@ class Finder {
     return turned * 50 > motion_.blocks.size();  // a knock is no turn
   }
 
+  // What order and signs of the gyros say of the accelerometers instead; nothing where both stand as they are.
+  std::string other_triad() const {
+    if (out_.gyro.isIdentity() || !out_.accelerometer.isIdentity()) {
+      return {};
+    }
+    const Matrix3 inverse = out_.gyro.transpose();
+    return fmt::format(", or with the gyros as they stand and these as {}",
+                       axes_words(inverse.trace() < 0.0 ? Matrix3(-inverse) : inverse));
+  }
+
   // Turns do not show whether all three accelerometers are reversed; the Earth's rate does.
   void settle_sign(bool by_gimbal) {
     const std::string axes = axes_words(out_.accelerometer);
@@ -239,8 +249,8 @@ class Finder {
       return doubt(
           "accelerometer.axes",
           fmt::format(
-              "{}: an axis that points up is taken to read +g; were all three reversed, turns would show the same",
-              axes));
+              "{}: an axis that points up is taken to read +g; were all three reversed, turns would show the same{}",
+              axes, by_gimbal ? std::string() : other_triad()));
     }
     const double latitude = std::asin(std::clamp(earth->sine_of_latitude, -1.0, 1.0)) / units::degree;
     if (!in_.latitude_deg) {

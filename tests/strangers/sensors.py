@@ -47,7 +47,7 @@ def moved(rate, stops, rng, tremor=0.0):
             m = round(move * rate)
             s = (numpy.arange(m) + 0.5) / m
             attitude.append(numpy.array([c @ turn(axis, angle * p) for p in 10 * s**3 - 15 * s**4 + 6 * s**5]))
-            omega.append(axis * (angle / move * (30 * s**2 - 60 * s**3 + 30 * s**4))[:, None])
+            omega.append(axis * (angle / m * rate * (30 * s**2 - 60 * s**3 + 30 * s**4))[:, None])   # whole samples: as far as the attitudes
             moving.append(numpy.ones(m))
     c_bn = numpy.concatenate(attitude).transpose(0, 2, 1)
     omega, moving = numpy.concatenate(omega), numpy.concatenate(moving)

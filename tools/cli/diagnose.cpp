@@ -306,7 +306,8 @@ Expected<int> diagnose_by_poses(const DiagnoseArguments& arguments, const Opened
   return poses_mismatch(d) ? 1 : 0;
 }
 
-// Accelerometers of a cheap sensor are off by some per cent of g: of a log that stands no fault, and no reason to say nothing of it.
+// Accelerometers of a cheap sensor are off by some per cent of g, and a logger faster than the sensor writes each sample twice: of a log
+// that stands no fault, and no reason to say nothing of it.
 bool off_at_rest(const diagnosis::Diagnosis& diagnosis, const Recording& recording) {
   Vector3 sum = Vector3::Zero();
   for (const std::array<double, 3>& v : recording.delta_v_mps) {
@@ -315,8 +316,9 @@ bool off_at_rest(const diagnosis::Diagnosis& diagnosis, const Recording& recordi
   const double force = sum.norm() * recording.sample_rate_hz / static_cast<double>(recording.delta_v_mps.size());
   constexpr double most = 0.1;
   return !has_read_outs(recording) && std::abs(force / units::standard_gravity - 1.0) < most &&
-         std::all_of(diagnosis.faults.begin(), diagnosis.faults.end(),
-                     [](const diagnosis::DataFault& fault) { return fault.id == "wrong_scale"; });
+         std::all_of(diagnosis.faults.begin(), diagnosis.faults.end(), [](const diagnosis::DataFault& fault) {
+           return fault.id == "wrong_scale" || fault.id == "lost_samples";
+         });
 }
 
 Expected<int> diagnose(const DiagnoseArguments& arguments) {

@@ -141,6 +141,8 @@ Json read_outs_json(const diagnosis::ReadOuts& r) {
   }
   Json j = {{"axes", axes},
             {"disagreeing", r.disagreeing},
+            {"clipped_turns", r.clipped_turns},
+            {"clipped_rates", r.clipped_rates},
             {"gyro_bias", array(r.gyro_bias)},
             {"gyro_bias_sigma", array(r.gyro_bias_sigma)}};
   if (r.clock) {
@@ -307,6 +309,7 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
             {"turns_whole", d.turns_whole},
             {"before", d.direction_before / units::degree},
             {"after", d.direction_after / units::degree},
+            {"by_noise", d.direction_by_noise / units::degree},
             {"held_out_before", d.direction_before_held_out / units::degree},
             {"held_out_after", d.direction_after_held_out / units::degree}}},
           {"invisible", d.invisible}};

@@ -233,8 +233,9 @@ Expected<PoseLayout> pose_layout(const import::ColumnSource& source, const std::
     return layout_by_names(named, std::move(gyro), std::move(accel), columns, file).map(saying);
   }
   const auto no_triad =
-      fail(ErrorKind::bad_input,
-           fmt::format("{}: some columns are called gyros or accelerometers, but no x, y and z of either", file));
+      fail(ErrorKind::bad_input, fmt::format("{}: some columns are called gyros or accelerometers, but no x, y and z "
+                                             "of either; --only gyros or --only accelerometers takes what there is",
+                                             file));
   const bool some_named = !all_nameless(source) && gyro.several + accel.several > 0;
   if (some_named && sensors != Sensors::gyros) {
     return no_triad;

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "daemon/estimate/quantity_text.hpp"
+#include "tools/cli/folded_text.hpp"
 #include "tools/cli/head_output.hpp"
 #include "tools/cli/poses_attitude_output.hpp"
 #include "tools/cli/poses_output.hpp"
@@ -20,54 +21,6 @@ using diagnosis::PoseDiagnosis;
 using diagnosis::PoseEffect;
 using diagnosis::PoseParameter;
 using diagnosis::Sensors;
-
-constexpr std::size_t columns = 80;
-
-// Parts with a separator behind each but the last, broken at 80 columns; all lines but the first are indented.
-std::string wrapped(const std::string& start, const std::vector<std::string>& parts, const std::string& separator) {
-  constexpr std::size_t indent = 2;
-  std::string text = start;
-  std::size_t used = start.size();
-  for (std::size_t k = 0; k < parts.size(); ++k) {
-    const std::string part = parts[k] + (k + 1 < parts.size() ? separator : "");
-    if (used > start.size() && used + 1 + part.size() > columns) {
-      text += fmt::format("\n{:{}}", "", indent - 1);
-      used = indent - 1;
-    }
-    text += " " + part;
-    used += 1 + part.size();
-  }
-  return text + "\n";
-}
-
-std::vector<std::string> words_of(const std::string& sentence) {
-  std::vector<std::string> words;
-  std::size_t from = 0;
-  while (from < sentence.size()) {
-    const std::size_t to = std::min(sentence.find(' ', from), sentence.size());
-    words.push_back(sentence.substr(from, to - from));
-    from = to + 1;
-  }
-  return words;
-}
-
-// A sentence, broken at blanks.
-std::string lines_of(const std::string& start, const std::string& sentence) {
-  return wrapped(start, words_of(sentence), "");
-}
-
-// A text line by line, each broken so behind its first word.
-std::string folded(const std::string& text) {
-  std::string all;
-  for (std::size_t from = 0; from < text.size();) {
-    const std::size_t to = text.find('\n', from);
-    const std::string line = text.substr(from, to - from);
-    const std::size_t end = std::min(line.find(' ', line.find_first_not_of(' ')), line.size());
-    all += lines_of(line.substr(0, end), end < line.size() ? line.substr(end + 1) : "");
-    from = to + 1;
-  }
-  return all;
-}
 
 std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
@@ -105,6 +58,13 @@ std::string confounded_clause(const PoseDiagnosis& d, const PoseEffect& e) {
     }
   }
   return others.empty() ? std::string() : fmt::format("; in this order of the poses {}", fmt::join(others, ", "));
+}
+
+// Behind a gyro's own unit; a drift is told per second, as the log's times are.
+std::string per_what(const diagnosis::Effect& effect) {
+  const std::string& unit = effect.parameters.front().unit;
+  const std::string own = "deg/h", per = unit.starts_with(own) ? unit.substr(own.size()) : std::string();
+  return per == "/h" ? "/s" : per;
 }
 
 // One line an effect: its id, how sure, and its largest coefficient.
@@ -150,7 +110,7 @@ std::string what_decides(const PoseDiagnosis& d) {
 std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text;
   for (const PoseEffect& e : d.gyro_named) {
-    text += effect_line(d, e, shown.gyro, shown.gyro_name);
+    text += effect_line(d, e, shown.gyro, shown.gyro_name + per_what(*e.effect));
   }
   for (const PoseEffect& e : d.accel_named) {
     text += effect_line(d, e, e.effect->parameters.front().si_per_unit, e.effect->parameters.front().unit);
@@ -193,11 +153,15 @@ std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
     text += lines_of("misfit:", d.gyros_contradict);
   }
   if (d.accel_reversed) {
-    text += lines_of("reversed:",
-                     "all accelerometers, as the Earth's rate shows: they read acceleration; or the latitude has the "
-                     "other sign");
+    text += lines_of(
+        "reversed:",
+        "all accelerometers, as the Earth's rate shows: they read acceleration, or the axes of both triads are "
+        "a mirror image, as where one of an order or sign was made to fit; or the latitude has the other sign");
   }
-  if (text.empty() && d.by_poses) {
+  const bool by_table =
+      d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
+                                 [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
+  if (text.empty() && d.by_poses && !by_table) {
     text = d.accel_tested || d.sensors == Sensors::accelerometers
                ? "nothing named beyond bias, scale factor and misalignment\n"
                : "nothing named; nonlinearity of the accelerometers is not tested by these poses\n";
@@ -264,10 +228,10 @@ std::string text_of(const std::vector<Row>& rows) {
     return std::any_of(r.cells.begin(), r.cells.end(),
                        [](const std::string& c) { return c.find(" +- ") != std::string::npos; });
   });
-  if (spread && indent + label + cell[0] + cell[1] + cell[2] + 3 > columns) {
+  if (spread && indent + label + cell[0] + cell[1] + cell[2] + 3 > terminal_columns) {
     return text_of(narrower(rows));
   }
-  const std::size_t gap = indent + label + cell[0] + cell[1] + cell[2] + 3 * wide > columns ? 1 : wide;
+  const std::size_t gap = indent + label + cell[0] + cell[1] + cell[2] + 3 * wide > terminal_columns ? 1 : wide;
   std::string text;
   for (const Row& r : rows) {
     text += fmt::format("{:{}}{:<{}}", "", indent, r.label, label);
@@ -384,9 +348,13 @@ std::string open_parameters(const PoseDiagnosis& d) {
 }
 
 std::string turns_words(const PoseDiagnosis& d) {
-  return d.turns == 0
-             ? std::string()
-             : fmt::format("turns carry gravity's direction to {:.2f} deg rms\n", d.direction_after / units::degree);
+  if (d.turns == 0) {
+    return {};
+  }
+  constexpr double much = 5.0;
+  const bool more = d.direction_by_noise > 0.0 && d.direction_after > much * d.direction_by_noise;
+  return fmt::format("turns carry gravity's direction to {:.2f} deg rms{}\n", d.direction_after / units::degree,
+                     more ? fmt::format(", the gyros' noise to {:.2g}", d.direction_by_noise / units::degree) : "");
 }
 
 std::string turns_line(const PoseDiagnosis& d) {
@@ -412,12 +380,18 @@ std::string read_outs(const diagnosis::ReadOuts& r, const ReadingUnits& shown) {
                  ? with_sigma(gain, a.sigma(k), "raw units per rad/s")
                  : "scale " + with_sigma(100.0 * (gain - 1.0), 100.0 * a.sigma(k), "%");
     for (Eigen::Index i = 0; i < 3; ++i) {
-      if (i != k) {
+      if (i != k && a.sigma(i) > 0.0 && std::isfinite(a.sigma(i))) {  // a log may hold one gyro
         words += fmt::format(", {} {}", "xyz"[i], with_sigma(100.0 * across(a)(i), 100.0 * a.sigma(i), "%"));
       }
     }
     if (a.nonlinearity) {
-      words += fmt::format("; nonlinearity {}", a.nonlinearity->determined ? "named" : "not seen");
+      const double at_fastest = 100.0 * a.fastest_deg_per_s * units::degree;  // %, of a rate's own part
+      words +=
+          a.nonlinearity->determined
+              ? fmt::format("; nonlinearity named, {} at {:.0f} deg/s",
+                            with_sigma(at_fastest * a.nonlinearity->value, at_fastest * a.nonlinearity->sigma, "%"),
+                            a.fastest_deg_per_s)
+              : std::string("; nonlinearity not seen");
     }
     if (a.turns_alike > 0.0) {
       words += "; " + turns_alike_words(a);
@@ -444,8 +418,10 @@ std::string read_outs(const diagnosis::ReadOuts& r, const ReadingUnits& shown) {
   const bool steady = std::any_of(r.axes.begin(), r.axes.end(), [](const auto& a) { return a.steady || a.oscillates; });
   if (steady) {
     const auto of = [](const Vector3& v) { return std::array{v.x(), v.y(), v.z()}; };
-    text += text_of(
-        {{"", {"x", "y", "z"}}, gyro_row("mean", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {true, true, true})});
+    const auto there = [&r](Eigen::Index k) { return r.gyro_bias_sigma(k) > 0.0; };
+    text +=
+        text_of({{"", {"x", "y", "z"}},
+                 gyro_row("at rate 0", of(r.gyro_bias), of(r.gyro_bias_sigma), shown, {there(0), there(1), there(2)})});
   }
   return text;
 }

@@ -67,6 +67,9 @@ Json term_json(const Rest& rest, const RestTerm& term) {
     j["as_well"].push_back(amplitude_json(rest, a));
   }
   j["not_told_apart_at_rest"] = term.twins;
+  if (term.tilt != RestTerm::Tilt::none) {
+    j["tilt_of_the_base"] = term.tilt == RestTerm::Tilt::open ? "open" : "excluded";
+  }
   return j;
 }
 
@@ -87,6 +90,9 @@ Json axis_json(const Rest& rest, const RestAxis& a) {
   }
   if (a.quantum > 0.0) {
     j["quantum"] = a.quantum / mean.raw;
+  }
+  if (a.swing > 0.0) {
+    j["swings"] = {{"amplitude", a.swing / mean.raw}, {"frequency_hz", a.swing_hz}, {"unit", mean.name}};
   }
   j["rms"] = a.rms / mean.raw;
   j["rms_left"] = a.rms_left / mean.raw;
@@ -213,6 +219,49 @@ std::string parting_text(const Rest& rest) {
                        : "confounded: a longer log, or a channel of the temperature, tells\n";
 }
 
+// What of the accelerometers may be the base's.
+std::string tilt_text(const Rest& rest) {
+  std::string text;
+  bool open = false, excluded = false;
+  for (const RestAxis& a : rest.axes) {
+    for (const RestTerm& t : a.terms) {
+      open |= t.tilt == RestTerm::Tilt::open;
+      excluded |= t.tilt == RestTerm::Tilt::excluded;
+    }
+  }
+  text += open ? "    or a tilt of the base: the gyros do not exclude it\n" : "";
+  return text + (excluded ? "    no tilt of the base: the gyros do not turn then\n" : "");
+}
+
+// Tilts that gyros and gravity both show.
+std::string motion_text(const Rest& rest) {
+  constexpr double arcmin = units::degree / 60.0;
+  std::string text;
+  for (const diagnosis::RestTilt& t : rest.tilts) {
+    text +=
+        fmt::format("the base tilts by {:.3g} arcmin at {:.0f} s, and the gyros by {} of it: no error of a sensor\n",
+                    t.angle / arcmin, t.time_s, figure(t.share, t.sigma, 1.0));
+  }
+  if (rest.base_tilt) {
+    text += fmt::format("the base tilts to and fro by {:.3g} arcmin, in means of 10 s, as gyros and gravity show\n",
+                        rest.base_tilt->range / arcmin);
+  }
+  return text;
+}
+
+// Axes that swing, wrapped.
+std::string swing_text(const Rest& rest) {
+  Line line{"swings beside the white noise", "a line or a motion of the base", {}};
+  for (const RestAxis& a : rest.axes) {
+    if (a.swing > 0.0) {
+      const Unit unit = of_mean(rest, a.gyro);
+      line.figures.push_back(fmt::format("{} {} by {:.2g} {} at {:.3g} Hz", a.gyro ? "gyro" : "accelerometer",
+                                         "xyz"[a.axis], a.swing / unit.raw, unit.name, a.swing_hz));
+    }
+  }
+  return line.figures.empty() ? std::string() : line.text();
+}
+
 std::string drift_text(const Rest& rest) {
   std::string text;
   for (const Named& named : named_of(rest)) {
@@ -226,7 +275,7 @@ std::string drift_text(const Rest& rest) {
       text += fmt::format("    the same at rest: {}\n", fmt::join(named.twins, ", "));
     }
   }
-  return text + parting_text(rest);
+  return text + tilt_text(rest) + parting_text(rest);
 }
 
 }  // namespace
@@ -240,10 +289,23 @@ Json rest_json(const Rest& rest) {
   for (const RestAxis& a : rest.axes) {
     axes.push_back(axis_json(rest, a));
   }
+  constexpr double arcmin = units::degree / 60.0;
+  Json tilts = Json::array();
+  for (const diagnosis::RestTilt& t : rest.tilts) {
+    tilts.push_back({{"at_s", t.time_s},
+                     {"arcmin", t.angle / arcmin},
+                     {"of_it_by_gyros", {{"value", t.share}, {"sigma", t.sigma}}}});
+  }
+  Json base = {{"jumps", tilts}};
+  if (rest.base_tilt) {
+    base["range_arcmin"] = rest.base_tilt->range / arcmin;
+    base["correlation"] = rest.base_tilt->correlation;
+  }
   return {{"blocks", rest.blocks},
           {"block_s", rest.block_s},
           {"drift_tested", rest.drift_tested},
           {"temperature_degC", rest.coldest ? Json{*rest.coldest, *rest.warmest} : Json()},
+          {"base", base},
           {"axes", axes}};
 }
 
@@ -258,13 +320,16 @@ std::string rest_table(const Rest& rest) {
       }
     }
   }
-  return text;
+  return text + swing_text(rest);
 }
 
 std::string rest_findings(const Rest& rest) {
+  const char* nothing = rest.tilts.empty() && !rest.base_tilt
+                            ? "nothing drifts by more than slow noise makes: nothing named\n"
+                            : "beside it nothing drifts by more than slow noise makes: nothing named\n";
   return !rest.drift_tested ? "drift: not asked about, the rest is too short\n"
-         : drifts(rest)     ? "beside slow noise, named:\n" + drift_text(rest)
-                            : "nothing drifts by more than slow noise makes: nothing named\n";
+                            : motion_text(rest) + (drifts(rest) ? "beside slow noise, named:\n" + drift_text(rest)
+                                                                : std::string(nothing));
 }
 
 std::string rest_text(const Rest& rest) {

@@ -223,7 +223,7 @@ std::string turns_elsewhere(const PoseInput& input, const std::vector<Pose>& pos
     std::snprintf(
         text.data(), text.size(),
         "the gyros carry gravity wrong by %.0f deg, and no order or sign of the axes mends it: they stand aslant in "
-        "the accelerometers, or turns are missing in the log",
+        "the accelerometers, or rows of the turns are missing in the log or twice in it",
         off / units::degree);
   }
   return text.data();

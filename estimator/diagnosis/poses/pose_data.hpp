@@ -52,6 +52,9 @@ FoundPoses find_poses(const PoseInput& input, const std::vector<LeftOut>& left_o
 // Axes that stand at the end of their range, which no other value approaches as often.
 std::vector<Clipping> find_clipping(const PoseInput& input);
 
+// Whether a gyro stands at the end of its range in a sample of [first, last).
+bool gyros_clip(const PoseInput& input, const std::vector<Clipping>& clipped, std::size_t first, std::size_t last);
+
 // Takes out the poses in which an accelerometer stands at the end of its range; how many those are.
 int drop_clipped(const PoseInput& input, const std::vector<Clipping>& clipped, std::vector<Pose>& poses);
 

@@ -33,7 +33,19 @@ std::vector<Vector3> carried_direction(const PoseInput& input, const std::vector
   return all;
 }
 
-// Less what a bias and a coefficient of the temperature make.
+// A gyro that reads one value in all poses hides the Earth's rate, with whatever else is there.
+std::array<bool, 3> silent_axes(const std::vector<Pose>& poses) {
+  std::array<bool, 3> silent{};
+  for (std::size_t axis = 0; axis < silent.size(); ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    silent[axis] = std::all_of(poses.begin(), poses.end(), [&](const Pose& p) {
+      return p.gyro(i) == poses.front().gyro(i) && p.gyro_white(i) == 0.0;
+    });
+  }
+  return silent;
+}
+
+// Less what a bias and a coefficient of the temperature make; 0 of gyros that say nothing.
 Eigen::MatrixX3d projected(const std::vector<Vector3>& rows, const std::vector<Pose>& poses) {
   Eigen::MatrixX3d all(static_cast<Eigen::Index>(rows.size()), 3);
   Eigen::VectorXd temperature(all.rows());
@@ -45,6 +57,12 @@ Eigen::MatrixX3d projected(const std::vector<Vector3>& rows, const std::vector<P
   temperature.array() -= temperature.mean();
   if (const double square = temperature.squaredNorm(); square > 0.0) {
     all -= temperature * (temperature.transpose() * all / square).eval();
+  }
+  const std::array<bool, 3> silent = silent_axes(poses);
+  for (std::size_t axis = 0; axis < silent.size(); ++axis) {
+    if (silent[axis]) {
+      all.col(static_cast<Eigen::Index>(axis)).setZero();
+    }
   }
   return all;
 }
@@ -135,7 +153,7 @@ EarthInPoses earth_of_any_latitude(const PoseInput& input, const std::vector<Pos
 }
 
 // Where neither latitude nor heading is known the vertical part is: it stands along u in all three axes alike. It is taken where it is likelier
-// than none by e^6 and within the Earth's rate by 3 sigma. An isotropic g-sensitivity of that size does the same, and no pose parts them.
+// than none by e^6 and no more than the Earth's rate and its sigma. An isotropic g-sensitivity of that size does the same, and no pose parts them.
 EarthInPoses vertical_part(const PoseInput& input, const std::vector<Pose>& poses) {
   EarthInPoses earth;
   earth.rate.assign(poses.size(), Vector3::Zero());
@@ -157,23 +175,23 @@ EarthInPoses vertical_part(const PoseInput& input, const std::vector<Pose>& pose
   const double rate = a.cwiseProduct(y).sum() / square, left = (y - rate * a).squaredNorm();
   const double free = 3.0 * static_cast<double>(poses.size() - 1);
   const double sigma = std::sqrt(left / (free - 1.0) / square);
-  constexpr double than_none = 6.0, sure = 3.0;
-  if (likelier(y.squaredNorm(), left, poses.size()) < than_none || std::abs(rate) - sure * sigma > omega) {
+  // Of three sigma and more a g-sensitivity that widens sigma would have its part.
+  constexpr double than_none = 6.0;
+  if (likelier(y.squaredNorm(), left, poses.size()) < than_none || std::abs(rate) - sigma > omega) {
     return earth;
   }
   const auto latitude_of = [omega](double vertical) { return std::asin(std::clamp(vertical / omega, -1.0, 1.0)); };
-  earth.latitude = latitude_of(rate);
+  const double vertical = std::clamp(rate, -omega, omega);
+  earth.latitude = latitude_of(vertical);
   earth.latitude_sigma =
-      std::max(latitude_of(rate + sigma) - *earth.latitude, *earth.latitude - latitude_of(rate - sigma));
+      std::max(latitude_of(vertical + sigma) - *earth.latitude, *earth.latitude - latitude_of(vertical - sigma));
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    earth.rate[k] = rate * up[k];
+    earth.rate[k] = vertical * up[k];
   }
   return earth;
 }
 
-}  // namespace
-
-EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
+EarthInPoses earth_in_room(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
   EarthInPoses earth;
   earth.rate.assign(poses.size(), Vector3::Zero());
   if (input.sensors != Sensors::both || !knows_gyro_unit(input)) {
@@ -230,6 +248,19 @@ EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& pos
   take(earth.reversed ? -omega_n.y() : omega_n.y());
   for (std::size_t k = 0; k < poses.size(); ++k) {
     earth.rate[k] += omega_n.x() * (std::cos(found.angle) * first[k] + std::sin(found.angle) * second[k]);
+  }
+  return earth;
+}
+
+}  // namespace
+
+EarthInPoses earth_in_poses(const PoseInput& input, const std::vector<Pose>& poses, bool carried) {
+  EarthInPoses earth = earth_in_room(input, poses, carried);
+  const std::array<bool, 3> silent = silent_axes(poses);
+  for (Vector3& rate : earth.rate) {
+    for (std::size_t axis = 0; axis < silent.size(); ++axis) {
+      rate(static_cast<Eigen::Index>(axis)) *= silent[axis] ? 0.0 : 1.0;
+    }
   }
   return earth;
 }

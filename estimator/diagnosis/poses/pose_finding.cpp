@@ -443,6 +443,15 @@ std::vector<Clipping> find_clipping(const PoseInput& input) {
   return all;
 }
 
+bool gyros_clip(const PoseInput& input, const std::vector<Clipping>& clipped, std::size_t first, std::size_t last) {
+  return std::any_of(clipped.begin(), clipped.end(), [&](const Clipping& c) {
+    const auto stands = [&](const auto& row) { return std::abs(row[static_cast<std::size_t>(c.axis)]) >= c.limit; };
+    const auto begin = input.gyro.begin();
+    return c.gyro &&
+           std::any_of(begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(last), stands);
+  });
+}
+
 int drop_clipped(const PoseInput& input, const std::vector<Clipping>& clipped, std::vector<Pose>& poses) {
   constexpr double most =
       0.01;  // of a pose's samples; what white noise cuts off moves the mean by less than a tenth of its sigma

@@ -16,6 +16,13 @@ bool has(const std::vector<PoseEffect>& list, const Effect* effect) {
   return std::any_of(list.begin(), list.end(), [effect](const PoseEffect& p) { return p.effect == effect; });
 }
 
+const Effect& measured_gyro_temperature() {
+  const std::vector<Effect>& all = catalogue();
+  return *std::find_if(all.begin(), all.end(), [](const Effect& effect) {
+    return effect.id == "gyro_temperature" && effect.temperature == TemperatureUse::measured;
+  });
+}
+
 void best_first(std::vector<PoseEffect>& all) {
   std::stable_sort(all.begin(), all.end(), [](const PoseEffect& a, const PoseEffect& b) { return a.log_p < b.log_p; });
 }
@@ -68,6 +75,8 @@ class Gyros {
 
  private:
   PoseEffect attempt(const Effect& effect, double constant) const;
+  // Whether a measured temperature leaves no difference between these parts: in a chamber it is what changes from one to the next.
+  bool follow_temperature(const Eigen::MatrixXd& of_parts, double log_limit) const;
 
   const std::vector<Pose>& poses_;
   std::vector<double> time_s_;
@@ -76,6 +85,20 @@ class Gyros {
   std::array<Eigen::MatrixXd, 3> known_;
   std::array<Eigen::VectorXd, 3> y_;
 };
+
+bool Gyros::follow_temperature(const Eigen::MatrixXd& of_parts, double log_limit) const {
+  const Effect& measured = measured_gyro_temperature();
+  if (!has_temperature_) {
+    return false;
+  }
+  double log_p = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    const Trial trial = trial_of(measured, NAN, poses_, duration_s_, axis);
+    log_p = std::min(log_p, compare(joined(known_[i], trial.columns), of_parts, y_[i], time_s_, true).log_p);
+  }
+  return log_corrected(log_p, 3.0) > log_limit;
+}
 
 void Gyros::take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& d) {
   const std::ptrdiff_t last = poses_.empty() ? 0 : poses_.back().part;
@@ -102,7 +125,7 @@ void Gyros::take_jumps(const PoseInput& input, double log_limit, PoseDiagnosis& 
     answers[axis] = compare(known_[axis], of_parts, y_[axis], time_s_, true);
     log_p = std::min(log_p, answers[axis].log_p);
   }
-  if (log_corrected(log_p, 3.0) > log_limit) {
+  if (log_corrected(log_p, 3.0) > log_limit || follow_temperature(of_parts, log_limit)) {
     return;
   }
   for (std::size_t j = 0; j < parts.size(); ++j) {
@@ -182,12 +205,16 @@ PoseEffect Gyros::attempt(const Effect& effect, double constant) const {
   PoseEffect result;
   result.effect = &effect;
   result.constant = constant;
-  const bool with_time = of_time(effect);
+  // A measured temperature is asked as a drift is: it changes as slowly, and beside a walk it would always lose to one.
+  const bool with_time = of_time(effect) || effect.temperature == TemperatureUse::measured;
   constexpr double two_sigma = 2.0;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     const Trial trial = trial_of(effect, constant, poses_, duration_s_, axis);
-    const RowComparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
+    RowComparison c = compare(known_[i], trial.columns, y_[i], time_s_, with_time);
+    if (with_time && trial.columns.cols() > 0) {
+      hold_flicker(poses_, time_s_, axis, joined(known_[i], trial.columns), known_[i].cols(), c.with);
+    }
     const double beside_flicker =
         with_time ? log_p_beside_flicker(poses_, time_s_, axis, known_[i], trial.columns, y_[i], two_sigma) : -HUGE_VAL;
     result.held_out_rms[i] = c.with.held_out_rms;

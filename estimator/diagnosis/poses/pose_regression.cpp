@@ -5,6 +5,8 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "estimator/statistics/distributions.hpp"
 
@@ -193,9 +195,11 @@ RowComparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& colum
   return c;
 }
 
-double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
-                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
-                            double sure) {
+namespace {
+
+// Lower root of the covariance of white noise and of flicker as the poses' halves tell it, by `sure` of its sigma more; none: they tell none.
+std::optional<Eigen::LLT<Eigen::MatrixXd>> with_flicker(const std::vector<Pose>& poses,
+                                                        const std::vector<double>& time_s, int axis, double sure) {
   const auto n = static_cast<Eigen::Index>(poses.size());
   constexpr double median_of_square =
       0.4549;  // of a normal number of unit variance: a pose in which something else moved counts once
@@ -216,7 +220,7 @@ double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<do
   const double level = (half + sure * sigma - white.mean()) / std::log(2.0);
   const double times = (time_s.back() - time_s.front()) / length_s;
   if (!(level > 0.0) || !(times > 1.0)) {
-    return -HUGE_VAL;
+    return std::nullopt;
   }
   constexpr double far_apart = 1.5, beyond = 1.0;
   const double variance = std::log(times) + far_apart + beyond;  // any constant is the bias
@@ -228,15 +232,36 @@ double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<do
           level * (i == j ? variance : variance - far_apart - std::log(std::max(1.0, apart_s / length_s)));
     }
   }
-  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-  if (root.info() != Eigen::Success) {
+  Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  return root.info() == Eigen::Success ? std::optional(std::move(root)) : std::nullopt;
+}
+
+}  // namespace
+
+double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
+                            const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
+                            double sure) {
+  const auto root = with_flicker(poses, time_s, axis, sure);
+  if (!root) {
     return -HUGE_VAL;
   }
-  const Eigen::VectorXd whitened = root.matrixL().solve(y);
-  const Regression without = regress(root.matrixL().solve(known), whitened);
-  const Regression with = regress(root.matrixL().solve(joined(known, columns)), whitened);
+  const Eigen::VectorXd whitened = root->matrixL().solve(y);
+  const Regression without = regress(root->matrixL().solve(known), whitened);
+  const Regression with = regress(root->matrixL().solve(joined(known, columns)), whitened);
   const auto more = static_cast<double>(with.rank - without.rank);
   return more < 1.0 ? 0.0 : log_chi_squared_tail(std::max(0.0, without.square - with.square), more);
+}
+
+void hold_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
+                  const Eigen::MatrixXd& columns, Eigen::Index first, Regression& r) {
+  const auto root = with_flicker(poses, time_s, axis, 0.0);
+  if (!root) {
+    return;
+  }
+  const Eigen::MatrixXd L = root->matrixL();
+  const Eigen::MatrixXd fit = columns.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::Index n = columns.cols() - first;
+  r.sigma.tail(n) = r.sigma.tail(n).cwiseMax((fit * L).rowwise().norm().tail(n));
 }
 
 std::vector<double> middles(const std::vector<Pose>& poses) {

@@ -46,6 +46,9 @@ RowComparison compare(const Eigen::MatrixXd& known, const Eigen::MatrixXd& colum
 double log_p_beside_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
                             const Eigen::MatrixXd& known, const Eigen::MatrixXd& columns, const Eigen::VectorXd& y,
                             double sure = 0.0);
+// Sigma of what was fitted beside white noise, from column `first` on, no less than that 1/f noise makes it.
+void hold_flicker(const std::vector<Pose>& poses, const std::vector<double>& time_s, int axis,
+                  const Eigen::MatrixXd& columns, Eigen::Index first, Regression& r);
 std::vector<double> middles(const std::vector<Pose>& poses);
 
 // Columns of one axis' readings (or of |f|, axis 3) for one effect: [poses x coefficients], those that vanish left out.

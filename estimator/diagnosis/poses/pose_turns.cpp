@@ -18,12 +18,21 @@ namespace {
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 constexpr double scale_before = 0.1;  // sigma of S before the data
 
+Vector3 left_in(const Pose& p, const GyroModel& model) { return p.gyro - model.bias - model.G * p.u; }
+
 // u at the beginning of pose k+1, carried there from pose k, less the accelerometers' u.
 Vector3 direction_error(const PoseInput& input, const Pose& from, const Pose& to, const GyroModel& model) {
   Vector3 u = from.u.normalized();
+  Vector3 besides = Vector3::Zero(), more = Vector3::Zero();  // at the end of `from`; a second
+  if (model.drifts) {
+    besides = left_in(from, model);
+    more = (left_in(to, model) - besides) / (to.middle_s - from.middle_s);
+    besides += more * (input.time_s[from.last - 1] - input.time_s.front() - from.middle_s);
+  }
   for (std::size_t i = from.last; i < to.first; ++i) {
     const double dt = input.time_s[i] - input.time_s[i - 1];
-    const Vector3 raw = at(input.gyro, i) - model.bias - model.G * u;
+    besides += more * dt;
+    const Vector3 raw = at(input.gyro, i) - model.bias - besides - model.G * u;
     u = matrix_from_rotation_vector(-(model.S * raw) * input.gyro_unit * dt) * u;
   }
   return u - to.u.normalized();
@@ -128,6 +137,18 @@ GyroModel static_model(const std::vector<Pose>& poses, std::size_t without, bool
   return m;
 }
 
+// Whether the poses read more besides than their white noise makes: beside so much, a mean bias is wrong in the turns, and what the readings on
+// both sides of a turn are known by is little.
+bool drifts(const std::vector<Pose>& poses, const GyroModel& model) {
+  constexpr double times = 2.0;
+  double square = 0.0, white = 0.0;
+  for (const Pose& p : poses) {
+    square += left_in(p, model).squaredNorm();
+    white += p.gyro_white.squaredNorm();
+  }
+  return white > 0.0 && square > times * times * white;
+}
+
 // Sigma of S by what the poses leave open of the accelerometers: directions of gravity are wrong by as much, and gyros that carry them from
 // pose to pose seem misaligned, or of another scale.
 Eigen::Matrix<double, 9, 1> sigma_by_accelerometers(const PoseInput& input, const std::vector<Pose>& poses,
@@ -186,15 +207,36 @@ void close_parameters(PoseDiagnosis& d) {
   }
 }
 
+// Of the direction behind a turn, rms over the turns, rad: the noise of the turn and that of the bias by the poses at its ends.
+double by_noise(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns) {
+  double square = 0.0;
+  for (const std::size_t k : turns) {
+    const Pose &from = poses[k], &to = poses[k + 1];
+    const double length_s = input.time_s[to.first] - input.time_s[from.last - 1];
+    const double early = from.gyro_white.squaredNorm(), late = to.gyro_white.squaredNorm();
+    constexpr double across = 2.0 / 3.0;  // of three components
+    square += across * (0.5 * (early * from.length_s + late * to.length_s) * length_s +
+                        0.25 * (early + late) * length_s * length_s);
+  }
+  return input.gyro_unit * std::sqrt(square / static_cast<double>(turns.size()));
+}
+
 void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns,
                       const AccelModel& accel, bool linear, PoseDiagnosis& d) {
+  // Before what is named: with a bias alone.
+  const bool drift = drifts(poses, static_model(poses, none, linear)), more = linear || drift;
   for (const bool with : {false, true}) {
-    GyroModel all = static_model(poses, none, with && linear);
+    const auto model_without = [&](std::size_t pose) {
+      GyroModel model = static_model(poses, pose, with && linear);
+      model.drifts = with && drift;
+      return model;
+    };
+    GyroModel all = model_without(none);
     const TurnFit fit = fit_turns(input, poses, turns, none, all);
     double square = 0.0, held_out_square = 0.0;
     for (const std::size_t k : turns) {
       square += direction_error(input, poses[k], poses[k + 1], all).squaredNorm();
-      GyroModel rest = static_model(poses, k, with && linear);
+      GyroModel rest = model_without(k);
       rest.S = all.S;
       fit_turns(input, poses, turns, k, rest);
       held_out_square += direction_error(input, poses[k], poses[k + 1], rest).squaredNorm();
@@ -202,7 +244,7 @@ void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, co
     const auto n = static_cast<double>(turns.size());
     (with ? d.direction_after : d.direction_before) = std::sqrt(square / n);
     (with ? d.direction_after_held_out : d.direction_before_held_out) = std::sqrt(held_out_square / n);
-    if (with || !linear) {
+    if (with || !more) {
       const auto open = sigma_by_accelerometers(input, poses, turns, accel, fit, all);
       add_parameters(all, (fit.sigma.cwiseAbs2() + open.cwiseAbs2()).cwiseSqrt(), d);
       if (!fit.by_residuals) {
@@ -212,7 +254,7 @@ void fit_and_hold_out(const PoseInput& input, const std::vector<Pose>& poses, co
                               ": they leave nothing over that says how far they are known");
       }
     }
-    if (!with && !linear) {
+    if (!with && !more) {
       d.direction_after = d.direction_before;
       d.direction_after_held_out = d.direction_before_held_out;
       break;
@@ -236,12 +278,7 @@ void tell_in_raw(PoseDiagnosis& d) {
 std::vector<std::size_t> usable_turns(const PoseInput& input, const std::vector<Pose>& poses, const PoseDiagnosis& d) {
   std::vector<std::size_t> turns;
   for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
-    bool clipped = false;
-    for (const Clipping& c : d.clipped) {
-      for (std::size_t i = poses[k].last; c.gyro && i < poses[k + 1].first; ++i) {
-        clipped |= std::abs(input.gyro[i][static_cast<std::size_t>(c.axis)]) >= c.limit;
-      }
-    }
+    bool clipped = gyros_clip(input, d.clipped, poses[k].last, poses[k + 1].first);
     const double from = input.time_s[poses[k].last - 1] - input.time_s.front();
     const double to = input.time_s[poses[k + 1].first] - input.time_s.front();
     for (const LeftOut& out : d.left_out) {
@@ -261,12 +298,18 @@ void judge_turns(const PoseInput& input, const std::vector<Pose>& poses, const s
   d.turns_clipped = static_cast<int>(poses.size() - 1 - turns.size());
   d.turns_whole = static_cast<int>(turns.size() - kept.size());
   if (kept.empty()) {
+    // That all of them do is more likely another unit, or time.
+    if (const auto reading = read_gyros_by_turns(input, poses, turns); reading && d.gyros_contradict.empty()) {
+      d.gyros_contradict = contradiction(input, *reading);
+    }
     return;
   }
   fit_and_hold_out(input, poses, kept, accel, linear, d);
-  // Turns that end this far from where gravity is are carried in another unit, or not by these gyros.
-  constexpr double most = 10.0 * units::degree;
-  if (d.direction_after > most) {
+  d.direction_by_noise = by_noise(input, poses, kept);
+  // Turns that end this far from where gravity is are carried in another unit, or not by these gyros; or by a part of what they read, where
+  // noise makes little of it.
+  constexpr double most = 10.0 * units::degree, much = 3.0 * units::degree, times = 20.0;
+  if (d.direction_after > most || d.direction_after > std::max(much, times * d.direction_by_noise)) {
     close_parameters(d);
     if (const auto reading = read_gyros_by_turns(input, poses, turns); reading && d.gyros_contradict.empty()) {
       d.gyros_contradict = contradiction(input, *reading);

@@ -12,6 +12,7 @@ struct GyroModel {
   Matrix3 S = Matrix3::Identity();
   Vector3 bias = Vector3::Zero();  // raw
   Matrix3 G = Matrix3::Zero();     // raw per g
+  bool drifts = false;  // then what the poses at both ends of a turn read besides, straight between them, is bias too
 };
 
 // Numbers of the poses behind which a turn begins that holds no sample at the end of the gyros' range (d.clipped) and none that was

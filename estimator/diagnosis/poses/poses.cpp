@@ -166,6 +166,11 @@ void add_read_outs(const PoseInput& input, PoseDiagnosis& d) {
                                 ? "an attitude: gyros that turn, accelerometers in poses, and its clock"
                                 : "an attitude: gyros that turn, and its clock");
   }
+  if (d.read_outs && d.read_outs->clipped_turns + d.read_outs->clipped_rates > 0) {
+    d.invisible.push_back("what " + counted(d.read_outs->clipped_turns, "turn") + " and " +
+                          counted(d.read_outs->clipped_rates, "steady rate") +
+                          " of the table tell, in which a gyro stands at the end of its range");
+  }
   if (d.read_outs) {
     d.supports.emplace_back("angle read-outs: gyros that turn about the table's axes, and the table's clock");
   } else if (!input.outer.empty()) {
@@ -223,7 +228,7 @@ void add_rest(const PoseInput& input, double alpha, const std::vector<Pose>& pos
 
 // Gyros alone: nothing says where down is, so that only rest and a table's angles are left to hold them against.
 void judge_gyros_alone(const PoseInput& input, double alpha, const std::vector<Pose>& poses, PoseDiagnosis& d) {
-  d.read_outs = read_outs_of(input, poses, alpha, d.invisible);
+  d.read_outs = read_outs_of(input, poses, d.clipped, alpha, d.invisible);
   d.accel_adequate = true;
   if (poses.empty() && !d.read_outs && !has_attitude(d)) {
     d.failure = about_attitude(d) +
@@ -316,8 +321,11 @@ std::string why_no_poses(const PoseInput& input, const std::vector<Pose>& poses,
     constexpr double of_each_other = 1.3;
     const auto [low, high] = std::minmax_element(d.other_forces.begin(), d.other_forces.end());
     const bool alike = d.other_forces.size() >= several && *high < of_each_other * *low;
-    return free    ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
-                     "acceleration"
+    constexpr double off = 0.1, unit = 1.0 / 9.80665;
+    const bool of_g = alike && std::abs(*low / unit - 1.0) < off && std::abs(*high / unit - 1.0) < off;
+    return free && !of_g
+               ? "the accelerometers read next to nothing at rest: gravity is not in them, as in a phone's linear "
+                 "acceleration"
            : alike ? "at rest the accelerometers read" + with_numbers(" %.4g to %.4g g: ", *low, *high) +
                          "gravity in another unit than is said of them"
                    : "steady, but not at 1 g: " + other_forces_words(d) + "; gravity is no reference there";
@@ -418,7 +426,7 @@ PoseDiagnosis diagnose_continuous(const PoseInput& input, double alpha) {
     return d;
   }
   constexpr double of_read_outs = 0.2;
-  d.read_outs = read_outs_of(input, poses, of_read_outs * alpha, d.invisible);
+  d.read_outs = read_outs_of(input, poses, d.clipped, of_read_outs * alpha, d.invisible);
   const double left = (d.read_outs ? 1.0 - of_read_outs : 1.0) * alpha;
   if (!d.by_poses) {
     add_rest(input, left, poses, d);

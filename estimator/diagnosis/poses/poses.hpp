@@ -131,7 +131,8 @@ struct ReadOuts {
   std::optional<ReadOutClock> clock;
   std::optional<TableTilt> tilt;
   Vector3 gyro_bias = Vector3::Zero(), gyro_bias_sigma = Vector3::Zero();  // raw
-  int disagreeing = 0;  // turns that read-outs and gyros disagree about
+  int disagreeing = 0;                       // turns that read-outs and gyros disagree about
+  int clipped_turns = 0, clipped_rates = 0;  // in which a gyro stands at the end of its range
 };
 
 // Allan deviation of a triad at rest (IEEE Std 952, annex C), raw units.
@@ -202,6 +203,7 @@ struct PoseDiagnosis {
   double gyro_raw_unit = 0.0;    // rad/s a raw unit, by the turns, where nobody says it; parameters are then in it
   std::string gyros_contradict;  // what of the gyros' unit or axes contradicts gravity's turns; empty: nothing
   double direction_before = 0.0, direction_after = 0.0;
+  double direction_by_noise = 0.0;  // of the gyros' white noise, which is in their bias too
   double direction_before_held_out = 0.0, direction_after_held_out = 0.0;  // rotation and its poses left out
   int steady_turns = 0;              // stretches that are quiet and turn: no poses
   std::vector<double> other_forces;  // what quiet stretches read that are not at 1 g, g: no poses

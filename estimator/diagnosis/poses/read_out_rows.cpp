@@ -110,7 +110,8 @@ std::vector<Stop> find_stops(const PoseInput& input, const std::vector<Pose>& po
 }
 
 std::vector<TurnRow> turns_between(const PoseInput& input, const std::vector<Pose>& poses,
-                                   const std::vector<Stop>& stops) {
+                                   const std::vector<Stop>& stops, const std::vector<Clipping>& clipped,
+                                   int& at_the_end) {
   constexpr double least = 1.0 * units::degree;
   std::vector<TurnRow> rows;
   for (std::size_t k = 1; k < stops.size(); ++k) {
@@ -122,19 +123,32 @@ std::vector<TurnRow> turns_between(const PoseInput& input, const std::vector<Pos
     if (std::max(std::abs(row.outer), std::abs(row.inner)) < least) {
       continue;
     }
+    if (gyros_clip(input, clipped, poses[a.pose].last, poses[b.pose].first)) {
+      ++at_the_end;
+      continue;
+    }
     row.first = a.middle;
     row.last = b.middle;
     row.bias = 0.5 * (poses[a.pose].gyro + poses[b.pose].gyro);
     row.turned = Vector3::Zero();  // in a pose nothing turns: its samples would add their noise
-    for (std::size_t i = poses[a.pose].last; i < poses[b.pose].first; ++i) {
+    const Pose &from = poses[a.pose], &to = poses[b.pose];
+    row.begins = from.last;
+    row.ends = to.first;
+    for (std::size_t i = row.begins; i < row.ends; ++i) {
       row.turned += (at(input.gyro, i) - row.bias) * interval(input, i);
     }
+    const double length_s = input.time_s[row.ends] - input.time_s[row.begins - 1];
+    const Vector3 a_second =
+        0.5 * (from.gyro_white.cwiseAbs2() * from.length_s + to.gyro_white.cwiseAbs2() * to.length_s);
+    const Vector3 of_bias = 0.25 * (from.gyro_white.cwiseAbs2() + to.gyro_white.cwiseAbs2());
+    row.noise = (a_second * length_s + of_bias * length_s * length_s).cwiseSqrt();
     rows.push_back(row);
   }
   return rows;
 }
 
-std::vector<SteadyRate> find_steady_rates(const PoseInput& input) {
+std::vector<SteadyRate> find_steady_rates(const PoseInput& input, const std::vector<Clipping>& clipped,
+                                          int& at_the_end) {
   const std::vector<double> outer = smooth_rate(input, input.outer), inner = smooth_rate(input, input.inner);
   const double outer_limit = rest_limit(input.outer), inner_limit = rest_limit(input.inner);
   constexpr double slowest = 2.0 * units::degree, even = 0.01;
@@ -155,7 +169,11 @@ std::vector<SteadyRate> find_steady_rates(const PoseInput& input) {
       s.last = i;
       s.outer = of_outer;
       if (complete(input, of_outer ? input.outer : input.inner, s)) {
-        all.push_back(s);
+        if (gyros_clip(input, clipped, s.first, s.last)) {
+          ++at_the_end;
+        } else {
+          all.push_back(s);
+        }
       }
       first = i;
     }
@@ -199,23 +217,29 @@ std::vector<std::vector<SteadyRate>> mounts_of(const PoseInput& input, const std
 
 std::vector<Delay> delays_of_turns(const PoseInput& input, const std::vector<TurnRow>& rows, const ReadOuts& found) {
   std::vector<Delay> delays;
+  // Where both axes turn, what the gyros make of each is known only as far as both responses are.
+  const auto alone = [](const TurnRow& row) { return row.about_outer() || row.about_inner(); };
+  constexpr std::ptrdiff_t enough = 3;
+  const bool only_alone = std::count_if(rows.begin(), rows.end(), alone) >= enough;
   for (const TurnRow& row : rows) {
     const bool outer = std::abs(row.outer) > std::abs(row.inner);
-    if (axis_called(found, outer) == nullptr) {
+    if (axis_called(found, outer) == nullptr || (only_alone && !alone(row))) {
       continue;
     }
     const std::vector<double>& angle = outer ? input.outer : input.inner;
     const Vector3 along =
         row.turned.normalized();  // the axis of this turn: that of the outer one goes with the inner angle
     const double middle = 0.5 * (input.time_s[row.first] + input.time_s[row.last]);
-    double by_gyros = 0.0, by_read_out = 0.0;  // first moments
-    for (std::size_t i = row.first + 1; i <= row.last; ++i) {
-      const double t = input.time_s[i] - middle;
-      by_gyros += t * along.dot(at(input.gyro, i) - row.bias) * interval(input, i);
-      by_read_out += t * (angle[i] - angle[i - 1]);
+    // First moments. In the poses the gyros would add their noise; the read-out may turn late.
+    double by_gyros = 0.0, by_read_out = 0.0;
+    for (std::size_t i = row.begins; i < row.ends; ++i) {
+      by_gyros += (input.time_s[i] - middle) * along.dot(at(input.gyro, i) - row.bias) * interval(input, i);
     }
-    delays.push_back({middle - input.time_s.front(),
-                      by_read_out / (outer ? row.outer : row.inner) - by_gyros / along.dot(row.turned)});
+    for (std::size_t i = row.first + 1; i <= row.last; ++i) {
+      by_read_out += (input.time_s[i] - middle) * (angle[i] - angle[i - 1]);
+    }
+    const double read_out = by_read_out / (outer ? row.outer : row.inner), gyros = by_gyros / along.dot(row.turned);
+    delays.push_back({middle + read_out - input.time_s.front(), read_out - gyros});
   }
   return delays;
 }

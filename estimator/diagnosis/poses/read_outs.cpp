@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "estimator/diagnosis/poses/pose_regression.hpp"
+#include "estimator/diagnosis/poses/pose_student.hpp"
 #include "estimator/diagnosis/poses/read_out_oscillation.hpp"
 #include "estimator/diagnosis/poses/read_out_rows.hpp"
 #include "estimator/geometry/units.hpp"
@@ -115,14 +116,21 @@ Residuals residuals_of(const Eigen::VectorXd& off) {
   return r;
 }
 
+// By which sigma of `rows` rows is wider that are known by no more than what they leave beside two columns.
+double widened_by_few(Eigen::Index rows) {
+  return student_widening(static_cast<double>(std::max<Eigen::Index>(1, rows - 2)));
+}
+
 // (R1) Sums over the turns, for a table that stops short once goes further the next time: what a stop's angle is off by is
-// white in the sums, what the gyros add turn by turn is a walk in them.
+// white in the sums, what the gyros add turn by turn is a walk in them. Of few turns what is left may be small by chance: sigma is no less
+// than the gyros' own noise makes it.
 void fit_sums(const PoseInput& input, const std::vector<const TurnRow*>& rows, bool outer, ReadOutAxis& axis) {
   const auto n = static_cast<Eigen::Index>(rows.size());
   Eigen::MatrixXd X(n + 1, 2), y(n + 1, 3);
   X.row(0) << 1.0, 0.0;
   y.row(0).setZero();
   std::vector<double> number = {0.0};
+  Vector3 information = Vector3::Zero();
   for (Eigen::Index k = 0; k < n; ++k) {
     const TurnRow& row = *rows[static_cast<std::size_t>(k)];
     const double turn = outer ? row.outer : row.inner;
@@ -130,7 +138,9 @@ void fit_sums(const PoseInput& input, const std::vector<const TurnRow*>& rows, b
     y.row(k + 1) = y.row(k) + row.turned.transpose();
     number.push_back(static_cast<double>(k + 1));
     axis.turned_deg += std::abs(turn) / units::degree;
+    information += (turn * turn * row.noise.cwiseAbs2().cwiseMax(1e-300).cwiseInverse());
   }
+  const double few = widened_by_few(n + 1);
   std::array<Residuals, 3> off;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Whitener white(X, y.col(i), number);
@@ -138,7 +148,8 @@ void fit_sums(const PoseInput& input, const std::vector<const TurnRow*>& rows, b
     const Eigen::VectorXd left = y.col(i) - r.value(1) * X.col(1);
     off[static_cast<std::size_t>(i)] = residuals_of(left.tail(n) - left.head(n));
     axis.response(i) = r.value(1) * input.gyro_unit;
-    axis.sigma(i) = r.sigma(1) * input.gyro_unit * off[static_cast<std::size_t>(i)].widening;
+    const double by_residuals = r.sigma(1) * few * off[static_cast<std::size_t>(i)].widening;
+    axis.sigma(i) = input.gyro_unit * std::max(by_residuals, 1.0 / std::sqrt(information(i)));
   }
   Eigen::Index along = 0;
   axis.response.cwiseAbs().maxCoeff(&along);
@@ -152,9 +163,7 @@ void axes_from_turns(const PoseInput& input, const std::vector<TurnRow>& rows, R
   for (const bool outer : {true, false}) {
     std::vector<const TurnRow*> of_axis;
     for (const TurnRow& row : rows) {
-      constexpr double alone = 0.02;
-      const double turn = outer ? row.outer : row.inner, other = outer ? row.inner : row.outer;
-      if (turn != 0.0 && std::abs(other) < alone * std::abs(turn)) {
+      if (outer ? row.about_outer() : row.about_inner()) {
         of_axis.push_back(&row);
       }
     }
@@ -220,12 +229,13 @@ std::optional<ReadOutAxis> axis_from_rates(const PoseInput& input, const std::ve
     return std::nullopt;
   }
   const auto [X, y] = weighted(rows);
+  const double few = widened_by_few(X.rows());
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Regression r = regress(X, y.col(i));
     answer.gyro_bias(i) = r.value(0);
-    answer.gyro_bias_sigma(i) = r.sigma(0);
+    answer.gyro_bias_sigma(i) = r.sigma(0) * few;
     axis.response(i) = r.value(1) * input.gyro_unit;
-    axis.sigma(i) = r.sigma(1) * input.gyro_unit;
+    axis.sigma(i) = r.sigma(1) * few * input.gyro_unit;
   }
   // Along the response: the part that grows with the rate, in both directions alike.
   const Eigen::VectorXd along = y * axis.response.normalized();
@@ -233,9 +243,9 @@ std::optional<ReadOutAxis> axis_from_rates(const PoseInput& input, const std::ve
   const Regression plain = regress(X, along), with = regress(joined(X, square), along);
   if (with.rank == 3 && y.rows() > 4) {
     axis.log_p_nonlinear = log_p_of(plain, with, y.rows());
-    axis.nonlinearity =
-        PoseParameter{"nonlinearity", "s/rad", with.value(2) * input.gyro_unit / axis.response.norm(),
-                      with.sigma(2) * input.gyro_unit / axis.response.norm(), axis.log_p_nonlinear < std::log(alpha)};
+    axis.nonlinearity = PoseParameter{"nonlinearity", "s/rad", with.value(2) * input.gyro_unit / axis.response.norm(),
+                                      with.sigma(2) * few * input.gyro_unit / axis.response.norm(),
+                                      axis.log_p_nonlinear < std::log(alpha)};
   }
   return axis;
 }
@@ -281,10 +291,11 @@ std::optional<ReadOutClock> clock_of(const std::vector<Delay>& delays, double du
     y(k) = d.delay_s;
   }
   const Regression r = regress(X, y);
+  const double few = widened_by_few(n);
   clock.delay_s = r.value(0);
-  clock.delay_sigma_s = std::hypot(r.sigma(0), 0.5 * interval_s);
+  clock.delay_sigma_s = std::hypot(r.sigma(0) * few, 0.5 * interval_s);
   clock.growth_s = r.value(1);
-  clock.growth_sigma_s = r.sigma(1);
+  clock.growth_sigma_s = r.sigma(1) * few;
   clock.faster = -clock.growth_s / duration_s;  // what the read-outs show at a second happens 1 + this by the log
   clock.faster_sigma = clock.growth_sigma_s / duration_s;
   clock.least_s = y.minCoeff();
@@ -361,14 +372,16 @@ void add_oscillation(const PoseInput& input, double interval_s, ReadOuts& answer
 
 }  // namespace
 
-std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses, double alpha) {
+std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses,
+                                        const std::vector<Clipping>& clipped, double alpha) {
   if (input.outer.size() != input.time_s.size() || input.inner.size() != input.time_s.size()) {
     return std::nullopt;
   }
   ReadOuts answer;
   const std::vector<Stop> stops = find_stops(input, poses);
-  const std::vector<TurnRow> rows = kept_rows(turns_between(input, poses, stops), answer.disagreeing);
-  const std::vector<SteadyRate> rates = find_steady_rates(input);
+  const std::vector<TurnRow> rows =
+      kept_rows(turns_between(input, poses, stops, clipped, answer.clipped_turns), answer.disagreeing);
+  const std::vector<SteadyRate> rates = find_steady_rates(input, clipped, answer.clipped_rates);
   axes_from_turns(input, rows, answer);
   for (const bool outer : {true, false}) {
     axes_from_rates(input, rates, poses, outer, alpha, answer);
@@ -393,10 +406,11 @@ std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vecto
   return answer;
 }
 
-std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses, double alpha,
+std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses,
+                                     const std::vector<Clipping>& clipped, double alpha,
                                      std::vector<std::string>& invisible) {
   constexpr double another = 1.5, deviations = 5.0;
-  std::optional<ReadOuts> answer = judge_read_outs(input, poses, alpha);
+  std::optional<ReadOuts> answer = judge_read_outs(input, poses, clipped, alpha);
   for (const ReadOutAxis& axis : answer&& input.gyros_si ? answer->axes : std::vector<ReadOutAxis>{}) {
     const double gain = axis.response.norm();
     if ((gain > another || gain < 1.0 / another) && std::abs(gain - 1.0) > deviations * axis.sigma.norm()) {

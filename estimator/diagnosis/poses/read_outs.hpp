@@ -17,10 +17,13 @@
 namespace selfcal::diagnosis {
 
 // nullopt: there are no read-outs, or no turn that they and the gyros show.
-std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses, double alpha);
+// `clipped`: the ends of ranges that are reached; turns and rates in which a gyro stands there tell nothing of it.
+std::optional<ReadOuts> judge_read_outs(const PoseInput& input, const std::vector<Pose>& poses,
+                                        const std::vector<Clipping>& clipped, double alpha);
 
 // None where the gyros, whose unit is known, turn by another size than the read-outs: nothing follows from them then, and `invisible` tells it.
-std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses, double alpha,
+std::optional<ReadOuts> read_outs_of(const PoseInput& input, const std::vector<Pose>& poses,
+                                     const std::vector<Clipping>& clipped, double alpha,
                                      std::vector<std::string>& invisible);
 
 }  // namespace selfcal::diagnosis

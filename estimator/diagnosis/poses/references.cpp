@@ -66,6 +66,32 @@ double gravity_turned(const ImuData& data) {
   return largest;
 }
 
+// The largest angle that the gyros turn without a second of rest, beside their usual rate. A base that sways turns back. rad.
+double gyros_turned(const ImuData& data) {
+  const auto window = static_cast<std::size_t>(std::max(4.0, data.sample_rate_hz));
+  std::vector<Vector3> turns;  // of a second
+  for (std::size_t first = 0; first + window <= data.size(); first += window) {
+    turns.emplace_back(Vector3::Zero());
+    for (std::size_t i = first; i < first + window; ++i) {
+      turns.back() += Eigen::Map<const Vector3>(data.delta_theta[i].data());
+    }
+  }
+  Vector3 usual = Vector3::Zero();
+  for (Eigen::Index axis = 0; axis < 3 && !turns.empty(); ++axis) {
+    std::vector<double> of_axis(turns.size());
+    std::transform(turns.begin(), turns.end(), of_axis.begin(), [axis](const Vector3& turn) { return turn(axis); });
+    usual(axis) = median(std::move(of_axis));
+  }
+  constexpr double rests = 1.0 * units::degree;
+  double largest = 0.0;
+  Vector3 run = Vector3::Zero();
+  for (const Vector3& turn : turns) {
+    run = (turn - usual).norm() > rests ? Vector3(run + turn - usual) : Vector3::Zero();
+    largest = std::max(largest, run.norm());
+  }
+  return largest;
+}
+
 }  // namespace
 
 PositionReference position_reference(const ImuData& data) {
@@ -83,6 +109,11 @@ PositionReference position_reference(const ImuData& data) {
   if (turned > much && read_outs_rest(data)) {
     return {false, sentence("gravity turns by %.0f deg in the sensor and no read-out leaves %.0f: a hand moved it",
                             turned / units::degree, 0.0)};
+  }
+  constexpr double about_up = 30.0 * units::degree;
+  if (const double heading = gyros_turned(data); heading > about_up && read_outs_rest(data)) {
+    return {false, sentence("the gyros turn by %.0f deg at once and no read-out leaves %.0f: a hand moved it",
+                            heading / units::degree, 0.0)};
   }
   return {};
 }

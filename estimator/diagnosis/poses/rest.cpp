@@ -6,6 +6,8 @@
 
 #include "estimator/diagnosis/poses/pose_quantum.hpp"
 #include "estimator/diagnosis/poses/rest_drift.hpp"
+#include "estimator/diagnosis/poses/rest_swing.hpp"
+#include "estimator/diagnosis/poses/rest_tilt.hpp"
 #include "estimator/geometry/units.hpp"
 
 namespace selfcal::diagnosis {
@@ -62,6 +64,18 @@ void add_allan(const std::vector<RestNoise>& noise, RestAxis& a) {
   a.white_asd = std::isfinite(white) ? white : 0.0;
   a.instability = std::isfinite(least) ? least : 0.0;
   a.instability_is_bound = a.instability_tau_s == longest;
+}
+
+// What swings stands in the Allan deviation at all times, and would be told as white noise.
+void add_swing(const PoseInput& input, const std::vector<Pose>& poses, RestAxis& a) {
+  constexpr double counts = 1.3;
+  const auto swing =
+      find_swing(a.gyro ? input.gyro : input.accel, static_cast<std::size_t>(a.axis), sample_rate(input), poses);
+  if (swing) {
+    a.swing = swing->amplitude;
+    a.swing_hz = swing->frequency_hz;
+    a.white_asd = a.white_asd > counts * swing->white_asd ? swing->white_asd : a.white_asd;
+  }
 }
 
 std::string with_number(const char* format, double value) {
@@ -147,9 +161,13 @@ std::optional<Rest> judge_rest(const PoseInput& input, const std::vector<Pose>& 
       rest.axes.push_back(a);
     }
   }
+  for (RestAxis& a : rest.axes) {
+    add_swing(input, poses, a);
+  }
   constexpr double of_promised =
       0.5;  // the noise is of no grid: half of what is promised, as in the diagnosis elsewhere
   judge_drift(blocks, of_promised * alpha, rest.axes);
+  judge_tilt(input, poses, blocks, rest);
   for (RestAxis& a : rest.axes) {
     add_quantum(input, poses, a);
     if (a.gyro || std::abs(a.mean) < 0.1 * blocks.accel.row(0).norm()) {  // a scale factor shows where gravity acts

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/diagnosis/effects/effect.hpp"
+#include "estimator/diagnosis/noise/base_tilt.hpp"
 
 namespace selfcal::diagnosis {
 
@@ -40,7 +41,16 @@ struct RestTerm {
   double log_p = 0.0;                  // corrected for axes, equations and time constants
   double share = 0.0;                  // of the square of the blocks' means about their mean
   std::vector<RestAmplitude> as_well;  // each in its place: explain the log as well
-  std::vector<std::string> twins;      // ids of equations that are this one as long as nothing turns
+  // Of an accelerometer: whether the base may have tilted instead (rest_tilt.hpp). One that was seen to is no term.
+  enum class Tilt { none, open, excluded, seen } tilt = Tilt::none;
+  double tilt_angle = 0.0;         // rad, of a jump
+  std::vector<std::string> twins;  // ids of equations that are this one as long as nothing turns
+};
+
+// The base tilted at once, as gravity and gyros both show.
+struct RestTilt {
+  double time_s = 0.0, angle = 0.0;  // rad, by gravity
+  double share = 0.0, sigma = 0.0;   // of it, by the gyros
 };
 
 struct RestAxis {
@@ -53,6 +63,7 @@ struct RestAxis {
   bool instability_is_bound = false;    // it falls to the longest time there is
   double walk = NAN, walk_sigma = NAN;  // raw / sqrt(s); NaN: not seen
   double quantum = 0.0;                 // raw; 0: finer than the noise
+  double swing = 0.0, swing_hz = 0.0;   // amplitude, raw, of a line or a motion; 0: none that white noise does not make
   double rms = 0.0, rms_left = 0.0;     // of the blocks' means, without the equations and beside them
   std::vector<RestTerm> terms;
 };
@@ -65,6 +76,8 @@ struct Rest {
   std::optional<double> coldest, warmest;  // degC, of the blocks; of a channel that moves by more than its noise
   bool has_channel = false;
   std::vector<RestAxis> axes;
+  std::vector<RestTilt> tilts;
+  std::optional<BaseTilt> base_tilt;  // slowly, likewise
 };
 
 // nullopt: less than 5 blocks rest. `noise` of both triads in `d` is used.

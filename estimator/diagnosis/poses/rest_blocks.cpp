@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/geometry/units.hpp"
+
 namespace selfcal::diagnosis {
 namespace {
 
@@ -54,6 +56,23 @@ bool moves(const Eigen::VectorXd& temperature) {
          deviation(temperature) > std::max(least, times * noise_of(temperature));
 }
 
+// Of each pose the first one of which it is the same stand: only a gap of the log lies between, in which the direction of gravity stayed. What
+// stood elsewhere in between has a mean of its own.
+std::vector<std::size_t> stands(const PoseInput& input, const std::vector<Pose>& poses) {
+  constexpr double longest_s = 60.0, turned = 0.2 * units::degree;
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    all.push_back(k);
+    if (k == 0 || poses[k].part == poses[k - 1].part || input.sensors == Sensors::gyros) {
+      continue;
+    }
+    const double away_s = input.time_s[poses[k].first] - input.time_s[poses[k - 1].last - 1];
+    const double off = poses[k].accel.normalized().cross(poses[k - 1].accel.normalized()).norm();
+    all[k] = away_s < longest_s && off < turned ? all[k - 1] : k;
+  }
+  return all;
+}
+
 }  // namespace
 
 RestBlocks rest_blocks(const PoseInput& input, const std::vector<Pose>& poses) {
@@ -67,9 +86,11 @@ RestBlocks rest_blocks(const PoseInput& input, const std::vector<Pose>& poses) {
   }
   r.times.block_s = std::max({least_s, whole / most_blocks, least_samples / rate_hz});
   r.duration_s = input.time_s.back() - input.time_s.front();
+  const std::vector<std::size_t> stand = stands(input, poses);
+  r.stand = stand[r.longest];
   std::vector<Block> all;
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    add_blocks_of(input, poses[k], k, r.times.block_s, rate_hz, all);
+    add_blocks_of(input, poses[k], stand[k], r.times.block_s, rate_hz, all);
   }
   const auto n = static_cast<Eigen::Index>(all.size());
   r.gyro.resize(n, 3);
@@ -88,7 +109,7 @@ RestBlocks rest_blocks(const PoseInput& input, const std::vector<Pose>& poses) {
     r.times.middle_s(i) = b.middle_s - input.time_s.front();
     r.times.weight(i) = b.count / (r.times.block_s * rate_hz);
     r.pose.push_back(b.pose);
-    if (b.pose == r.longest) {
+    if (b.pose == r.stand) {
       of_longest.push_back(r.times.middle_s(i));
     }
   }

@@ -208,7 +208,7 @@ Table table_of_constants(const RestBlocks& blocks) {
   Table t;
   t.stands = blocks.pose;
   t.stands.erase(std::unique(t.stands.begin(), t.stands.end()), t.stands.end());
-  std::stable_partition(t.stands.begin(), t.stands.end(), [&](std::size_t p) { return p == blocks.longest; });
+  std::stable_partition(t.stands.begin(), t.stands.end(), [&](std::size_t p) { return p == blocks.stand; });
   t.columns = Eigen::MatrixXd::Zero(blocks.rows(), static_cast<Eigen::Index>(t.stands.size()));
   for (std::size_t p = 0; p < t.stands.size(); ++p) {
     for (Eigen::Index i = 0; i < blocks.rows(); ++i) {

@@ -6,6 +6,7 @@
 
 #include "estimator/diagnosis/effects/catalogue.hpp"
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -178,22 +179,46 @@ void Equations::add_of_temperature() {
   }
 }
 
-// Between two blocks of one pose that have three beside them on either side: a block alone is no jump.
+// Of a block the part that is before a jump within it, by its mean between those of `side` blocks on either side: 0 to 1. Axes weigh as the
+// differences of neighbours are small.
+double before_jump(const Eigen::MatrixXd& readings, Eigen::Index block, Eigen::Index side) {
+  const Eigen::Index n = readings.rows();
+  double along = 0.0, square = 0.0;
+  for (Eigen::Index axis = 0; axis < readings.cols(); ++axis) {
+    const Eigen::VectorXd y = readings.col(axis);
+    std::vector<double> steps(static_cast<std::size_t>(n - 1));
+    for (Eigen::Index k = 0; k + 1 < n; ++k) {
+      steps[static_cast<std::size_t>(k)] = std::abs(y(k + 1) - y(k));
+    }
+    const double noise = median(std::move(steps));
+    if (noise > 0.0) {
+      const double early = y.segment(block - side, side).mean(), late = y.segment(block + 1, side).mean();
+      along += (late - early) * (late - y(block)) / (noise * noise);
+      square += (late - early) * (late - early) / (noise * noise);
+    }
+  }
+  return square > 0.0 ? std::clamp(along / square, 0.0, 1.0) : 0.0;
+}
+
+// Within or at the ends of a block that has three beside it on either side in one stand: a block alone is no jump. Where in the block follows
+// from its mean.
 void Equations::add_jump() {
   constexpr Eigen::Index least = 3;
   const auto pose = [&](Eigen::Index i) { return blocks_.pose[static_cast<std::size_t>(i)]; };
   RestCandidate c;
   std::vector<Eigen::VectorXd> columns;
-  for (Eigen::Index i = least; i + least <= blocks_.rows(); ++i) {
-    if (pose(i - least) == pose(i + least - 1)) {
+  for (Eigen::Index i = least; i + least < blocks_.rows(); ++i) {
+    if (pose(i - least) == pose(i + least)) {
+      const double before = before_jump(gyro_ ? blocks_.gyro : blocks_.accel, i, least);
       Eigen::VectorXd step = Eigen::VectorXd::Zero(blocks_.rows());
-      for (Eigen::Index k = i; k < blocks_.rows(); ++k) {
+      step(i) = 1.0 - before;
+      for (Eigen::Index k = i + 1; k < blocks_.rows(); ++k) {
         step(k) = pose(k) == pose(i) ? 1.0 : 0.0;
       }
       double length = 0.0;
       columns.push_back(centred(step, length));
       c.length.push_back(length);
-      c.constant.push_back(0.5 * (blocks_.times.middle_s(i - 1) + blocks_.times.middle_s(i)));
+      c.constant.push_back(blocks_.times.middle_s(i) + (before - 0.5) * blocks_.times.block_s);
     }
   }
   if (columns.empty()) {
@@ -212,7 +237,8 @@ void Equations::add_jump() {
                 false,
                 true};
   c.apart_s = blocks_.times.block_s;
-  c.tests = worth(c.columns);
+  constexpr double where = 2.0;  // in its block: half a degree of freedom and more
+  c.tests = where * worth(c.columns);
   all.push_back(std::move(c));
 }
 
