@@ -107,6 +107,20 @@ std::string what_decides(const PoseDiagnosis& d) {
              : std::string();
 }
 
+// What comes nearest to a misfit of the accelerometers, with its largest coefficient where it has one in mg.
+std::string nearest_words(const PoseEffect& e) {
+  std::string words = fmt::format(", nearest {} (log10 p {:.1f})", e.effect->id, log10_of(e.log_p));
+  const std::string& unit = e.effect->parameters.front().unit;
+  const auto largest =
+      std::max_element(e.value.begin(), e.value.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+  if (largest != e.value.end() && unit.starts_with("ug")) {
+    const auto k = static_cast<std::size_t>(largest - e.value.begin());
+    words += fmt::format(", most in {}: {}", e.parameters[k],
+                         with_sigma(1e3 * e.value[k], 1e3 * e.sigma[k], "mg" + unit.substr(2)));
+  }
+  return words;
+}
+
 std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
   std::string text;
   for (const PoseEffect& e : d.gyro_named) {
@@ -128,10 +142,7 @@ std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
                                  from_pose, to_pose, from_s, to_s, cell(1e3 * size.x(), 1e3 * sigma.x()),
                                  cell(1e3 * size.y(), 1e3 * sigma.y()), cell(1e3 * size.z(), 1e3 * sigma.z())));
   } else if (d.by_poses && !d.accel_adequate) {
-    const std::string near = d.accel_tried.empty()
-                                 ? std::string()
-                                 : fmt::format(", nearest {} (log10 p {:.1f})", d.accel_tried.front().effect->id,
-                                               log10_of(d.accel_tried.front().log_p));
+    const std::string near = d.accel_tried.empty() ? std::string() : nearest_words(d.accel_tried.front());
     text += lines_of("misfit:", fmt::format("bias, scale and misalignment of the accelerometers leave {:.2f} mg rms{}",
                                             1e3 * d.accel_rms_g, near));
   }

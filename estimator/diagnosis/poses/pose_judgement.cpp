@@ -16,13 +16,6 @@ bool has(const std::vector<PoseEffect>& list, const Effect* effect) {
   return std::any_of(list.begin(), list.end(), [effect](const PoseEffect& p) { return p.effect == effect; });
 }
 
-const Effect& measured_gyro_temperature() {
-  const std::vector<Effect>& all = catalogue();
-  return *std::find_if(all.begin(), all.end(), [](const Effect& effect) {
-    return effect.id == "gyro_temperature" && effect.temperature == TemperatureUse::measured;
-  });
-}
-
 void best_first(std::vector<PoseEffect>& all) {
   std::stable_sort(all.begin(), all.end(), [](const PoseEffect& a, const PoseEffect& b) { return a.log_p < b.log_p; });
 }
@@ -87,15 +80,19 @@ class Gyros {
 };
 
 bool Gyros::follow_temperature(const Eigen::MatrixXd& of_parts, double log_limit) const {
-  const Effect& measured = measured_gyro_temperature();
   if (!has_temperature_) {
     return false;
   }
   double log_p = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const Trial trial = trial_of(measured, NAN, poses_, duration_s_, axis);
-    log_p = std::min(log_p, compare(joined(known_[i], trial.columns), of_parts, y_[i], time_s_, true).log_p);
+    Eigen::MatrixXd known = known_[i];
+    for (const Effect& effect : catalogue()) {
+      if (effect.temperature == TemperatureUse::measured && acts_on(effect, true, true)) {
+        known = joined(known, trial_of(effect, NAN, poses_, duration_s_, axis).columns);
+      }
+    }
+    log_p = std::min(log_p, compare(known, of_parts, y_[i], time_s_, true).log_p);
   }
   return log_corrected(log_p, 3.0) > log_limit;
 }

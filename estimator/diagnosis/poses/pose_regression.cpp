@@ -159,7 +159,9 @@ Regression regress(const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
   Eigen::VectorXd length = columns.colwise().norm();
   length = (length.array() > 0.0).select(length, 1.0);
   const Eigen::MatrixXd X = columns * length.cwiseInverse().asDiagonal();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(X);
+  constexpr double dependent = 1e-10;  // of a column: that three products of a direction add up is rounded
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(dependent).compute(X);
   Regression r;
   r.rank = qr.rank();
   const Eigen::VectorXd scaled = qr.solve(y);
@@ -172,8 +174,9 @@ Regression regress(const Eigen::MatrixXd& columns, const Eigen::VectorXd& y) {
   r.held_out_rms = std::sqrt((e.array() / (1.0 - leverage).max(1e-9)).square().mean());
   const double variance = r.square / static_cast<double>(std::max<Eigen::Index>(1, y.size() - r.rank));
   const Eigen::MatrixXd G = X.transpose() * X;
-  const Eigen::VectorXd square =
-      (G.completeOrthogonalDecomposition().pseudoInverse().diagonal() * variance).cwiseMax(0.0);
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> inverse;
+  inverse.setThreshold(dependent * dependent).compute(G);
+  const Eigen::VectorXd square = (inverse.pseudoInverse().diagonal() * variance).cwiseMax(0.0);
   r.value = scaled.cwiseQuotient(length);
   r.sigma = square.cwiseSqrt().cwiseQuotient(length);
   return r;
