@@ -212,11 +212,19 @@ class Together {
     constexpr double all_of_it = 0.98;
     std::vector<bool> own(all.terms.size(), false);
     for (std::size_t k = 0; k < own.size() && !of_laws_.stop.stop_requested(); ++k) {
+      const auto may_make = [&](const UnitEffect& effect) {
+        return (effect.effect->triad == diagnosis::Triad::gyro) == (all.terms[k].axis < 3) &&
+               !std::isnan(effect.on.front().constant);
+      };
+      if (std::none_of(rest.effects().begin(), rest.effects().end(), may_make)) {
+        continue;
+      }
       const auto row = static_cast<Eigen::Index>(k);
       const CatalogueReach reach(rest.recordings().front(), {all.terms[k]}, all.coefficient.segment(row, 1),
                                  of_laws_.stop);
-      own[k] = std::any_of(rest.effects().begin(), rest.effects().end(),
-                           [&](const UnitEffect& effect) { return reach.largest_share(*effect.effect) >= all_of_it; });
+      own[k] = std::any_of(rest.effects().begin(), rest.effects().end(), [&](const UnitEffect& effect) {
+        return may_make(effect) && reach.largest_share(*effect.effect) >= all_of_it;
+      });
     }
     if (std::none_of(own.begin(), own.end(), [](bool is) { return is; })) {
       return false;

@@ -330,6 +330,10 @@ class Guesser {
       } else if (said.unit.empty() && fit->off > nearness(triad_columns(values_, *roles_.gyro))) {
         doubt("gyro.unit", fmt::format("{} within {:.1f} %; what a count of an instrument means may be as near",
                                        fit->unit, 100.0 * std::expm1(fit->off)));
+      } else if (constexpr double much = 0.05; fit->off > much) {
+        doubt("gyro.unit",
+              fmt::format("{}, but the turns show {:.1f} % of another size: rows that are lost in turns, or the time",
+                          fit->unit, 100.0 * std::expm1(fit->off)));
       } else if (said.unit.empty() && is_doubted("time")) {
         doubt("gyro.unit", fmt::format("{} follows from the time, which is doubted", fit->unit));
       }

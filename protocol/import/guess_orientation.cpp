@@ -182,7 +182,9 @@ class Finder {
       return;
     }
     if (!fit || fit->explained < fair_turns || !gravity_turns()) {
-      const char* why = quick.turns ? "what turns does not show in the accelerometers" : "nothing turns";
+      const char* why = quick.turns       ? "what turns does not show in the accelerometers"
+                        : gravity_turns() ? "no turn stands out of what moves"
+                                          : "nothing turns";
       doubt("gyro.axes", fmt::format("taken as they stand; {}, so that order and signs cannot be checked", why));
       if (quick.turns && !out_.moves && !in_.on_a_table) {
         doubt("gimbal", "the gyros show turns and gravity none: disturbed, or turned about the vertical");

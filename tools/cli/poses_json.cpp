@@ -315,12 +315,14 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d) {
           {"invisible", d.invisible}};
 }
 
+bool names_nonlinearity(const diagnosis::PoseDiagnosis& d) {
+  return d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
+                                    [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
+}
+
 bool poses_mismatch(const diagnosis::PoseDiagnosis& d) {
-  const bool nonlinear =
-      d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
-                                 [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
   return !d.accel_adequate || !d.gyros_contradict.empty() || !d.accel_named.empty() || !d.gyro_named.empty() ||
-         d.settling.has_value() || nonlinear ||
+         d.settling.has_value() || names_nonlinearity(d) ||
          (d.dividing_head && (d.dividing_head->third || d.dividing_head->drift)) || (d.rest && drifts(*d.rest));
 }
 

@@ -14,6 +14,8 @@ nlohmann::ordered_json poses_json(const diagnosis::PoseDiagnosis& d);
 // factors, in some ten lines of 80 columns; the details have every test and every parameter.
 std::string poses_summary(const diagnosis::PoseDiagnosis& d, bool si);
 std::string poses_details(const diagnosis::PoseDiagnosis& d, bool si);
+// Whether a rate table shows that a scale factor changes with the rate.
+bool names_nonlinearity(const diagnosis::PoseDiagnosis& d);
 // Whether something is there that bias, scale and misalignment do not hold.
 bool poses_mismatch(const diagnosis::PoseDiagnosis& d);
 

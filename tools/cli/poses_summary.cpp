@@ -169,10 +169,7 @@ std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {
         "all accelerometers, as the Earth's rate shows: they read acceleration, or the axes of both triads are "
         "a mirror image, as where one of an order or sign was made to fit; or the latitude has the other sign");
   }
-  const bool by_table =
-      d.read_outs && std::any_of(d.read_outs->axes.begin(), d.read_outs->axes.end(),
-                                 [](const auto& a) { return a.nonlinearity && a.nonlinearity->determined; });
-  if (text.empty() && d.by_poses && !by_table) {
+  if (text.empty() && d.by_poses && !names_nonlinearity(d)) {
     text = d.accel_tested || d.sensors == Sensors::accelerometers
                ? "nothing named beyond bias, scale factor and misalignment\n"
                : "nothing named; nonlinearity of the accelerometers is not tested by these poses\n";

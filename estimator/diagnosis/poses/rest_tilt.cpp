@@ -47,16 +47,22 @@ class Tilts {
     return std::abs(up_(axis)) < upright;
   }
 
+  // By sums over a second: a log of hours at 1 kHz is not held twice.
   std::optional<BaseTilt> course() const {
     std::vector<std::array<double, 3>> angle, velocity;
     const double rate_hz = sample_rate(input_);
-    for (std::size_t i = longest_.first; i < longest_.last; ++i) {
-      const Vector3 turn = at(input_.gyro, i) * input_.gyro_unit / rate_hz, push = at(input_.accel, i) / rate_hz;
+    const auto samples = static_cast<std::size_t>(std::max(1.0, std::floor(rate_hz)));
+    for (std::size_t first = longest_.first; first + samples <= longest_.last; first += samples) {
+      Vector3 turn = Vector3::Zero(), push = Vector3::Zero();
+      for (std::size_t i = first; i < first + samples; ++i) {
+        turn += at(input_.gyro, i) * (input_.gyro_unit / rate_hz);
+        push += at(input_.accel, i) / rate_hz;
+      }
       angle.push_back({turn.x(), turn.y(), turn.z()});
       velocity.push_back({push.x(), push.y(), push.z()});
     }
     ImuData data;
-    data.sample_rate_hz = rate_hz;
+    data.sample_rate_hz = rate_hz / static_cast<double>(samples);
     data.delta_theta = angle;
     data.delta_v = velocity;
     return base_tilt(data, {{.last = angle.size()}});

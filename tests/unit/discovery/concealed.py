@@ -32,10 +32,10 @@ def effect(name, **keys):
     return f'[[effect]]\nid = "{name}"\n' + "".join(f"{k} = {json.dumps(v)}\n" for k, v in keys.items())
 
 
-def answer(name, text, *arguments, seed=23):
+def answer(name, text, *arguments, seed=23, dwell_s=None):
     """The document of a diagnosis of a recording in which the law is concealed."""
     (folder / f"{name}.toml").write_text(text)
-    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", str(seed), "-o", f"{name}.h5", "--truth", f"{name}.json")
+    run("simulate", "--config", "sim.toml", "--physics", f"{name}.toml", "--seed", str(seed), *(("--dwell", str(dwell_s)) if dwell_s else ()), "-o", f"{name}.h5", "--truth", f"{name}.json")
     return json.loads(run("diagnose", f"{name}.h5", "--json", *arguments, statuses=(0, 1)))
 
 
