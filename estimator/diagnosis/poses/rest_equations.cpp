@@ -89,10 +89,11 @@ double worth(const Eigen::MatrixXd& columns) {
 
 // From a fiftieth of the log to three quarters of it: shorter ones leave few blocks, longer ones are ramps.
 std::vector<double> time_constants(double duration_s) {
-  constexpr double from = 0.02, to = 0.75, step = 1.26;
-  std::vector<double> all;
-  for (double share = from; share < to; share *= step) {
-    all.push_back(share * duration_s);
+  constexpr double from = 0.02, step = 1.26;
+  constexpr std::size_t steps = 16;
+  std::vector<double> all = {from * duration_s};
+  while (all.size() < steps) {
+    all.push_back(step * all.back());
   }
   return all;
 }

@@ -108,9 +108,9 @@ std::optional<Swing> find_swing(const std::vector<std::array<double, 3>>& series
     return std::nullopt;
   }
   double white = HUGE_VAL;
-  constexpr double lowest = 1.0 / 16.0, highest = 2.0, octave = 2.0;
-  for (double f = lowest; f < highest; f *= octave) {
-    white = std::min(white, level_of(*s, f, octave * f));
+  constexpr double octave = 2.0;
+  for (const double from_hz : {1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0}) {
+    white = std::min(white, level_of(*s, from_hz, octave * from_hz));
   }
   const auto first = static_cast<Eigen::Index>(std::ceil(std::max(least_hz, 3.0 * s->bin_hz) / s->bin_hz));
   if (!(white > 0.0) || !std::isfinite(white) || first + 1 >= s->density.size()) {

@@ -51,7 +51,8 @@ TEST(QuantumBeat, LinesOfCountsAreBeats) {
     const double rate = quantum * std::uniform_real_distribution<double>(0.3, 60.0)(engine);
     const std::vector<double> rates = counted(rate);
     int lines = 0, told = 0;
-    for (double f = 0.5; f < 20.0; f += step_hz) {
+    for (int step = 50; step < 2000; ++step) {
+      const double f = step * step_hz;
       const double amplitude = amplitude_at(rates, f);
       const bool beat = beat_of_quantum({rate, 0.0, quantum, sample_rate_hz}, f, seen, width_hz);
       told += beat ? 1 : 0;
