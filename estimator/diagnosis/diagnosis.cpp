@@ -302,15 +302,10 @@ void Diagnoser::judge_noise_alone() {
   d_.sigma = d_.calibration.sigma;
 }
 
-// Not even noise.
-bool stands_at_one_value(std::span<const std::array<double, 3>> increments) {
-  return std::all_of(increments.begin(), increments.end(), [&](const auto& one) { return one == increments.front(); });
-}
-
 DiagnosisOutcome Diagnoser::run() {
   say("data");
-  if (stands_at_one_value(data_.delta_theta) && stands_at_one_value(data_.delta_v)) {
-    return {std::nullopt, "all axes stand at one value throughout: no readings of a sensor"};
+  if (std::string none = no_readings(data_.delta_theta, data_.delta_v); !none.empty()) {
+    return {std::nullopt, std::move(none)};
   }
   if (data_.coasts.empty()) {  // else they were found and left out
     d_.faults = find_data_faults(data_);

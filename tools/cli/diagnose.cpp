@@ -308,7 +308,7 @@ Expected<int> diagnose_by_poses(const DiagnoseArguments& arguments, const Opened
 
 // Accelerometers of a cheap sensor are off by some per cent of g, and a logger faster than the sensor writes each sample twice: of a log
 // that stands no fault, and no reason to say nothing of it.
-bool off_at_rest(const diagnosis::Diagnosis& diagnosis, const Recording& recording) {
+bool harmless_at_rest(const diagnosis::Diagnosis& diagnosis, const Recording& recording) {
   Vector3 sum = Vector3::Zero();
   for (const std::array<double, 3>& v : recording.delta_v_mps) {
     sum += Vector3(v[0], v[1], v[2]);
@@ -346,7 +346,7 @@ Expected<int> diagnose(const DiagnoseArguments& arguments) {
     return fail(ErrorKind::bad_input, fmt::format("{}: {}", arguments.recording, outcome.failure));
   }
   diagnosis::Diagnosis& diagnosis = *outcome.diagnosis;
-  if (!diagnosis.faults.empty() && off_at_rest(diagnosis, (*opened)->loaded.recording)) {
+  if (!diagnosis.faults.empty() && harmless_at_rest(diagnosis, (*opened)->loaded.recording)) {
     return diagnose_by_poses(arguments, **opened, diagnosis.faults.front().words);
   }
   if (!diagnosis.faults.empty()) {

@@ -67,8 +67,8 @@ std::string per_what(const diagnosis::Effect& effect) {
   return per == "/h" ? "/s" : per;
 }
 
-// One line an effect: its id, how sure, and its largest coefficient.
-std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit, const std::string& unit_name) {
+// Its id, how sure, and its largest coefficient.
+std::string effect_words(const PoseEffect& e, double unit, const std::string& unit_name) {
   std::size_t largest = 0;
   for (std::size_t k = 0; k < e.value.size(); ++k) {
     largest = std::abs(e.value[k]) > std::abs(e.value[largest]) ? k : largest;
@@ -78,6 +78,12 @@ std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit
     words += fmt::format(", most in {}: {}", e.parameters[largest],
                          with_sigma(e.value[largest] / unit, e.sigma[largest] / unit, unit_name));
   }
+  return words;
+}
+
+// One line an effect.
+std::string effect_line(const PoseDiagnosis& d, const PoseEffect& e, double unit, const std::string& unit_name) {
+  std::string words = effect_words(e, unit, unit_name);
   std::vector<std::string> rivals = diagnosis::ids_of(e.equivalent);
   if (e.may_be_flicker) {
     rivals.emplace_back("a bias that wanders by itself");
@@ -107,18 +113,12 @@ std::string what_decides(const PoseDiagnosis& d) {
              : std::string();
 }
 
-// What comes nearest to a misfit of the accelerometers, with its largest coefficient where it has one in mg.
+// What comes nearest to a misfit of the accelerometers, with its largest coefficient where that is one in g.
 std::string nearest_words(const PoseEffect& e) {
-  std::string words = fmt::format(", nearest {} (log10 p {:.1f})", e.effect->id, log10_of(e.log_p));
+  constexpr double mg = 1e-3;
   const std::string& unit = e.effect->parameters.front().unit;
-  const auto largest =
-      std::max_element(e.value.begin(), e.value.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  if (largest != e.value.end() && unit.starts_with("ug")) {
-    const auto k = static_cast<std::size_t>(largest - e.value.begin());
-    words += fmt::format(", most in {}: {}", e.parameters[k],
-                         with_sigma(1e3 * e.value[k], 1e3 * e.sigma[k], "mg" + unit.substr(2)));
-  }
-  return words;
+  return ", nearest " + (unit.starts_with("ug") ? effect_words(e, mg, "mg" + unit.substr(2))
+                                                : fmt::format("{} (log10 p {:.1f})", e.effect->id, log10_of(e.log_p)));
 }
 
 std::string findings(const PoseDiagnosis& d, const ReadingUnits& shown) {

@@ -9,6 +9,7 @@
 
 #include "daemon/estimate/quantity_text.hpp"
 #include "estimator/geometry/units.hpp"
+#include "tools/cli/folded_text.hpp"
 
 namespace selfcal::cli {
 namespace {
@@ -19,6 +20,8 @@ using diagnosis::RestAmplitude;
 using diagnosis::RestAxis;
 using diagnosis::RestEquation;
 using diagnosis::RestTerm;
+
+constexpr double arcmin = units::degree / 60.0;
 
 // What readings of an axis are told in: name of the unit, and raw units in one of it.
 struct Unit {
@@ -235,12 +238,11 @@ std::string tilt_text(const Rest& rest) {
 
 // Tilts that gyros and gravity both show.
 std::string motion_text(const Rest& rest) {
-  constexpr double arcmin = units::degree / 60.0;
   std::string text;
   for (const diagnosis::RestTilt& t : rest.tilts) {
-    text +=
-        fmt::format("the base tilts by {:.3g} arcmin at {:.0f} s, and the gyros by {} of it: no error of a sensor\n",
-                    t.angle / arcmin, t.time_s, figure(t.share, t.sigma, 1.0));
+    text += lines_of(
+        "the", fmt::format("base tilts by {:.3g} arcmin at {:.0f} s, and the gyros by {} of it: no error of a sensor",
+                           t.angle / arcmin, t.time_s, figure(t.share, t.sigma, 1.0)));
   }
   if (rest.base_tilt) {
     text += fmt::format("the base tilts to and fro by {:.3g} arcmin, in means of 10 s, as gyros and gravity show\n",
@@ -289,7 +291,6 @@ Json rest_json(const Rest& rest) {
   for (const RestAxis& a : rest.axes) {
     axes.push_back(axis_json(rest, a));
   }
-  constexpr double arcmin = units::degree / 60.0;
   Json tilts = Json::array();
   for (const diagnosis::RestTilt& t : rest.tilts) {
     tilts.push_back({{"at_s", t.time_s},

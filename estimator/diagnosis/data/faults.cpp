@@ -307,6 +307,14 @@ void frozen_axes(const ImuData& data, const std::vector<Segment>& segments, std:
 
 }  // namespace
 
+std::string no_readings(std::span<const std::array<double, 3>> gyro, std::span<const std::array<double, 3>> accel) {
+  const auto never_changes = [](std::span<const std::array<double, 3>> series) {
+    return std::all_of(series.begin(), series.end(), [&](const auto& row) { return row == series.front(); });
+  };
+  return never_changes(gyro) && never_changes(accel) ? "all axes stand at one value throughout: no readings of a sensor"
+                                                     : "";
+}
+
 std::vector<DataFault> find_data_faults(const ImuData& data) {
   std::vector<DataFault> faults;
   ImuData sensors = data;

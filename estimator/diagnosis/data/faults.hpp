@@ -1,6 +1,8 @@
 // Faults of the data themselves, looked for before any physics: what they do to the filter looks like anything.
 #pragma once
 
+#include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,9 @@ struct DataFault {
   // All of it, where it is a fault of a part of the recording; empty: of the whole.
   std::vector<FaultyStretch> stretches = {};
 };
+
+// Empty; or that no reading of either triad ever changes, and not even noise is there.
+std::string no_readings(std::span<const std::array<double, 3>> gyro, std::span<const std::array<double, 3>> accel);
 
 // Each kind at most once, with its first sample and how many there are.
 std::vector<DataFault> find_data_faults(const ImuData& data);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "estimator/diagnosis/data/faults.hpp"
 #include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/statistics/median.hpp"
@@ -85,12 +86,7 @@ double turns_beside_gravity(const PoseInput& input) {
   if (rates.size() < least) {
     return 0.0;
   }
-  Vector3 usual;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::vector<double> all(rates.size());
-    std::transform(rates.begin(), rates.end(), all.begin(), [axis](const Vector3& rate) { return rate(axis); });
-    usual(axis) = median(std::move(all));
-  }
+  const Vector3 usual = median_of_axes(rates);
   std::vector<double> across(rates.size());
   std::transform(
       rates.begin(), rates.end(), up.begin(), across.begin(),
@@ -102,11 +98,8 @@ double turns_beside_gravity(const PoseInput& input) {
 }  // namespace
 
 std::string no_readings(const PoseInput& input) {
-  const auto never_changes = [](const std::vector<std::array<double, 3>>& series) {
-    return std::all_of(series.begin(), series.end(), [&](const auto& row) { return row == series.front(); });
-  };
-  if (never_changes(input.gyro) && never_changes(input.accel)) {
-    return "all axes stand at one value throughout: no readings of a sensor";
+  if (std::string none = no_readings(input.gyro, input.accel); !none.empty()) {
+    return none;
   }
   if (input.sensors == Sensors::gyros || input.accel.size() < 3) {
     return {};

@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/poses/pose_drift.hpp"
 #include "estimator/diagnosis/poses/pose_student.hpp"
 #include "estimator/geometry/units.hpp"
+#include "estimator/statistics/median.hpp"
 
 namespace selfcal::diagnosis {
 namespace {
@@ -237,6 +238,22 @@ double gravity_span_deg(const std::vector<Pose>& poses) {
     }
   }
   return std::acos(std::clamp(least, -1.0, 1.0)) / units::degree;
+}
+
+Vector3 median_of_axes(const std::vector<Vector3>& all) {
+  Vector3 medians;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> values(all.size());
+    std::transform(all.begin(), all.end(), values.begin(), [axis](const Vector3& one) { return one(axis); });
+    medians(axis) = median(std::move(values));
+  }
+  return medians;
+}
+
+Vector3 variance_of_turn(const PoseInput& input, const Pose& from, const Pose& to) {
+  const double length_s = input.time_s[to.first] - input.time_s[from.last - 1];
+  const Vector3 early = from.gyro_white.cwiseAbs2(), late = to.gyro_white.cwiseAbs2();
+  return 0.5 * (early * from.length_s + late * to.length_s) * length_s + 0.25 * (early + late) * length_s * length_s;
 }
 
 }  // namespace selfcal::diagnosis

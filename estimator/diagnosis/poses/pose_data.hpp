@@ -33,6 +33,12 @@ inline double sample_rate(const PoseInput& input) {
 
 Vector3 at(const std::vector<std::array<double, 3>>& series, std::size_t i);
 
+// The median of each axis; there is one vector at least.
+Vector3 median_of_axes(const std::vector<Vector3>& all);
+
+// Variance of what the gyros turn between two poses, raw^2 s^2: their white noise meanwhile, and that of the bias by both.
+Vector3 variance_of_turn(const PoseInput& input, const Pose& from, const Pose& to);
+
 // Gaps, stretches in which an axis is stuck, in which the accelerometers give zero, which gravity never does, or all six axes one value for
 // half a second.
 std::vector<LeftOut> find_left_out(const PoseInput& input, const std::vector<StuckAxis>& stuck);

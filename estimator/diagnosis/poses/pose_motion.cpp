@@ -76,12 +76,9 @@ std::vector<double> forces_of_another_zero(const PoseInput& input, const std::ve
   }
   std::vector<double> forces(stretches.size());
   std::transform(stretches.begin(), stretches.end(), forces.begin(), [&](const Pose& p) { return force_of(input, p); });
-  Vector3 usual;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::vector<double> rates(stretches.size());
-    std::transform(stretches.begin(), stretches.end(), rates.begin(), [&](const Pose& p) { return p.gyro(axis); });
-    usual(axis) = median(std::move(rates));
-  }
+  std::vector<Vector3> rates(stretches.size());
+  std::transform(stretches.begin(), stretches.end(), rates.begin(), [](const Pose& p) { return p.gyro; });
+  const Vector3 usual = median_of_axes(rates);
   const auto rests = static_cast<std::size_t>(std::count_if(stretches.begin(), stretches.end(), [&](const Pose& p) {
     return (p.gyro - usual).cwiseAbs().maxCoeff() * input.gyro_unit < units::degree;  // a centrifuge turns
   }));

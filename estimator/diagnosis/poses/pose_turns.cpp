@@ -210,13 +210,9 @@ void close_parameters(PoseDiagnosis& d) {
 // Of the direction behind a turn, rms over the turns, rad: the noise of the turn and that of the bias by the poses at its ends.
 double by_noise(const PoseInput& input, const std::vector<Pose>& poses, const std::vector<std::size_t>& turns) {
   double square = 0.0;
+  constexpr double across = 2.0 / 3.0;  // of three components
   for (const std::size_t k : turns) {
-    const Pose &from = poses[k], &to = poses[k + 1];
-    const double length_s = input.time_s[to.first] - input.time_s[from.last - 1];
-    const double early = from.gyro_white.squaredNorm(), late = to.gyro_white.squaredNorm();
-    constexpr double across = 2.0 / 3.0;  // of three components
-    square += across * (0.5 * (early * from.length_s + late * to.length_s) * length_s +
-                        0.25 * (early + late) * length_s * length_s);
+    square += across * variance_of_turn(input, poses[k], poses[k + 1]).sum();
   }
   return input.gyro_unit * std::sqrt(square / static_cast<double>(turns.size()));
 }

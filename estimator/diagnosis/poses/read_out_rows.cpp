@@ -123,25 +123,21 @@ std::vector<TurnRow> turns_between(const PoseInput& input, const std::vector<Pos
     if (std::max(std::abs(row.outer), std::abs(row.inner)) < least) {
       continue;
     }
-    if (gyros_clip(input, clipped, poses[a.pose].last, poses[b.pose].first)) {
+    const Pose &from = poses[a.pose], &to = poses[b.pose];
+    if (gyros_clip(input, clipped, from.last, to.first)) {
       ++at_the_end;
       continue;
     }
     row.first = a.middle;
     row.last = b.middle;
-    row.bias = 0.5 * (poses[a.pose].gyro + poses[b.pose].gyro);
+    row.bias = 0.5 * (from.gyro + to.gyro);
     row.turned = Vector3::Zero();  // in a pose nothing turns: its samples would add their noise
-    const Pose &from = poses[a.pose], &to = poses[b.pose];
     row.begins = from.last;
     row.ends = to.first;
     for (std::size_t i = row.begins; i < row.ends; ++i) {
       row.turned += (at(input.gyro, i) - row.bias) * interval(input, i);
     }
-    const double length_s = input.time_s[row.ends] - input.time_s[row.begins - 1];
-    const Vector3 a_second =
-        0.5 * (from.gyro_white.cwiseAbs2() * from.length_s + to.gyro_white.cwiseAbs2() * to.length_s);
-    const Vector3 of_bias = 0.25 * (from.gyro_white.cwiseAbs2() + to.gyro_white.cwiseAbs2());
-    row.noise = (a_second * length_s + of_bias * length_s * length_s).cwiseSqrt();
+    row.noise = variance_of_turn(input, from, to).cwiseSqrt();
     rows.push_back(row);
   }
   return rows;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "estimator/diagnosis/poses/pose_data.hpp"
 #include "estimator/geometry/rotation.hpp"
 #include "estimator/geometry/units.hpp"
 #include "estimator/statistics/median.hpp"
@@ -76,12 +77,7 @@ double gyros_turned(const ImuData& data) {
       turns.back() += Eigen::Map<const Vector3>(data.delta_theta[i].data());
     }
   }
-  Vector3 usual = Vector3::Zero();
-  for (Eigen::Index axis = 0; axis < 3 && !turns.empty(); ++axis) {
-    std::vector<double> of_axis(turns.size());
-    std::transform(turns.begin(), turns.end(), of_axis.begin(), [axis](const Vector3& turn) { return turn(axis); });
-    usual(axis) = median(std::move(of_axis));
-  }
+  const Vector3 usual = turns.empty() ? Vector3::Zero() : median_of_axes(turns);
   constexpr double rests = 1.0 * units::degree;
   double largest = 0.0;
   Vector3 run = Vector3::Zero();

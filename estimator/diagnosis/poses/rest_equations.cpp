@@ -180,25 +180,26 @@ void Equations::add_of_temperature() {
   }
 }
 
-// Of a block the part that is before a jump within it, by its mean between those of `side` blocks on either side: 0 to 1. Axes weigh as the
-// differences of neighbours are small.
-double before_jump(const Eigen::MatrixXd& readings, Eigen::Index block, Eigen::Index side) {
+// By which an axis counts: the square of its neighbours' usual difference, inverted; 0 where nothing changes.
+Eigen::VectorXd weights_of_axes(const Eigen::MatrixXd& readings) {
   const Eigen::Index n = readings.rows();
-  double along = 0.0, square = 0.0;
+  const Eigen::MatrixXd steps = (readings.bottomRows(n - 1) - readings.topRows(n - 1)).cwiseAbs();
+  Eigen::VectorXd weights(readings.cols());
   for (Eigen::Index axis = 0; axis < readings.cols(); ++axis) {
-    const Eigen::VectorXd y = readings.col(axis);
-    std::vector<double> steps(static_cast<std::size_t>(n - 1));
-    for (Eigen::Index k = 0; k + 1 < n; ++k) {
-      steps[static_cast<std::size_t>(k)] = std::abs(y(k + 1) - y(k));
-    }
-    const double noise = median(std::move(steps));
-    if (noise > 0.0) {
-      const double early = y.segment(block - side, side).mean(), late = y.segment(block + 1, side).mean();
-      along += (late - early) * (late - y(block)) / (noise * noise);
-      square += (late - early) * (late - early) / (noise * noise);
-    }
+    const double noise = median({steps.col(axis).begin(), steps.col(axis).end()});
+    weights(axis) = noise > 0.0 ? 1.0 / (noise * noise) : 0.0;
   }
-  return square > 0.0 ? std::clamp(along / square, 0.0, 1.0) : 0.0;
+  return weights;
+}
+
+// Of a block the part that is before a jump within it, by its mean between those of `side` blocks on either side: 0 to 1.
+double before_jump(const Eigen::MatrixXd& readings, const Eigen::VectorXd& weights, Eigen::Index block,
+                   Eigen::Index side) {
+  const Eigen::RowVectorXd early = readings.middleRows(block - side, side).colwise().mean(),
+                           late = readings.middleRows(block + 1, side).colwise().mean();
+  const Eigen::VectorXd weighted = (late - early).transpose().cwiseProduct(weights);
+  const double square = (late - early).dot(weighted);
+  return square > 0.0 ? std::clamp((late - readings.row(block)).dot(weighted) / square, 0.0, 1.0) : 0.0;
 }
 
 // Within or at the ends of a block that has three beside it on either side in one stand: a block alone is no jump. Where in the block follows
@@ -206,11 +207,13 @@ double before_jump(const Eigen::MatrixXd& readings, Eigen::Index block, Eigen::I
 void Equations::add_jump() {
   constexpr Eigen::Index least = 3;
   const auto pose = [&](Eigen::Index i) { return blocks_.pose[static_cast<std::size_t>(i)]; };
+  const Eigen::MatrixXd& readings = gyro_ ? blocks_.gyro : blocks_.accel;
+  const Eigen::VectorXd weights = weights_of_axes(readings);
   RestCandidate c;
   std::vector<Eigen::VectorXd> columns;
   for (Eigen::Index i = least; i + least < blocks_.rows(); ++i) {
     if (pose(i - least) == pose(i + least)) {
-      const double before = before_jump(gyro_ ? blocks_.gyro : blocks_.accel, i, least);
+      const double before = before_jump(readings, weights, i, least);
       Eigen::VectorXd step = Eigen::VectorXd::Zero(blocks_.rows());
       step(i) = 1.0 - before;
       for (Eigen::Index k = i + 1; k < blocks_.rows(); ++k) {
